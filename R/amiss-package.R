@@ -1,0 +1,54 @@
+#' amiss: find what a simulation gets wrong, name the cause, measure the gain
+#'
+#' The way the data goes: [measurements()] and a simulator ([zone()], [function_simulator()]) give an ensemble
+#' ([simulate_design()], or [ensemble()] for runs made elsewhere); [train_emulator()], [calibrate()],
+#' [attribute_discrepancy()] follow. [upgrade_model()] runs the whole loop with a [catalogue()] of [mechanism()]s,
+#' [report()] writes it down, and [run_study()] does all of it from one file.
+#'
+#' @useDynLib amiss, .registration = TRUE
+#' @importFrom Rcpp evalCpp
+#' @importFrom rlang %||% .data
+#' @importFrom generics tidy glance augment
+#' @keywords internal
+"_PACKAGE"
+
+#' @export
+generics::tidy
+
+#' @export
+generics::glance
+
+#' @export
+generics::augment
+
+format_version <- 1L
+
+# A seed given by the user, or one drawn from R's generator, so that set.seed() governs.
+pick_seed <- function(seed, call = rlang::caller_env()) {
+  if (is.null(seed)) return(sample.int(.Machine$integer.max, 1))
+  check_input(checkmate::check_number(seed, lower = 0, upper = 2^53, finite = TRUE), "seed", call = call)
+  as.numeric(seed)
+}
+
+# Evaluates an expression under a seed of its own and leaves R's generator as it was.
+with_seed <- function(seed, expression) {
+  old <- globalenv()$.Random.seed
+  on.exit(if (is.null(old)) rm(list = ".Random.seed", envir = globalenv()) else assign(".Random.seed", old, envir = globalenv()))
+  set.seed(as.integer(seed %% .Machine$integer.max), kind = "Mersenne-Twister", normal.kind = "Inversion", sample.kind = "Rejection")
+  expression
+}
+
+check_threads <- function(threads, call = rlang::caller_env()) {
+  check_input(checkmate::check_count(threads, positive = TRUE), "threads", call = call)
+  as.integer(threads)
+}
+
+engine_context <- function(seed, threads) list(seed = seed, threads = threads)
+
+# The engine's own exceptions become the package's conditions.
+call_engine <- function(expression, call = rlang::caller_env()) {
+  tryCatch(expression, `Rcpp::exception` = function(e) {
+    numerical <- inherits(e, "std::runtime_error")
+    (if (numerical) abort_numerical else abort_input)("The computation stopped: {conditionMessage(e)}.", call = call)
+  })
+}

@@ -1,0 +1,72 @@
+attribution_control <- list(surrogates = 199, smallest_shift = 0.05, level = 0.05, least_log10_bf = 0.5,
+                            ais = list(pilot_chains = 48, groups = 4, importance_draws = 600))
+
+#' Which boundary conditions drive the discrepancy
+#'
+#' For each condition: the evidence that the history model loses when the condition is dropped, its share of the
+#' variance, and a p-value from surrogates (all conditions shifted in time together, which keeps their
+#' autocorrelation and their correlation with one another), adjusted over all conditions by Holm's method.
+#'
+#' @param fit A calibration ([calibrate()]).
+#' @param control List of options: `surrogates` (199), `smallest_shift` (0.05 of the record), `level` (0.05),
+#'   `least_log10_bf` (0.5: what a condition must earn besides its p-value), and `ais` for the sampler.
+#' @inheritParams calibrate
+#' @return An object of class `amiss_attribution`; its `table` is ranked.
+#' @export
+attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
+  check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
+  control <- merge_control(attribution_control, control)
+  ais <- fit$control$ais
+  ais[names(control$ais)] <- control$ais
+  control$ais <- merge_control(ais_control, ais, "control$ais")
+  seed <- pick_seed(seed)
+  threads <- check_threads(threads)
+  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  full_setting <- fit$history$setting[which.max(fit$history$log_likelihood)]
+  settings <- unique(c(full_setting, fit$history$null_setting))
+  result <- call_engine(attribute_(data, fit$priors, settings, control, engine_context(seed, threads)))
+  conditions <- fit$measurements$conditions
+  log10_bf <- (fit$history$log_evidence - result$log_evidence_dropped) / log(10)
+  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf,
+                      standard_error = sqrt(fit$history$standard_error^2 + result$standard_error^2) / log(10),
+                      share = variance_shares(fit, data), p_value = result$adjusted, p_value_single = result$p_value,
+                      significant = result$adjusted <= control$level & log10_bf >= control$least_log10_bf,
+                      trusted = result$trusted & fit$history$trusted)
+  table <- table[order(-table$log10_bf_dropped), ]
+  rownames(table) <- NULL
+  structure(list(format_version = format_version, table = table, surrogates = nrow(result$null_statistics),
+                 statistic = stats::setNames(result$statistic, conditions), null_statistics = result$null_statistics,
+                 control = control, seed = seed), class = "amiss_attribution")
+}
+
+# Share of the variance of the record outside the simulation space that each condition's fitted response carries:
+# cov(response_s, y) / var(y). Shares and the unexplained rest add to one, whatever the correlation of conditions.
+variance_shares <- function(fit, data) {
+  parts <- condition_responses(fit, data)
+  outside <- function(x) stats::lm.fit(data$basis, x)$residuals
+  y <- outside(data$y)
+  colSums(outside(parts) * y) / sum(y^2)
+}
+
+# Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).
+condition_responses <- function(fit, data) {
+  phi <- sweep(sweep(data$responses, 2, fit$history$centre), 2, fit$history$scale, "/")
+  b <- rowMeans(fit$coefficients)
+  vapply(seq_along(fit$measurements$conditions), function(s) {
+    own <- data$condition == s - 1L
+    as.numeric(phi[, own, drop = FALSE] %*% b[own])
+  }, numeric(nrow(phi)))
+}
+
+#' @export
+print.amiss_attribution <- function(x, ...) {
+  cli::cli_text("{.strong Attribution} of the discrepancy ({x$surrogates} surrogates)")
+  print(x$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")], digits = 3, row.names = FALSE)
+  named <- x$table$boundary[x$table$significant]
+  cli::cli_bullets(c("*" = if (length(named)) "driven by {.field {named}}" else "no boundary condition is significant",
+                     ">" = "next: {.fun upgrade_model} with a {.fun catalogue}"))
+  invisible(x)
+}
+
+#' @export
+tidy.amiss_attribution <- function(x, ...) x$table

@@ -1,0 +1,157 @@
+ais_control <- list(pilot_chains = 64, groups = 8, chains = 32, sweeps = 3, ess_drop = 0.7, resample = TRUE,
+                    importance_draws = 1000, max_components = 3)
+
+calibration_control <- list(confidence = NULL, amplitude = NULL, time_constants = NULL, error_times = NULL,
+                            error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, ais = list())
+
+#' Calibrate a simulator on measurements
+#'
+#' Two posteriors are sampled by annealed importance sampling. The first is that of the discrepancy and the error,
+#' on the part of the record outside the simulation space, which no parameter can reach. The second is that of the
+#' parameters, on the part inside, under the error that the first has learnt. The product of the two normalising
+#' constants is the evidence of the model, as a density of the calibration record.
+#'
+#' @param emulator A trained emulator ([train_emulator()]).
+#' @param measurements The [measurements()].
+#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
+#'   `amplitude` (scale of the half-Cauchy prior of each condition's share of the discrepancy, in the target's unit;
+#'   default the noise), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
+#'   (variance beside the white noise) of the autocorrelated error, `error_draws` (number of error draws carried
+#'   into the calibration), and `ais`, a list for the sampler (`pilot_chains`, `groups`, `chains`, `sweeps`,
+#'   `ess_drop`, `resample`, `importance_draws`, `max_components`).
+#' @param seed Seed; if `NULL`, R's generator gives one.
+#' @param threads Number of threads; the result does not depend on it.
+#' @return An object of class `amiss_calibration`.
+#' @export
+calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
+  check_input(checkmate::check_class(emulator, "amiss_emulator"), "emulator")
+  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  seed <- pick_seed(seed)
+  threads <- check_threads(threads)
+  rows <- used_rows(measurements, "calibrate")
+  if (nrow(emulator$basis$vectors) != length(rows)) {
+    abort_input(c("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have {length(rows)} calibration rows.",
+                  i = "Train it on runs at exactly these rows."))
+  }
+  control <- fill_calibration_control(control, measurements, length(rows))
+  data <- history_data(emulator, measurements, rows, control)
+  priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
+                 amplitude = control$amplitude, correlation_times = control$error_times, ratios = control$error_ratios)
+
+  history <- call_engine(history_(data, priors, control$ais, engine_context(seed, threads)))
+  picked <- systematic_draws(history$weights, control$error_draws)
+  errors <- list(setting = history$setting[picked], variance = history$variance[picked], t = history$t[picked, , drop = FALSE])
+  estimates <- call_engine(history_estimates_(data, priors, errors))
+  posterior <- call_engine(calibrate_(emulator$processes, estimates, control$ais, engine_context(seed + 1, threads)))
+
+  values <- unit_to_values(posterior$unit, emulator$parameters)
+  error_se <- error_draw_error(posterior)
+  log_evidence <- history$log_evidence + posterior$log_evidence
+  se <- sqrt(history$standard_error^2 + posterior$standard_error^2 + error_se^2)
+  structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
+                 seed = seed, rows = rows, values = values, weights = posterior$weights,
+                 history = history, posterior = posterior, errors = errors,
+                 coefficients = estimates$coefficients, priors = priors,
+                 log_evidence = log_evidence, standard_error = se, interval = log_evidence + c(-1.96, 1.96) * se,
+                 trust = trust(history, posterior, error_se)), class = "amiss_calibration")
+}
+
+fill_calibration_control <- function(control, measurements, n, call = rlang::caller_env()) {
+  control <- merge_control(calibration_control, control, call = call)
+  control$ais <- merge_control(ais_control, control$ais, "control$ais", call = call)
+  step <- measurements$step_h
+  if (is.null(control$confidence)) control["confidence"] <- 2 / n
+  if (is.null(control$amplitude)) control["amplitude"] <- measurements$noise_sd
+  if (is.null(control$time_constants)) {
+    taus <- step * 2^(1:6)
+    control[["time_constants"]] <- c(0, taus[taus <= n * step / 6])
+  }
+  if (is.null(control$error_times)) control[["error_times"]] <- c(2, 8) * step
+  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",
+              "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
+  check_input(checkmate::check_number(control$amplitude, lower = 1e-12), "control$amplitude", call = call)
+  check_input(checkmate::check_numeric(control$time_constants, lower = 0, min.len = 1, any.missing = FALSE), "control$time_constants", call = call)
+  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, any.missing = FALSE, max.len = 3), "control$error_times", call = call)
+  check_input(checkmate::check_numeric(control$error_ratios, lower = 0, min.len = 1, any.missing = FALSE), "control$error_ratios", call = call)
+  check_input(checkmate::check_count(control$error_draws, positive = TRUE), "control$error_draws", call = call)
+  control
+}
+
+# Filter responses over the whole averaged record, so that each calibration row knows its history.
+filter_responses <- function(measurements, time_constants) {
+  all <- seq_along(measurements$y)
+  filter_bank_(measurements$boundary, time_constants, measurements$hours, segment_starts(measurements, all))
+}
+
+history_data <- function(emulator, measurements, rows, control) {
+  responses <- filter_responses(measurements, control$time_constants)
+  list(y = measurements$y[rows], basis = emulator$basis$vectors, responses = responses[rows, , drop = FALSE],
+       condition = rep(measurements$condition - 1L, each = length(control$time_constants)),
+       time = measurements$hours[rows], new_segment = segment_starts(measurements, rows))
+}
+
+# n draws, each with equal weight, from weighted ones; deterministic.
+systematic_draws <- function(weights, n) {
+  findInterval((seq_len(n) - 0.5) / n, cumsum(weights / sum(weights)), left.open = TRUE) + 1L
+}
+
+# Monte Carlo error from carrying a finite number of error draws: how unevenly they share in the likelihood.
+error_draw_error <- function(posterior) {
+  log_d <- posterior$error_log_densities
+  share <- exp(sweep(log_d, 2, apply(log_d, 2, max)))
+  share <- as.numeric(sweep(share, 2, colSums(share), "/") %*% posterior$weights)
+  n <- length(share)
+  if (n < 2) return(0)
+  sqrt(max(0, sum(share^2) - 1 / n) * n / (n - 1))
+}
+
+trust <- function(history, posterior, error_se) {
+  why <- c(if (!history$trusted) paste("discrepancy:", history$verdict),
+           if (!posterior$trusted) paste("parameters:", posterior$verdict),
+           if (error_se > 0.7) "the error seen outside the simulation space does not fit what is left inside it")
+  list(trusted = is.null(why), verdict = if (is.null(why)) "trusted: chains move, weights are even and two estimators agree" else paste(why, collapse = "; "))
+}
+
+#' @export
+print.amiss_calibration <- function(x, ...) {
+  cli::cli_text("{.strong Calibration} on {length(x$rows)} rows of {.val {x$measurements$name}}")
+  cli::cli_text("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)}, {round(x$interval[2] / log(10), 2)}], {x$trust$verdict}")
+  print(parameter_table(x), digits = 3, row.names = FALSE)
+  cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
+  invisible(x)
+}
+
+weighted_quantile <- function(x, w, probs) {
+  order <- order(x)
+  cumulative <- cumsum(w[order]) / sum(w)
+  stats::approx(cumulative, x[order], probs, rule = 2, ties = "ordered")$y
+}
+
+parameter_table <- function(fit) {
+  rows <- lapply(names(fit$emulator$parameters), function(n) {
+    q <- weighted_quantile(fit$values[, n], fit$weights, c(0.5, 0.025, 0.975))
+    data.frame(name = n, unit = fit$emulator$parameters[[n]]$unit, median = q[1], lower95 = q[2], upper95 = q[3])
+  })
+  do.call(rbind, rows)
+}
+
+#' @export
+coef.amiss_calibration <- function(object, ...) {
+  table <- parameter_table(object)
+  stats::setNames(table$median, table$name)
+}
+
+#' @export
+logLik.amiss_calibration <- function(object, ...) {
+  structure(object$log_evidence, df = length(object$emulator$parameters), nobs = length(object$rows), class = "logLik")
+}
+
+#' @export
+tidy.amiss_calibration <- function(x, ...) parameter_table(x)
+
+#' @export
+glance.amiss_calibration <- function(x, ...) {
+  data.frame(log10_evidence = x$log_evidence / log(10), lower95 = x$interval[1] / log(10), upper95 = x$interval[2] / log(10),
+             trusted = x$trust$trusted, n = length(x$rows), vectors = ncol(x$emulator$basis$vectors),
+             runs = nrow(x$emulator$processes$inputs))
+}

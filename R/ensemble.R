@@ -1,0 +1,105 @@
+#' Design and runs: an ensemble of simulations
+#'
+#' `simulate_design()` draws a Latin hypercube over the priors and runs the simulator at each point.
+#' `ensemble()` takes a design and runs that were made elsewhere.
+#'
+#' @param simulator A simulator: [zone()], [function_simulator()].
+#' @param measurements [measurements()]; the simulator is driven by them.
+#' @param runs Number of runs.
+#' @param seed Seed of the design; if `NULL`, R's generator gives one.
+#' @param threads Number of threads.
+#' @return An object of class `amiss_ensemble`: parameter values, their places in the unit cube and the outputs at
+#'   the calibration rows (one column per run).
+#' @export
+simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1) {
+  check_simulator(simulator)
+  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  threads <- check_threads(threads)
+  parameters <- free_parameters(simulator)
+  if (!length(parameters)) abort_input(c("The simulator has no free parameter.", i = "Replace a number by {.fun free}."))
+  check_enough_runs(runs, length(parameters))
+  seed <- pick_seed(seed)
+  unit <- with_seed(seed, lhs::randomLHS(runs, length(parameters)))
+  values <- unit_to_values(unit, parameters)
+  outputs <- simulate_measured(simulator, values, measurements, "calibrate", threads)
+  new_ensemble(parameters, unit, values, outputs, simulator, seed)
+}
+
+#' @rdname simulate_design
+#' @param design Matrix of parameter values, one run a row, named columns.
+#' @param outputs Matrix of outputs at the calibration rows of the measurements, one run a column.
+#' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not given, each gets a
+#'   uniform prior over the range of its column.
+#' @export
+ensemble <- function(design, outputs, parameters = NULL) {
+  design <- as.matrix(design)
+  outputs <- as.matrix(outputs)
+  check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"), "design")
+  check_input(checkmate::check_matrix(outputs, "numeric"), "outputs")
+  if (nrow(design) != ncol(outputs)) {
+    abort_input(c("{.arg design} has {nrow(design)} rows and {.arg outputs} {ncol(outputs)} columns; each row of the design needs its run.",
+                  i = "Give the outputs as one column per run."))
+  }
+  check_enough_runs(nrow(design), ncol(design))
+  if (is.null(parameters)) {
+    parameters <- lapply(colnames(design), function(name) free(name, uniform(min(design[, name]), max(design[, name]))))
+  }
+  names(parameters) <- vapply(parameters, `[[`, "", "name")
+  absent <- setdiff(names(parameters), colnames(design))
+  if (length(absent)) abort_input("{.arg design} lacks {cli::qty(absent)}column{?s} {.val {absent}}.")
+  values <- design[, names(parameters), drop = FALSE]
+  unit <- values
+  for (name in names(parameters)) {
+    prior <- parameters[[name]]$prior
+    outside <- which(values[, name] < prior$lower | values[, name] > prior$upper)
+    if (length(outside) == nrow(values)) {
+      abort_input(c("No run lies where the prior of {.val {name}} has mass: {format(prior)}, while the runs span {signif(min(values[, name]), 4)} to {signif(max(values[, name]), 4)}.",
+                    i = "Correct the prior or make runs inside it."))
+    }
+    if (length(outside)) {
+      abort_input(c("{length(outside)} run{?s} lie{?s/} outside the prior of {.val {name}}; the first is run {outside[1]} with value {values[outside[1], name]}.",
+                    i = "Widen the prior or leave these runs out."))
+    }
+    unit[, name] <- prior_cdf(prior, values[, name])
+  }
+  new_ensemble(parameters, unname(unit), values, outputs, NULL, NA)
+}
+
+check_enough_runs <- function(runs, parameters, call = rlang::caller_env()) {
+  if (runs < max(5, parameters + 2)) {
+    abort_input(c("{runs} run{?s} {?is/are} too few for {parameters} parameter{?s}; at least {max(5, parameters + 2)} are needed.",
+                  i = "Ten times the number of parameters is a good start."), call = call)
+  }
+}
+
+unit_to_values <- function(unit, parameters) {
+  values <- vapply(seq_along(parameters), function(p) prior_quantile(parameters[[p]]$prior, unit[, p]), numeric(nrow(unit)))
+  matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
+}
+
+new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, call = rlang::caller_env()) {
+  failed <- which(colSums(!is.finite(outputs)) > 0)
+  if (length(failed)) {
+    left <- ncol(outputs) - length(failed)
+    if (left < max(5, length(parameters) + 2)) {
+      abort_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable run{?s} {?is/are} too few.",
+                    x = "The first is run {failed[1]} at {paste(colnames(values), signif(values[failed[1], ], 4), sep = ' = ', collapse = ', ')}.",
+                    i = "Find out why the simulator fails there, or narrow the priors."), call = call)
+    }
+    warn_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left out.",
+                 i = "The first is run {failed[1]} at {paste(colnames(values), signif(values[failed[1], ], 4), sep = ' = ', collapse = ', ')}."))
+    outputs <- outputs[, -failed, drop = FALSE]
+    unit <- unit[-failed, , drop = FALSE]
+    values <- values[-failed, , drop = FALSE]
+  }
+  structure(list(format_version = format_version, parameters = parameters, unit = unit, values = values, outputs = outputs,
+                 simulator = simulator, failed = length(failed), seed = seed), class = "amiss_ensemble")
+}
+
+#' @export
+print.amiss_ensemble <- function(x, ...) {
+  cli::cli_text("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over {length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}")
+  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}", ">" = "next: {.fun train_emulator}"))
+  invisible(x)
+}

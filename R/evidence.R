@@ -1,0 +1,23 @@
+#' Bayes factor of two calibrated models
+#'
+#' Both evidences are densities of the same measured record, so that models with different bases may be compared.
+#' The words are those of Monari (2022), table 1.
+#'
+#' @param model,reference Calibrations ([calibrate()]) on the same measurements.
+#' @return A one-row data frame: `log10_bf` in favour of `model`, its 95 % interval `lower95`, `upper95`, and `word`.
+#' @export
+bayes_factor <- function(model, reference) {
+  for (fit in list(model, reference)) check_input(checkmate::check_class(fit, "amiss_calibration"), "model")
+  if (!identical(model$measurements$y[model$rows], reference$measurements$y[reference$rows])) {
+    abort_input(c("The two models were calibrated on different records; their evidences cannot be compared.",
+                  i = "Calibrate both on the same measurements."))
+  }
+  log10_bf <- (model$log_evidence - reference$log_evidence) / log(10)
+  se <- sqrt(model$standard_error^2 + reference$standard_error^2) / log(10)
+  data.frame(log10_bf = log10_bf, lower95 = log10_bf - 1.96 * se, upper95 = log10_bf + 1.96 * se, word = evidence_word(log10_bf))
+}
+
+evidence_word <- function(log10_bf) {
+  words <- c("negative", "weak", "substantial", "strong", "decisive")
+  words[findInterval(log10_bf, c(0, 0.5, 1, 2)) + 1]
+}

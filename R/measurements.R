@@ -1,0 +1,261 @@
+#' Measurements: the target, the boundary conditions and what each row is for
+#'
+#' Checks a table of measurements and prepares it for all later stages: the record is cut into segments wherever
+#' time is broken, averaged to a coarser step if asked, and each row is given its use: calibration, validation or
+#' warm-up. Time stamps mark the end of each interval.
+#'
+#' @param data A data frame; every numeric column may drive the simulator.
+#' @param time Name of the time column: `POSIXct`, ISO 8601 text or numbers (hours).
+#' @param target Name of the measured target.
+#' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws + circular(Wd)` or their
+#'   names. A circular quantity (degrees) enters as sine and cosine.
+#' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's unit. If not
+#'   given, the standard error of the averages is taken, which needs `average`.
+#' @param average Width of the averages in hours; `NULL` keeps the step of the data.
+#' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that say which rows
+#'   calibrate and which validate. Rows of neither use still drive the simulator.
+#' @param warmup Hours at the start of each segment that are left out, so that the simulator's unknown initial
+#'   state is forgotten.
+#' @param name,unit A name for the record, and the target's unit, for people.
+#' @return An object of class `amiss_measurements`.
+#' @examples
+#' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
+#' measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6)
+#' @export
+measurements <- function(data, time, target, boundary, noise_sd = NULL, average = NULL, calibrate = NULL,
+                         validate = NULL, warmup = 0, name = target, unit = "") {
+  check_input(checkmate::check_data_frame(data, min.rows = 10), "data")
+  check_input(checkmate::check_string(time), "time")
+  check_input(checkmate::check_string(target), "target")
+  check_input(checkmate::check_number(warmup, lower = 0, finite = TRUE), "warmup")
+  terms <- boundary_terms(boundary)
+  require_columns(data, c(time, target, terms$name))
+  hours <- read_time(data[[time]], time)
+  step <- stats::median(diff(hours))
+  segment <- cumsum(c(TRUE, diff(hours) > 1.5 * step))
+  check_regular(hours, step, segment, time)
+
+  numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
+  require_numeric(data, c(target, terms$name))
+  drivers <- as.matrix(data[numeric_columns])
+  y <- as.numeric(data[[target]])
+  require_complete(drivers, terms$name, hours, data[[time]])
+
+  if (is.character(calibrate)) calibrate <- eval_rows(calibrate, data, "calibrate")
+  if (is.character(validate)) validate <- eval_rows(validate, data, "validate")
+  calibrate <- rows_flag(calibrate, nrow(data), "calibrate", default = is.null(validate) | !isTRUE(any(validate)))
+  if (is.null(calibrate)) calibrate <- !validate
+  validate <- rows_flag(validate, nrow(data), "validate", default = FALSE)
+  if (any(calibrate & validate)) {
+    abort_input(c("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and validate{?s/}; the first is row {which(calibrate & validate)[1]}.",
+                  i = "Validation rows must not be seen by the calibration."))
+  }
+  into_segment <- hours - stats::ave(hours, segment, FUN = min) + step
+  warm <- into_segment <= warmup + 1e-9
+  use <- ifelse(warm, "warmup", ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none")))
+
+  raw <- list(time = data[[time]], hours = hours, step_h = step, segment = segment, use = use, y = y, drivers = drivers)
+  coarse <- average_rows(raw, average)
+  x <- boundary_columns(coarse$drivers, terms)
+  constant <- constant_conditions(x, coarse$use == "calibrate")
+  if (length(constant)) {
+    warn_input(c("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do} not vary over the calibration rows and {?is/are} left out of the analysis.",
+                 i = "A condition that is constant cannot be told from the mean."))
+    x <- x_keep(x, setdiff(x$names, constant))
+  }
+  if (sum(coarse$use == "calibrate" & !is.na(coarse$y)) < 20) {
+    abort_input(c("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after averaging and warm-up; at least 20 are needed.",
+                  i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
+  }
+  noise_sd <- noise_or_standard_error(noise_sd, coarse)
+  structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise_sd,
+                 raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
+                 segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
+                 block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names),
+            class = "amiss_measurements")
+}
+
+#' @rdname measurements
+#' @param x,... Used in a formula only: `circular(Wd)` marks a quantity in degrees.
+#' @export
+circular <- function(x, ...) x
+
+boundary_terms <- function(boundary, call = rlang::caller_env()) {
+  labels <- if (inherits(boundary, "formula")) attr(stats::terms(boundary), "term.labels") else boundary
+  check_input(checkmate::check_character(labels, min.len = 1, any.missing = FALSE, unique = TRUE), "boundary",
+              "Give a formula such as {.code ~ Te + circular(Wd)}.", call = call)
+  is_circular <- grepl("^circular\\(.*\\)$", labels)
+  list(name = trimws(sub("^circular\\((.*)\\)$", "\\1", labels)), circular = is_circular)
+}
+
+require_columns <- function(data, columns, call = rlang::caller_env()) {
+  missing <- setdiff(columns, names(data))
+  if (length(missing)) {
+    abort_input(c("{cli::qty(missing)}Column{?s} {.val {missing}} {?is/are} not in the data.",
+                  i = "Columns there: {.val {names(data)}}."), call = call)
+  }
+}
+
+require_numeric <- function(data, columns, call = rlang::caller_env()) {
+  for (column in columns) {
+    if (is.numeric(data[[column]])) next
+    values <- as.character(data[[column]])
+    bad <- which(is.na(suppressWarnings(as.numeric(values))) & !is.na(values))
+    where <- if (length(bad)) "row {bad[1]} holds {.val {values[bad[1]]}}" else "it is of class {.cls {class(data[[column]])}}"
+    abort_input(c(paste0("Column {.val {column}} is not numeric: ", where, "."),
+                  i = "Read it as numbers, or mark missing values as NA."), call = call)
+  }
+}
+
+read_time <- function(values, name, call = rlang::caller_env()) {
+  if (is.factor(values)) values <- as.character(values)
+  if (is.character(values)) {
+    parsed <- as.POSIXct(sub("T", " ", values, fixed = TRUE), tz = "UTC", optional = TRUE,
+                         tryFormats = c("%Y-%m-%d %H:%M:%OS", "%Y-%m-%d %H:%M", "%Y-%m-%d"))
+    bad <- which(is.na(parsed))
+    if (length(bad)) {
+      abort_input(c("Time column {.val {name}} cannot be read: row {bad[1]} holds {.val {values[bad[1]]}}.",
+                    i = "Use ISO 8601, for example 2013-08-30T00:10:00."), call = call)
+    }
+    values <- parsed
+  }
+  hours <- if (inherits(values, "POSIXct")) as.numeric(values) / 3600 else if (is.numeric(values)) as.numeric(values)
+  if (is.null(hours)) abort_input("Time column {.val {name}} is of class {.cls {class(values)}}; give POSIXct, ISO text or hours.", call = call)
+  if (anyNA(hours)) {
+    abort_input(c("Time column {.val {name}} has {sum(is.na(hours))} missing value{?s}; the first is in row {which(is.na(hours))[1]}.",
+                  i = "Every row needs its time; delete rows without one."), call = call)
+  }
+  twice <- which(duplicated(hours))
+  if (length(twice)) {
+    abort_input(c("Time column {.val {name}} has {length(twice)} duplicated time stamp{?s}; the first is {.val {format(values[twice[1]])}} in row {twice[1]}.",
+                  i = "Keep one row for each time (a change of summer time does this; use UTC)."), call = call)
+  }
+  back <- which(diff(hours) < 0)
+  if (length(back)) {
+    abort_input(c("Time column {.val {name}} goes back in row {back[1] + 1}: {.val {format(values[back[1] + 1])}} after {.val {format(values[back[1]])}}.",
+                  i = "Sort the rows by time."), call = call)
+  }
+  hours
+}
+
+check_regular <- function(hours, step, segment, name, call = rlang::caller_env()) {
+  within <- diff(segment) == 0
+  off <- which(within & abs(diff(hours) - step) > 0.01 * step)
+  if (length(off)) {
+    abort_input(c("Time column {.val {name}} has unequal steps: {signif(diff(hours)[off[1]], 4)} h after row {off[1]}, while the usual step is {signif(step, 4)} h.",
+                  i = "Interpolate or average the record to equal steps; whole gaps may stay."), call = call)
+  }
+  gaps <- which(!within)
+  if (length(gaps)) {
+    cli::cli_inform(c(i = "The record has {length(gaps)} gap{?s} (the first of {round(diff(hours)[gaps[1]], 1)} h after row {gaps[1]}); each part is simulated on its own."),
+                    class = "amiss_message_gap")
+  }
+}
+
+require_complete <- function(drivers, analysed, hours, time, call = rlang::caller_env()) {
+  for (column in analysed) {
+    bad <- which(!is.finite(drivers[, column]))
+    if (length(bad)) {
+      abort_input(c("Boundary condition {.val {column}} has {length(bad)} missing or infinite value{?s}; the first is in row {bad[1]} ({format(time[bad[1]])}).",
+                    i = "A simulator needs every value of what drives it: fill the gap, or remove these rows as a whole."), call = call)
+    }
+  }
+}
+
+eval_rows <- function(text, data, what, call = rlang::caller_env()) {
+  rows <- tryCatch(eval(parse(text = text)[[1]], data, baseenv()),
+                   error = function(e) abort_input(c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
+                                                     i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."), call = call))
+  rows
+}
+
+rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {
+  if (is.null(rows)) return(if (isTRUE(default)) rep(TRUE, n) else if (what == "calibrate") NULL else rep(FALSE, n))
+  check_input(checkmate::check_logical(rows, len = n, any.missing = FALSE), what, "One TRUE or FALSE for every row of the data.", call = call)
+  if (!any(rows)) abort_input("{.arg {what}} picks no row.", call = call)
+  rows
+}
+
+# Means over blocks of whole rows, aligned to the clock; a block must be complete and of one use and segment.
+average_rows <- function(raw, average, call = rlang::caller_env()) {
+  per_step <- 1L
+  if (!is.null(average)) {
+    check_input(checkmate::check_number(average, lower = 0, finite = TRUE), "average", call = call)
+    per_step <- as.integer(round(average / raw$step_h))
+    if (per_step < 1 || abs(per_step * raw$step_h - average) > 1e-6 * average) {
+      abort_input("{.arg average} = {average} h is not a whole multiple of the data's step of {signif(raw$step_h, 4)} h.", call = call)
+    }
+  }
+  width <- per_step * raw$step_h
+  clock <- floor((raw$hours - 0.5 * raw$step_h) / width)
+  key <- interaction(raw$segment, clock, drop = TRUE, lex.order = TRUE)
+  block <- as.integer(factor(key, levels = unique(key)))
+  size <- tabulate(block)
+  uses <- tapply(raw$use, block, function(u) if (length(unique(u)) == 1) u[1] else if ("warmup" %in% u) "warmup" else "none")
+  whole <- which(size == per_step)
+  index <- match(block, whole)
+  keep <- !is.na(index)
+  mean_of <- function(v) as.numeric(rowsum(v[keep], index[keep], reorder = TRUE)) / per_step
+  y <- mean_of(raw$y)
+  spread <- if (per_step > 1) sqrt(pmax(0, as.numeric(rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) / (per_step - 1)) / per_step) else rep(NA_real_, length(whole))
+  drivers <- rowsum(raw$drivers[keep, , drop = FALSE], index[keep], reorder = TRUE) / per_step
+  last <- which(keep)[!duplicated(index[keep], fromLast = TRUE)]
+  rownames(drivers) <- NULL
+  list(per_step = per_step, step_h = width, time = raw$time[last], hours = raw$hours[last], segment = raw$segment[last],
+       use = unname(as.character(uses[whole])), y = y, standard_error = spread, drivers = drivers, block = index)
+}
+
+boundary_columns <- function(drivers, terms) {
+  columns <- lapply(seq_along(terms$name), function(i) {
+    v <- drivers[, terms$name[i]]
+    if (!terms$circular[i]) return(matrix(v, ncol = 1))
+    cbind(sin(v * pi / 180), cos(v * pi / 180))
+  })
+  list(values = do.call(cbind, columns), names = terms$name,
+       condition = rep(seq_along(columns), vapply(columns, ncol, 1L)))
+}
+
+constant_conditions <- function(x, rows) {
+  spread <- apply(x$values[rows, , drop = FALSE], 2, function(v) diff(range(v)))
+  size <- apply(abs(x$values[rows, , drop = FALSE]), 2, max)
+  x$names[!tapply(spread > 1e-9 * (1 + size), x$condition, any)]
+}
+
+x_keep <- function(x, names, call = rlang::caller_env()) {
+  if (!length(names)) abort_input("No boundary condition varies; there is nothing to attribute a discrepancy to.", call = call)
+  columns <- x$names[x$condition] %in% names
+  list(values = x$values[, columns, drop = FALSE], names = names, condition = match(x$names[x$condition][columns], names))
+}
+
+noise_or_standard_error <- function(noise_sd, coarse, call = rlang::caller_env()) {
+  if (!is.null(noise_sd)) {
+    check_input(checkmate::check_number(noise_sd, finite = TRUE), "noise_sd", call = call)
+    if (noise_sd <= 0) abort_input("{.arg noise_sd} must be positive; got {noise_sd}.", call = call)
+    return(as.numeric(noise_sd))
+  }
+  if (coarse$per_step < 3) {
+    abort_input(c("{.arg noise_sd} is needed: the data are not averaged, so that their scatter within a step is unknown.",
+                  i = "Give the standard deviation of the measurement error in the target's unit."), call = call)
+  }
+  sqrt(mean(coarse$standard_error[coarse$use == "calibrate"]^2, na.rm = TRUE))
+}
+
+# Rows of a use that have a measured value.
+used_rows <- function(measurements, use) which(measurements$use == use & !is.na(measurements$y))
+
+# TRUE where a row does not follow the one before at the usual step.
+segment_starts <- function(measurements, rows) {
+  segment <- measurements$segment[rows]
+  c(TRUE, diff(segment) != 0)
+}
+
+#' @export
+print.amiss_measurements <- function(x, ...) {
+  n <- table(factor(x$use, c("calibrate", "validate", "warmup")))
+  cli::cli_text("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in {length(unique(x$segment))} segment{?s}")
+  cli::cli_bullets(c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}",
+                     "*" = "{n[['calibrate']]} calibrate, {n[['validate']]} validate, {n[['warmup']]} warm up",
+                     "*" = "boundary conditions {.field {x$conditions}}",
+                     ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
+  invisible(x)
+}

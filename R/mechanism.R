@@ -1,0 +1,57 @@
+#' Mechanisms and catalogues
+#'
+#' A mechanism is a named physical change to a model: the edit that makes it, the boundary conditions that drive it
+#' and one sentence for a person. A catalogue holds the mechanisms that make sense for a model.
+#'
+#' @param name Short name.
+#' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared
+#'   by [free()].
+#' @param boundary Names of the boundary conditions that drive the mechanism.
+#' @param sentence One sentence for a person: what it means if this mechanism is the cause.
+#' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class `amiss_catalogue`.
+#' @examples
+#' mechanism("steady loss", edit = function(model) model, boundary = "Te", sentence = "Heat leaves that the model keeps.")
+#' @export
+mechanism <- function(name, edit, boundary, sentence) {
+  check_input(checkmate::check_string(name, min.chars = 1), "name")
+  check_input(checkmate::check_function(edit, nargs = 1), "edit")
+  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
+  check_input(checkmate::check_string(sentence, min.chars = 1), "sentence")
+  structure(list(name = name, edit = edit, boundary = boundary, sentence = sentence), class = "amiss_mechanism")
+}
+
+#' @rdname mechanism
+#' @param ... Mechanisms.
+#' @export
+catalogue <- function(...) {
+  mechanisms <- list(...)
+  if (!all(vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))) {
+    abort_input(c("Every entry of a catalogue must be a mechanism.", i = "Make each with {.fun mechanism}."))
+  }
+  names(mechanisms) <- vapply(mechanisms, `[[`, "", "name")
+  if (anyDuplicated(names(mechanisms))) abort_input("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}} stands twice in the catalogue.")
+  structure(mechanisms, class = "amiss_catalogue")
+}
+
+#' @export
+print.amiss_mechanism <- function(x, ...) {
+  cli::cli_text("{.strong {x$name}}, driven by {.field {x$boundary}}: {x$sentence}")
+  invisible(x)
+}
+
+#' @export
+print.amiss_catalogue <- function(x, ...) {
+  cli::cli_text("{.strong Catalogue} of {length(x)} mechanism{?s}")
+  for (entry in x) cli::cli_bullets(c("*" = "{.strong {entry$name}} ({entry$boundary}): {entry$sentence}"))
+  invisible(x)
+}
+
+extend <- function(simulator, mechanism, call = rlang::caller_env()) {
+  extended <- tryCatch(mechanism$edit(simulator), error = function(e) {
+    abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = conditionMessage(e)), call = call)
+  })
+  if (!inherits(extended, class(simulator)[1])) {
+    abort_input("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not a simulator.", call = call)
+  }
+  extended
+}

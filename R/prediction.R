@@ -1,0 +1,75 @@
+#' Predict with a calibrated simulator
+#'
+#' The simulator itself is run at draws of the posterior (no emulator error), and the error and the discrepancy
+#' learnt in calibration widen the band.
+#'
+#' @param object A calibration ([calibrate()]) of an ensemble that knows its simulator.
+#' @param use Which rows: `"calibrate"`, `"validate"` or both.
+#' @param draws Number of posterior draws.
+#' @inheritParams calibrate
+#' @param ... Not used.
+#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (band of new measurements), and
+#'   `crps`, the continuous ranked probability score of each row.
+#' @export
+predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), draws = 40, seed = object$seed, threads = 1, ...) {
+  use <- match.arg(use, several.ok = TRUE)
+  m <- object$measurements
+  simulator <- object$emulator$simulator
+  if (is.null(simulator)) {
+    abort_input(c("The runs of this ensemble were made elsewhere, so that the simulator cannot be run again.",
+                  i = "Use {.fun predict} on the emulator for the calibration rows."))
+  }
+  picked <- systematic_draws(object$weights[order(object$values[, 1])], draws)
+  picked <- order(object$values[, 1])[picked]
+  rows <- which(m$use %in% use & !is.na(m$y))
+  runs <- simulate_measured(simulator, object$values[picked, , drop = FALSE], m, use, check_threads(threads))
+  runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
+  if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
+  sd <- error_sd(object, rows)
+  with_seed(seed, summarise_prediction(m, rows, runs, sd))
+}
+
+# Standard deviation of error and discrepancy at the given rows, for each error draw (rows x draws).
+error_sd <- function(fit, rows) {
+  responses <- filter_responses(fit$measurements, fit$control$time_constants)[rows, , drop = FALSE]
+  phi <- sweep(sweep(responses, 2, fit$history$centre), 2, fit$history$scale, "/")
+  condition <- rep(fit$measurements$condition, each = length(fit$control$time_constants))
+  levels <- length(fit$control$error_ratios)
+  squares <- vapply(seq_along(fit$measurements$conditions), function(s) rowMeans(phi[, condition == s, drop = FALSE]^2), numeric(length(rows)))
+  ratio_of <- function(g) {
+    total <- 0
+    for (k in seq_along(fit$control$error_times)) {
+      total <- total + fit$control$error_ratios[g %% levels + 1]
+      g <- g %/% levels
+    }
+    total
+  }
+  squares <- matrix(squares, nrow = length(rows))
+  vapply(seq_along(fit$errors$variance), function(j) {
+    sqrt(fit$errors$variance[j] * (1 + ratio_of(fit$errors$setting[j])) + as.numeric(squares %*% fit$errors$t[j, ]))
+  }, numeric(length(rows)))
+}
+
+summarise_prediction <- function(m, rows, runs, sd) {
+  n <- 200
+  member <- rep_len(seq_len(ncol(runs)), n)
+  error <- rep_len(seq_len(ncol(sd)), n)
+  samples <- runs[, member, drop = FALSE] + sd[, error, drop = FALSE] * stats::rnorm(length(rows) * n)
+  y <- m$y[rows]
+  sorted <- t(apply(samples, 1, sort))
+  # CRPS of an ensemble: mean |x - y| - 1/2 mean |x - x'| (Gneiting and Raftery 2007), by the sorted members.
+  spread <- as.numeric(sorted %*% (2 * seq_len(n) - n - 1)) / n^2
+  data.frame(time = m$time[rows], use = m$use[rows], observed = y, mean = rowMeans(runs),
+             lower95 = apply(sorted, 1, stats::quantile, 0.025), upper95 = apply(sorted, 1, stats::quantile, 0.975),
+             crps = rowMeans(abs(samples - y)) - spread, segment = m$segment[rows])
+}
+
+prediction_scores <- function(prediction) {
+  score <- function(use) {
+    p <- prediction[prediction$use == use, ]
+    if (!nrow(p)) return(c(rmse = NA_real_, crps = NA_real_, coverage95 = NA_real_))
+    c(rmse = sqrt(mean((p$observed - p$mean)^2)), crps = mean(p$crps),
+      coverage95 = mean(p$observed >= p$lower95 & p$observed <= p$upper95))
+  }
+  list(calibrate = score("calibrate"), validate = score("validate"))
+}

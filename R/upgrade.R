@@ -1,0 +1,149 @@
+upgrade_control <- list(max_steps = 3, decisive = 2, level = 0.95, emulator = list(), calibration = list(), attribution = list())
+
+#' The loop: show, name the cause, extend, measure
+#'
+#' The model is calibrated and its discrepancy attributed; every mechanism of the catalogue is tried as a real
+#' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
+#' and the loop begins again with the extended model. Held-out rows only measure; they decide nothing.
+#'
+#' @param simulator The base model.
+#' @param measurements The [measurements()].
+#' @param catalogue A [catalogue()] of mechanisms.
+#' @param runs Runs of the simulator for each model.
+#' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#'   its interval above zero; 2), and lists `emulator`, `calibration` and `attribution` for the stages.
+#' @param quiet No progress messages.
+#' @inheritParams calibrate
+#' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried, the
+#'   named cause, the gain, and why the loop stopped.
+#' @export
+upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1, quiet = FALSE) {
+  check_simulator(simulator)
+  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
+  control <- merge_control(upgrade_control, control)
+  seed <- pick_seed(seed)
+  threads <- check_threads(threads)
+  say <- if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
+
+  settings <- list(measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
+  say("Calibrating the base model")
+  current <- measured_model(fit_model(simulator, settings), "base", NULL, NULL, settings)
+  report_model(current, say)
+  models <- list(current)
+  candidates <- NULL
+  repeat {
+    left <- setdiff(names(catalogue), unlist(lapply(models, `[[`, "mechanism")))
+    if (!length(left)) {
+      stopped <- "every mechanism of the catalogue has been adopted"
+      break
+    }
+    if (length(models) > control$max_steps) {
+      stopped <- sprintf("the limit of %d steps was reached", control$max_steps)
+      break
+    }
+    ordered <- trial_order(catalogue[left], current$attribution)
+    trials <- try_mechanisms(current, catalogue[ordered], settings, say)
+    candidates <- rbind(candidates, trials$table)
+    best <- which.max(trials$table$log10_bf)
+    if (!length(best) || trials$table$log10_bf[best] < control$decisive || trials$table$lower95[best] <= 0) {
+      stopped <- stop_reason(trials$table, current$attribution, control$decisive)
+      break
+    }
+    chosen <- trials$table$mechanism[best]
+    say("Adopted {.strong {chosen}}: log10 Bayes factor {round(trials$table$log10_bf[best], 1)}")
+    current <- measured_model(trials$fits[[chosen]], paste(current$name, "+", chosen), current$name, chosen, settings)
+    report_model(current, say)
+    models <- c(models, list(current))
+  }
+  say("Stopped: {stopped}")
+  structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
+                 named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models), stopped_because = stopped,
+                 measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
+}
+
+# Every model of a study is drawn on the same design seed: differences between models are not the design's.
+fit_model <- function(simulator, settings) {
+  control <- settings$control
+  ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
+  emulator <- train_emulator(ensemble, settings$measurements, control$emulator, threads = settings$threads)
+  calibrate(emulator, settings$measurements, control$calibration, seed = settings$seed, threads = settings$threads)
+}
+
+measured_model <- function(fit, name, parent, mechanism, settings) {
+  attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)
+  prediction <- predict(fit, seed = settings$seed, threads = settings$threads)
+  list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
+       prediction = prediction, scores = prediction_scores(prediction))
+}
+
+report_model <- function(model, say) {
+  first <- model$attribution$table[1, ]
+  say("{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration, {signif(model$scores$validate[['rmse']], 3)} held out; discrepancy answers most to {.field {first$boundary}} (log10 Bayes factor {round(first$log10_bf_dropped, 1)})")
+}
+
+# Mechanisms driven by what the attribution names come first.
+trial_order <- function(catalogue, attribution) {
+  table <- attribution$table
+  weight <- vapply(catalogue, function(m) {
+    own <- table$log10_bf_dropped[table$boundary %in% m$boundary & table$significant]
+    if (length(own)) max(own) else 0
+  }, 0)
+  names(catalogue)[order(-weight)]
+}
+
+try_mechanisms <- function(current, catalogue, settings, say) {
+  fits <- list()
+  rows <- list()
+  for (name in names(catalogue)) {
+    fit <- fit_model(extend(current$fit$emulator$simulator, catalogue[[name]]), settings)
+    bf <- bayes_factor(fit, current$fit)
+    say("  {name}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
+    fits[[name]] <- fit
+    rows[[name]] <- data.frame(from = current$name, mechanism = name, bf, trusted = fit$trust$trusted)
+  }
+  table <- do.call(rbind, rows)
+  rownames(table) <- NULL
+  # Equal prior probability for no change and for each mechanism.
+  log_odds <- c(0, table$log10_bf) * log(10)
+  probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))
+  table$probability <- probability[-1]
+  list(fits = fits, table = table)
+}
+
+stop_reason <- function(table, attribution, decisive) {
+  significant <- attribution$table$boundary[attribution$table$significant]
+  best <- which.max(table$log10_bf)
+  tail <- sprintf("no mechanism is decisive (best: %s, log10 Bayes factor %.1f, %.0f needed)", table$mechanism[best], table$log10_bf[best], decisive)
+  if (length(significant)) paste0(tail, "; what answers to ", paste(significant, collapse = ", "), " remains unexplained") else paste0(tail, " and no boundary condition is significant")
+}
+
+named_cause <- function(models, candidates, catalogue) {
+  if (length(models) < 2) return(NULL)
+  first <- models[[2]]$mechanism
+  own <- candidates[candidates$from == models[[1]]$name & candidates$mechanism == first, ]
+  list(mechanism = first, boundary = catalogue[[first]]$boundary, log10_bf = own$log10_bf, sentence = catalogue[[first]]$sentence)
+}
+
+upgrade_gain <- function(models) {
+  before <- models[[1]]
+  after <- models[[length(models)]]
+  bf <- bayes_factor(after$fit, before$fit)
+  both <- function(use, score) c(before$scores[[use]][[score]], after$scores[[use]][[score]])
+  list(log10_bf = bf$log10_bf, interval = c(bf$lower95, bf$upper95), rmse_calibration = both("calibrate", "rmse"),
+       rmse_validation = both("validate", "rmse"), coverage95_validation = both("validate", "coverage95"),
+       crps_calibration = both("calibrate", "crps"), crps_validation = both("validate", "crps"))
+}
+
+#' @export
+print.amiss_upgrade <- function(x, ...) {
+  cause <- x$named_cause
+  cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(x$models) - 1} mechanism{?s} adopted")
+  if (is.null(cause)) cli::cli_bullets(c("*" = "no cause is named")) else {
+    cli::cli_bullets(c("*" = "cause: {.strong {cause$mechanism}} ({cause$boundary}), log10 Bayes factor {round(cause$log10_bf, 1)}", " " = "{cause$sentence}"))
+  }
+  g <- x$gain
+  cli::cli_bullets(c("*" = "RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)} held out",
+                     "*" = "stopped because {x$stopped_because}", ">" = "next: {.fun report}"))
+  invisible(x)
+}

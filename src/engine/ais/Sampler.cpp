@@ -1,0 +1,323 @@
+#include "engine/ais/Sampler.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "engine/linalg/log_sum_exp.hpp"
+#include "engine/parallel/parallel_for.hpp"
+
+namespace amiss {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kMoveDof = 6.0;        // of the proposals while annealing
+constexpr double kImportanceDof = 8.0;  // of the final mixture
+constexpr double kAcceptance = 0.35;    // aimed at by the step length
+enum Purpose : std::uint64_t { kPilot = 1, kFrozen, kImportance, kBootstrap };
+
+struct Chains {
+  MatrixXd x;      // dimension x n
+  VectorXd ll;     // log-likelihood
+  VectorXd log_w;  // log weights since the last resampling
+
+  Index size() const { return x.cols(); }
+};
+
+struct Level {
+  double beta;
+  StudentT proposal;
+  double step;
+};
+
+VectorXd evaluate(const Target& target, const MatrixXd& x) {
+  return target.log_likelihood(x).unaryExpr(
+      [](double v) { return std::isfinite(v) ? v : -std::numeric_limits<double>::infinity(); });
+}
+
+Chains start(const Target& target, int n, Stream& stream) {
+  Chains chains;
+  chains.x = stream.normals(target.dimension(), n);
+  chains.ll = evaluate(target, chains.x);
+  chains.log_w = VectorXd::Zero(n);
+  return chains;
+}
+
+double effective_size(const VectorXd& log_w) { return 1.0 / normalised_exp(log_w).squaredNorm(); }
+
+// Conditional effective size per chain of a step d in inverse temperature (Zhou, Johansen and Aston 2016).
+double conditional_ess(const Chains& chains, double d) {
+  const VectorXd w = normalised_exp(chains.log_w);
+  const VectorXd v = chains.ll * d;
+  const double top = v.maxCoeff();
+  if (!std::isfinite(top)) return 0.0;
+  const Eigen::ArrayXd e = (v.array() - top).exp();
+  const double mean = (w.array() * e).sum();
+  return mean * mean / (w.array() * e.square()).sum();
+}
+
+double next_beta(const Chains& chains, double beta, double target_ess) {
+  if (conditional_ess(chains, 1.0 - beta) >= target_ess) return 1.0;
+  double low = std::log(1e-14), high = std::log(1.0 - beta);
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (conditional_ess(chains, std::exp(middle)) >= target_ess ? low : high) = middle;
+  }
+  return std::min(1.0, beta + std::exp(low));
+}
+
+// Systematic resampling; all weights become equal.
+void resample(Chains& chains, Stream& stream) {
+  const Index n = chains.size();
+  const VectorXd w = normalised_exp(chains.log_w);
+  MatrixXd x(chains.x.rows(), n);
+  VectorXd ll(n);
+  double cumulative = w[0];
+  const double offset = stream.uniform();
+  for (Index i = 0, from = 0; i < n; ++i) {
+    while (cumulative < (static_cast<double>(i) + offset) / static_cast<double>(n) && from < n - 1) cumulative += w[++from];
+    x.col(i) = chains.x.col(from);
+    ll[i] = chains.ll[from];
+  }
+  chains.x = std::move(x);
+  chains.ll = std::move(ll);
+  chains.log_w.setZero();
+}
+
+// One move of every chain at inverse temperature beta; returns the share accepted.
+double move(const Target& target, Chains& chains, const Level& level, Stream& stream) {
+  const Index n = chains.size();
+  MatrixXd proposed(chains.x.rows(), n);
+  for (Index i = 0; i < n; ++i) proposed.col(i) = level.proposal.step(chains.x.col(i), level.step, stream);
+  const VectorXd ll = evaluate(target, proposed);
+  int accepted = 0;
+  for (Index i = 0; i < n; ++i) {
+    const double log_u = std::log(stream.uniform());
+    if (!std::isfinite(ll[i])) continue;
+    const double log_ratio = level.beta * (ll[i] - chains.ll[i]) -
+                             0.5 * (proposed.col(i).squaredNorm() - chains.x.col(i).squaredNorm()) +
+                             level.proposal.log_density(chains.x.col(i)) - level.proposal.log_density(proposed.col(i));
+    if (log_u < log_ratio) {
+      chains.x.col(i) = proposed.col(i);
+      chains.ll[i] = ll[i];
+      ++accepted;
+    }
+  }
+  return static_cast<double>(accepted) / static_cast<double>(n);
+}
+
+std::vector<Level> pilot(const Target& target, const AisOptions& options, const Context& context, long& evaluations) {
+  Stream stream(context.seed, kPilot, 0);
+  Chains chains = start(target, options.pilot_chains, stream);
+  evaluations += options.pilot_chains;
+  if (!std::isfinite(chains.ll.maxCoeff())) throw std::runtime_error("ais: the likelihood is zero at every prior draw");
+  std::vector<Level> levels;
+  double beta = 0.0, step = 0.8;
+  while (beta < 1.0) {
+    if (context.poll) context.poll();
+    if (static_cast<int>(levels.size()) >= options.max_temperatures) throw std::runtime_error("ais: too many temperatures");
+    const double next = next_beta(chains, beta, options.ess_drop);
+    chains.log_w += chains.ll * (next - beta);
+    beta = next;
+    levels.push_back({beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step});
+    resample(chains, stream);
+    for (int sweep = 0; sweep < options.sweeps + 1; ++sweep) {
+      const double accepted = move(target, chains, levels.back(), stream);
+      evaluations += chains.size();
+      step = std::min(1.0, std::max(0.01, levels.back().step * std::exp(accepted - kAcceptance)));
+      levels.back().step = step;
+    }
+  }
+  return levels;
+}
+
+struct Group {
+  Chains chains;
+  double log_evidence = 0.0;
+  VectorXd acceptance, ess;
+};
+
+Group frozen_run(const Target& target, const std::vector<Level>& levels, const AisOptions& options, Stream stream) {
+  Group group;
+  group.chains = start(target, options.chains, stream);
+  group.acceptance.resize(static_cast<Index>(levels.size()));
+  group.ess.resize(static_cast<Index>(levels.size()));
+  double beta = 0.0;
+  for (std::size_t k = 0; k < levels.size(); ++k) {
+    group.chains.log_w += group.chains.ll * (levels[k].beta - beta);
+    beta = levels[k].beta;
+    const double top = group.chains.log_w.maxCoeff();
+    group.ess[k] = std::isfinite(top) ? effective_size(group.chains.log_w) / options.chains : 0.0;
+    if (!std::isfinite(top)) {
+      group.log_evidence = -std::numeric_limits<double>::infinity();
+      return group;
+    }
+    if (options.resample && group.ess[k] < 0.5) {
+      group.log_evidence += log_mean_exp(group.chains.log_w);
+      resample(group.chains, stream);
+    }
+    double accepted = 0.0;
+    for (int sweep = 0; sweep < options.sweeps; ++sweep) accepted += move(target, group.chains, levels[k], stream);
+    group.acceptance[k] = accepted / options.sweeps;
+  }
+  group.log_evidence += log_mean_exp(group.chains.log_w);
+  return group;
+}
+
+// Without resampling every chain is an estimate of its own; with it, every group is.
+VectorXd independent_estimates(const std::vector<Group>& groups, const AisOptions& options) {
+  if (options.resample) {
+    VectorXd values(static_cast<Index>(groups.size()));
+    for (std::size_t g = 0; g < groups.size(); ++g) values[g] = groups[g].log_evidence;
+    return values;
+  }
+  VectorXd values(static_cast<Index>(groups.size()) * options.chains);
+  for (std::size_t g = 0; g < groups.size(); ++g) values.segment(g * options.chains, options.chains) = groups[g].chains.log_w;
+  return values;
+}
+
+struct Spread {
+  double se, lower, upper;
+};
+
+// Bootstrap of log mean exp; deviations are widened by sqrt(n / (n - 1)), the bias of a bootstrap of n values.
+Spread bootstrap(const VectorXd& values, double estimate, Stream stream) {
+  constexpr int kReplicates = 1000;
+  const Index n = values.size();
+  std::vector<double> replicates(kReplicates);
+  VectorXd sample(n);
+  for (double& replicate : replicates) {
+    for (Index i = 0; i < n; ++i) sample[i] = values[stream.index(static_cast<int>(n))];
+    replicate = log_mean_exp(sample);
+  }
+  std::sort(replicates.begin(), replicates.end());
+  const double widen = n > 1 ? std::sqrt(static_cast<double>(n) / static_cast<double>(n - 1)) : 1.0;
+  const Eigen::Map<const VectorXd> all(replicates.data(), kReplicates);
+  const double sd = std::sqrt((all.array() - all.mean()).square().sum() / (kReplicates - 1));
+  return {sd * widen, estimate + widen * (replicates[24] - estimate), estimate + widen * (replicates[974] - estimate)};
+}
+
+void importance_sample(const Target& target, const AisOptions& options, const Context& context, AisResult& result) {
+  Stream stream(context.seed, kImportance, 0);
+  const auto mixture = StudentTMixture::fit(result.draws, result.weights, options.max_components, kImportanceDof, stream);
+  const int n = options.importance_draws;
+  MatrixXd x(target.dimension(), n);
+  VectorXd log_w(n);
+  for (int i = 0; i < n; ++i) {
+    x.col(i) = mixture.draw(stream);
+    log_w[i] = -0.5 * x.col(i).squaredNorm() - 0.91893853320467274 * static_cast<double>(x.rows()) - mixture.log_density(x.col(i));
+  }
+  // Blocks of fixed size, so that the result does not depend on how many threads share them.
+  constexpr int kBlock = 64;
+  parallel_for((n + kBlock - 1) / kBlock, context, [&](int b) {
+    const int first = b * kBlock, count = std::min(kBlock, n - first);
+    log_w.segment(first, count) += evaluate(target, x.middleCols(first, count));
+  });
+  result.evaluations += n;
+  result.importance = log_mean_exp(log_w);
+  if (!std::isfinite(result.importance)) {
+    result.importance_se = std::numeric_limits<double>::infinity();
+    return;
+  }
+  const Eigen::ArrayXd relative = (log_w.array() - result.importance).exp();
+  result.importance_se = std::sqrt((relative - 1.0).square().sum() / (n - 1.0) / n);
+  result.importance_ess = n / relative.square().mean();
+}
+
+void choose_estimator(AisResult& result) {
+  const bool importance = std::isfinite(result.importance) && result.importance_se < result.annealed_se && result.importance_ess > 50;
+  if (importance) {
+    result.estimator = "importance";
+    result.log_evidence = result.importance;
+    result.standard_error = result.importance_se;
+    result.lower = result.importance - 1.96 * result.importance_se;
+    result.upper = result.importance + 1.96 * result.importance_se;
+  }
+}
+
+void judge(AisResult& result, const AisOptions& options) {
+  double least = 1.0;
+  for (const auto& level : result.ladder) least = std::min(least, level.acceptance);
+  const double gap = std::abs(result.annealed - result.importance);
+  const double allowed = 3.5 * std::hypot(result.annealed_se, result.importance_se) + 0.1;
+  result.trusted = false;
+  if (least < 0.02) {
+    result.verdict = "not trusted: the chains hardly move at some temperature";
+  } else if (result.ess < 0.05 * static_cast<double>(result.draws.cols())) {
+    result.verdict = "not trusted: a few chains carry all the weight";
+  } else if (result.standard_error > 1.0) {
+    result.verdict = "not trusted: the standard error exceeds one nat";
+  } else if (options.importance_draws > 0 && !(gap < allowed)) {
+    result.verdict = "not trusted: the two estimators of the evidence disagree";
+  } else {
+    result.trusted = true;
+    result.verdict = options.importance_draws > 0 ? "trusted: chains move, weights are even and two estimators agree"
+                                                  : "trusted: chains move and weights are even";
+  }
+}
+
+}  // namespace
+
+void AisOptions::check() const {
+  if (pilot_chains < 8 || groups < 2 || chains < 4) throw std::invalid_argument("ais: need pilot_chains >= 8, groups >= 2, chains >= 4");
+  if (sweeps < 1) throw std::invalid_argument("ais: sweeps must be positive");
+  if (!(ess_drop > 0 && ess_drop < 1)) throw std::invalid_argument("ais: ess_drop must lie in (0, 1)");
+  if (importance_draws < 0 || max_components < 1 || max_temperatures < 1) throw std::invalid_argument("ais: negative size");
+}
+
+AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context) {
+  options.check();
+  AisResult result;
+  const std::vector<Level> levels = pilot(target, options, context, result.evaluations);
+  std::vector<Group> groups(options.groups);
+  parallel_for(options.groups, context, [&](int g) {
+    groups[g] = frozen_run(target, levels, options, Stream(context.seed, kFrozen, static_cast<std::uint64_t>(g)));
+  });
+  result.evaluations += static_cast<long>(options.groups) * options.chains * (1 + static_cast<long>(levels.size()) * options.sweeps);
+
+  const VectorXd estimates = independent_estimates(groups, options);
+  result.annealed = log_mean_exp(estimates);
+  if (!std::isfinite(result.annealed)) throw std::runtime_error("ais: every group of chains ended with likelihood zero");
+  const Spread spread = bootstrap(estimates, result.annealed, Stream(context.seed, kBootstrap, 0));
+  result.annealed_se = spread.se;
+  result.log_evidence = result.annealed;
+  result.standard_error = spread.se;
+  result.lower = spread.lower;
+  result.upper = spread.upper;
+  result.estimator = "annealed";
+  result.log_weight_variance = (estimates.array() - estimates.mean()).square().sum() / std::max<double>(1.0, estimates.size() - 1.0);
+
+  const Index n = options.chains;
+  result.draws.resize(target.dimension(), n * options.groups);
+  result.log_likelihood.resize(n * options.groups);
+  VectorXd log_w(n * options.groups);
+  for (int g = 0; g < options.groups; ++g) {
+    result.draws.middleCols(g * n, n) = groups[g].chains.x;
+    result.log_likelihood.segment(g * n, n) = groups[g].chains.ll;
+    const VectorXd& own = groups[g].chains.log_w;
+    log_w.segment(g * n, n) = own.array() + (options.resample ? groups[g].log_evidence - log_mean_exp(own) : 0.0);
+  }
+  result.weights = normalised_exp(log_w);
+  result.ess = 1.0 / result.weights.squaredNorm();
+  for (std::size_t k = 0; k < levels.size(); ++k) {
+    Temperature temperature{levels[k].beta, levels[k].step, 0.0, 0.0};
+    for (const auto& group : groups) {
+      temperature.acceptance += group.acceptance[k] / options.groups;
+      temperature.ess += group.ess[k] / options.groups;
+    }
+    result.ladder.push_back(temperature);
+  }
+  result.importance = result.importance_se = std::numeric_limits<double>::quiet_NaN();
+  if (options.importance_draws > 0) {
+    importance_sample(target, options, context, result);
+    choose_estimator(result);
+  }
+  judge(result, options);
+  return result;
+}
+
+}  // namespace amiss

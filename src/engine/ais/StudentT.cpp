@@ -1,0 +1,163 @@
+#include "engine/ais/StudentT.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "engine/linalg/log_sum_exp.hpp"
+
+namespace amiss {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kPi = 3.14159265358979323846;
+
+MatrixXd weighted_covariance(const MatrixXd& x, const VectorXd& weights, const VectorXd& mean) {
+  const MatrixXd centred = x.colwise() - mean;
+  return centred * weights.asDiagonal() * centred.transpose();
+}
+
+// Lower Cholesky factor of a covariance estimated from `points` points, shrunk towards its diagonal.
+MatrixXd shrunk_root(MatrixXd covariance, double points) {
+  const double d = static_cast<double>(covariance.rows());
+  const VectorXd diagonal = covariance.diagonal().cwiseMax(1e-12);
+  covariance *= points / (points + d);
+  covariance.diagonal() = diagonal;
+  Eigen::LLT<MatrixXd> factor(covariance);
+  if (factor.info() != Eigen::Success) return diagonal.cwiseSqrt().asDiagonal();
+  return factor.matrixL();
+}
+
+struct GaussianMixture {
+  std::vector<double> weights;
+  std::vector<VectorXd> means;
+  std::vector<MatrixXd> roots;
+  double bic = std::numeric_limits<double>::infinity();
+};
+
+double log_gaussian(const VectorXd& x, const VectorXd& mean, const MatrixXd& root) {
+  const VectorXd z = root.triangularView<Eigen::Lower>().solve(x - mean);
+  return -0.5 * z.squaredNorm() - root.diagonal().array().log().sum() - 0.5 * static_cast<double>(x.size()) * std::log(2 * kPi);
+}
+
+GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights, int components, Stream& stream) {
+  const Index n = x.cols(), d = x.rows();
+  const double points = 1.0 / weights.squaredNorm();
+  const VectorXd mean = x * weights;
+  const MatrixXd covariance = weighted_covariance(x, weights, mean);
+  const MatrixXd root = shrunk_root(covariance, points);
+
+  GaussianMixture mixture;
+  // Starting centres far from one another: each next one is drawn with probability proportional to the squared
+  // distance (in the common scale) from the nearest so far.
+  const MatrixXd white = root.triangularView<Eigen::Lower>().solve(x.colwise() - mean);
+  VectorXd nearest = VectorXd::Constant(n, std::numeric_limits<double>::infinity());
+  Index chosen = 0;
+  double u = stream.uniform();
+  while (chosen < n - 1 && (u -= weights[chosen]) > 0) ++chosen;
+  for (int k = 0; k < components; ++k) {
+    if (k > 0) {
+      const VectorXd mass = nearest.cwiseProduct(weights);
+      u = stream.uniform() * mass.sum();
+      for (chosen = 0; chosen < n - 1 && (u -= mass[chosen]) > 0;) ++chosen;
+    }
+    nearest = nearest.cwiseMin((white.colwise() - white.col(chosen)).colwise().squaredNorm().transpose());
+    mixture.means.push_back(components == 1 ? mean : VectorXd(x.col(chosen)));
+    mixture.roots.push_back(root);
+    mixture.weights.push_back(1.0 / components);
+  }
+  double log_likelihood = -std::numeric_limits<double>::infinity();
+  MatrixXd responsibility(n, components);
+  for (int iteration = 0; iteration < (components == 1 ? 1 : 50); ++iteration) {
+    double total = 0.0;
+    for (Index i = 0; i < n; ++i) {
+      VectorXd log_part(components);
+      for (int k = 0; k < components; ++k) {
+        log_part[k] = std::log(mixture.weights[k]) + log_gaussian(x.col(i), mixture.means[k], mixture.roots[k]);
+      }
+      const double log_density = log_sum_exp(log_part);
+      responsibility.row(i) = (log_part.array() - log_density).exp().transpose() * weights[i];
+      total += points * weights[i] * log_density;
+    }
+    const bool settled = total - log_likelihood < 1e-3 * std::abs(total);
+    log_likelihood = total;
+    if (components == 1) break;
+    for (int k = 0; k < components; ++k) {
+      const double mass = responsibility.col(k).sum();
+      if (mass * points < static_cast<double>(d) + 2.0) return {};  // a component too small to have a covariance
+      const VectorXd share = responsibility.col(k) / mass;
+      mixture.weights[k] = mass;
+      mixture.means[k] = x * share;
+      mixture.roots[k] = shrunk_root(weighted_covariance(x, share, mixture.means[k]), mass * points);
+    }
+    if (settled) break;
+  }
+  const double parameters = components * (1.0 + d + 0.5 * d * (d + 1.0)) - 1.0;
+  mixture.bic = -2.0 * log_likelihood + parameters * std::log(points);
+  return mixture;
+}
+
+}  // namespace
+
+StudentT::StudentT(VectorXd location, MatrixXd root, double dof)
+    : location_(std::move(location)), root_(std::move(root)), dof_(dof) {
+  const double d = static_cast<double>(location_.size());
+  log_constant_ = std::lgamma(0.5 * (dof_ + d)) - std::lgamma(0.5 * dof_) - 0.5 * d * std::log(dof_ * kPi) -
+                  root_.diagonal().array().log().sum();
+}
+
+StudentT StudentT::fit(const MatrixXd& x, const VectorXd& weights, double dof) {
+  const VectorXd mean = x * weights;
+  const double points = 1.0 / weights.squaredNorm();
+  return StudentT(mean, shrunk_root(weighted_covariance(x, weights, mean), points), dof);
+}
+
+VectorXd StudentT::whiten(const VectorXd& x) const { return root_.triangularView<Eigen::Lower>().solve(x - location_); }
+
+double StudentT::log_density(const VectorXd& x) const {
+  return log_constant_ - 0.5 * (dof_ + static_cast<double>(x.size())) * std::log1p(whiten(x).squaredNorm() / dof_);
+}
+
+VectorXd StudentT::draw(Stream& stream) const {
+  const double w = 0.5 * dof_ / stream.gamma(0.5 * dof_);
+  return location_ + root_.triangularView<Eigen::Lower>() * VectorXd(std::sqrt(w) * stream.normals(location_.size()));
+}
+
+VectorXd StudentT::step(const VectorXd& x, double s, Stream& stream) const {
+  const VectorXd d = whiten(x);
+  const double w = 0.5 * (dof_ + d.squaredNorm()) / stream.gamma(0.5 * (dof_ + static_cast<double>(d.size())));
+  const VectorXd moved = std::sqrt(1.0 - s * s) * d + s * std::sqrt(w) * stream.normals(d.size());
+  return location_ + root_.triangularView<Eigen::Lower>() * moved;
+}
+
+StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights, int max_components, double dof,
+                                     Stream& stream) {
+  GaussianMixture best;
+  for (int k = 1; k <= max_components; ++k) {
+    GaussianMixture candidate = fit_gaussian_mixture(x, weights, k, stream);
+    if (k == 1 || candidate.bic < best.bic) best = std::move(candidate);
+  }
+  StudentTMixture mixture;
+  mixture.weights_ = best.weights;
+  for (std::size_t k = 0; k < best.means.size(); ++k) mixture.components_.emplace_back(best.means[k], best.roots[k], dof);
+  return mixture;
+}
+
+double StudentTMixture::log_density(const VectorXd& x) const {
+  VectorXd log_part(static_cast<Index>(components_.size()));
+  for (std::size_t k = 0; k < components_.size(); ++k) log_part[k] = std::log(weights_[k]) + components_[k].log_density(x);
+  return log_sum_exp(log_part);
+}
+
+VectorXd StudentTMixture::draw(Stream& stream) const {
+  double u = stream.uniform();
+  std::size_t k = 0;
+  while (k + 1 < components_.size() && (u -= weights_[k]) > 0) ++k;
+  return components_[k].draw(stream);
+}
+
+}  // namespace amiss

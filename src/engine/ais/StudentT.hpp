@@ -1,0 +1,52 @@
+#pragma once
+#include <vector>
+
+#include "engine/linalg/Eigen.hpp"
+#include "engine/random/Stream.hpp"
+
+namespace amiss {
+
+/// Multivariate Student t: location m, scale L L', degrees of freedom nu.
+class StudentT {
+ public:
+  StudentT(Eigen::VectorXd location, Eigen::MatrixXd root, double dof);
+
+  /// Fitted by moments to weighted points (columns of x; weights sum to 1), the covariance shrunk towards its
+  /// diagonal by d / (d + number of points), so that few points in many dimensions give a usable one.
+  static StudentT fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, double dof);
+
+  double log_density(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd draw(Stream& stream) const;
+
+  /// A step of length s in (0, 1] that leaves this distribution invariant and is reversible in it: with
+  /// d = L^-1 (x - m), draw w ~ InvGamma((nu + dim) / 2, (nu + d'd) / 2), then
+  /// d' = sqrt(1 - s^2) d + s sqrt(w) N(0, I) (the preconditioned Crank-Nicolson step of a scale mixture).
+  Eigen::VectorXd step(const Eigen::VectorXd& x, double s, Stream& stream) const;
+
+ private:
+  Eigen::VectorXd whiten(const Eigen::VectorXd& x) const;
+
+  Eigen::VectorXd location_;
+  Eigen::MatrixXd root_;
+  double dof_;
+  double log_constant_;
+};
+
+/// Mixture of Student t's; for importance sampling of posteriors with more than one mode.
+class StudentTMixture {
+ public:
+  /// Gaussian mixtures of 1 ... max_components components are fitted by expectation-maximisation; the one with
+  /// the least BIC gives locations and scales.
+  static StudentTMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components, double dof,
+                             Stream& stream);
+
+  double log_density(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd draw(Stream& stream) const;
+  std::size_t size() const { return components_.size(); }
+
+ private:
+  std::vector<double> weights_;
+  std::vector<StudentT> components_;
+};
+
+}  // namespace amiss

@@ -1,0 +1,184 @@
+#include "engine/discrepancy/HistoryModel.hpp"
+
+#include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cmath>
+#include <stdexcept>
+
+#include "engine/parallel/parallel_for.hpp"
+#include "engine/random/transform.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kHalfPi = 1.57079632679489661923;
+constexpr double kLogTwoPi = 1.83787706640934548356;
+
+double clamp_unit(double u) { return std::min(std::max(u, 1e-12), 1.0 - 1e-12); }
+
+}  // namespace
+
+int HistoryData::conditions() const { return condition.empty() ? 0 : 1 + *std::max_element(condition.begin(), condition.end()); }
+
+void HistoryData::check() const {
+  axis.check();
+  const Index n = y.size();
+  if (basis.rows() != n || responses.rows() != n || axis.size() != n) throw std::invalid_argument("history: lengths differ");
+  if (static_cast<Index>(condition.size()) != responses.cols()) throw std::invalid_argument("history: a condition is needed for each column");
+  if (basis.cols() >= n) throw std::invalid_argument("history: the basis spans the whole record, nothing is left outside it");
+}
+
+void HistoryPriors::check() const {
+  if (!(noise_sd > 0)) throw std::invalid_argument("history: noise_sd must be positive");
+  if (!(noise_shape > 0)) throw std::invalid_argument("history: noise_shape must be positive");
+  if (!(amplitude > 0)) throw std::invalid_argument("history: amplitude must be positive");
+  error.check();
+}
+
+WhitenedData whiten(const HistoryData& data, const VectorXd& correlation_times, const VectorXd& ratios) {
+  const Whitener whitener(data.axis, correlation_times, ratios);
+  MatrixXd basis = whitener(data.basis);
+  const MatrixXd responses = whitener(data.responses);
+  const VectorXd y = whitener(data.y);
+  const Index q = basis.cols();
+
+  // Columns scaled to unit norm first, so that their very different sizes do not cost accuracy.
+  const VectorXd norms = basis.colwise().norm().transpose();
+  basis.array().rowwise() /= norms.transpose().array();
+  const Eigen::HouseholderQR<MatrixXd> qr(basis);
+  const MatrixXd orthonormal = qr.householderQ() * MatrixXd::Identity(basis.rows(), q);
+
+  WhitenedData out;
+  out.root = qr.matrixQR().topRows(q).triangularView<Eigen::Upper>();
+  out.root *= norms.asDiagonal();
+  const VectorXd inside = orthonormal.transpose() * y;
+  out.estimate = out.root.triangularView<Eigen::Upper>().solve(inside);
+  const VectorXd y_outside = y - orthonormal * inside;
+  const MatrixXd outside = responses - orthonormal * (orthonormal.transpose() * responses);
+  out.gram = MatrixXd::Zero(outside.cols(), outside.cols());
+  out.gram.selfadjointView<Eigen::Lower>().rankUpdate(outside.transpose());
+  out.gram.triangularView<Eigen::StrictlyUpper>() = out.gram.transpose();
+  out.cross = outside.transpose() * y_outside;
+  out.square = y_outside.squaredNorm();
+  out.log_det = whitener.log_det();
+  out.residual_dimension = y.size() - q;
+  return out;
+}
+
+HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context& context)
+    : data_(std::move(data)), priors_(std::move(priors)), conditions_(data_.conditions()) {
+  data_.check();
+  priors_.check();
+  columns_ = VectorXd::Zero(conditions_);
+  for (int s : data_.condition) columns_[s] += 1.0;
+  centre_ = data_.responses.colwise().mean();
+  data_.responses.rowwise() -= centre_;
+  scale_ = (data_.responses.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, data_.y.size()))).cwiseSqrt();
+  for (Index j = 0; j < scale_.size(); ++j) {
+    if (!(scale_[j] > 1e-12 * (1.0 + std::abs(centre_[j])))) scale_[j] = 1.0;  // constant: its column is zero
+  }
+  data_.responses.array().rowwise() /= scale_.array();
+  settings_.resize(static_cast<std::size_t>(priors_.error.settings()));
+  parallel_for(static_cast<int>(settings_.size()), context, [&](int g) {
+    settings_[g] = whiten(data_, priors_.error.correlation_times, priors_.error.setting(g));
+  });
+}
+
+double HistoryModel::log_likelihood(int setting, double log_variance, const VectorXd& t, VectorXd* gradient) const {
+  return log_likelihood(settings_[setting], log_variance, t, gradient);
+}
+
+// With D = diag(t_s / p_s), B = I + D^1/2 G D^1/2 / sigma^2 and b = D^1/2 g:
+//   log |H'AH| = (N - Q) log sigma^2 + log |B|,   quadratic form = (y'y - b' B^-1 b / sigma^2) / sigma^2.
+// With r = B^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(B^-1)_ss - p_s]; it holds at t_s = 0 too.
+double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_variance, const VectorXd& t, VectorXd* gradient) const {
+  const double precision = std::exp(-log_variance);
+  std::vector<Index> kept;
+  for (std::size_t j = 0; j < data_.condition.size(); ++j) {
+    if (t[data_.condition[j]] > 0) kept.push_back(static_cast<Index>(j));
+  }
+  const Index p = static_cast<Index>(kept.size());
+  VectorXd root(p), b(p);
+  for (Index j = 0; j < p; ++j) {
+    const int s = data_.condition[kept[j]];
+    root[j] = std::sqrt(t[s] / columns_[s]);
+    b[j] = root[j] * whitened.cross[kept[j]];
+  }
+  MatrixXd matrix(p, p);
+  for (Index j = 0; j < p; ++j) {
+    for (Index i = j; i < p; ++i) matrix(i, j) = precision * root[i] * root[j] * whitened.gram(kept[i], kept[j]);
+    matrix(j, j) += 1.0;
+  }
+  const Eigen::LLT<MatrixXd, Eigen::Lower> factor(matrix);
+  const double n = static_cast<double>(whitened.residual_dimension);
+  const double log_det = p == 0 ? 0.0 : 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  const VectorXd half = p == 0 ? VectorXd() : VectorXd(factor.matrixL().solve(b));
+  const double quadratic = precision * (whitened.square - precision * half.squaredNorm());
+  const double value = whitened.log_det - 0.5 * (n * (kLogTwoPi + log_variance) + log_det + quadratic);
+
+  if (gradient != nullptr) {
+    gradient->setZero(1 + conditions_);
+    MatrixXd root_inverse = MatrixXd::Identity(p, p);
+    if (p > 0) factor.matrixL().solveInPlace(root_inverse);
+    const VectorXd inverse_diagonal = root_inverse.colwise().squaredNorm().transpose();
+    const VectorXd r = precision * (root_inverse.transpose() * half);
+    for (Index j = 0; j < p; ++j) {
+      (*gradient)[1 + data_.condition[kept[j]]] += 0.5 * (r[j] * r[j] + inverse_diagonal[j] - 1.0);
+    }
+    // sigma^2 |Sigma^-1 y|^2 = (quadratic form) - r'r: the residual sum of squares over sigma^2.
+    (*gradient)[0] = -0.5 * (n - static_cast<double>(p) + inverse_diagonal.sum() - (quadratic - r.squaredNorm()));
+  }
+  return value;
+}
+
+VectorXd HistoryModel::coefficients(const WhitenedData& whitened, double log_variance, const VectorXd& t) const {
+  const double precision = std::exp(-log_variance);
+  const Index p = static_cast<Index>(data_.condition.size());
+  VectorXd root(p);
+  for (Index j = 0; j < p; ++j) root[j] = std::sqrt(t[data_.condition[j]] / columns_[data_.condition[j]]);
+  MatrixXd matrix = precision * (root.asDiagonal() * whitened.gram * root.asDiagonal());
+  matrix.diagonal().array() += 1.0;
+  return root.asDiagonal() * matrix.llt().solve(precision * root.cwiseProduct(whitened.cross));
+}
+
+HistoryTarget::HistoryTarget(const HistoryModel& model, std::vector<int> active) : model_(model), active_(std::move(active)) {}
+
+Index HistoryTarget::dimension() const {
+  return 1 + model_.priors().error.correlation_times.size() + static_cast<Index>(active_.size());
+}
+
+HistoryParameters HistoryTarget::parameters(const VectorXd& x) const {
+  const HistoryPriors& priors = model_.priors();
+  HistoryParameters point;
+  const double shape = priors.noise_shape;
+  const double scaled = boost::math::gamma_p_inv(shape, clamp_unit(normal_cdf(x[0])));
+  point.variance = shape * priors.noise_sd * priors.noise_sd / scaled;
+  const Index components = priors.error.correlation_times.size();
+  const int levels = static_cast<int>(priors.error.ratios.size());
+  for (Index k = components - 1; k >= 0; --k) {
+    const int level = std::min(levels - 1, static_cast<int>(normal_cdf(x[1 + k]) * levels));
+    point.setting = point.setting * levels + level;
+  }
+  point.t = VectorXd::Zero(model_.conditions());
+  for (std::size_t a = 0; a < active_.size(); ++a) {
+    const double u = clamp_unit(normal_cdf(x[1 + components + static_cast<Index>(a)]));
+    point.t[active_[a]] = std::pow(priors.amplitude * std::tan(kHalfPi * u), 2);
+  }
+  return point;
+}
+
+VectorXd HistoryTarget::log_likelihood(const MatrixXd& x) const {
+  VectorXd values(x.cols());
+  for (Index i = 0; i < x.cols(); ++i) {
+    const HistoryParameters point = parameters(x.col(i));
+    values[i] = model_.log_likelihood(point.setting, std::log(point.variance), point.t);
+  }
+  return values;
+}
+
+}  // namespace amiss

@@ -1,0 +1,81 @@
+#include "engine/emulator/Emulator.hpp"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+#include "engine/parallel/parallel_for.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients)
+    : inputs_(inputs), coefficients_(coefficients), centre_(coefficients.colwise().mean()) {
+  if (inputs.rows() != coefficients.rows()) throw std::invalid_argument("emulator: inputs and coefficients differ in rows");
+  const MatrixXd centred = coefficients.rowwise() - centre_;
+  scale_ = (centred.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, inputs.rows() - 1))).cwiseSqrt();
+  for (Index q = 0; q < scale_.size(); ++q) {
+    if (!(scale_[q] > 0)) scale_[q] = 1.0;  // a coefficient that never changes is predicted by its mean
+  }
+}
+
+Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.coefficients) {
+  for (Index q = 0; q < coefficients_.cols(); ++q) {
+    processes_.emplace_back(inputs_, (coefficients_.col(q).array() - centre_[q]) / scale_[q],
+                            GaussianProcessParameters::unpack(state.parameters.row(q).transpose()));
+  }
+}
+
+Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options, const Context& context) {
+  Emulator emulator(inputs, basis.coefficients);
+  const double runs = static_cast<double>(inputs.rows());
+  const double shape = 2.0 + 0.5 * runs * static_cast<double>(basis.vectors.rows() - basis.size());
+  const double rate = std::sqrt(std::numeric_limits<double>::epsilon()) * basis.singular_values[0] + 0.5 * basis.discarded_ss;
+  std::vector<std::optional<GaussianProcess>> fitted(static_cast<std::size_t>(basis.size()));
+  parallel_for(static_cast<int>(basis.size()), context, [&](int q) {
+    const double norm = basis.vectors.col(q).squaredNorm() * emulator.scale_[q] * emulator.scale_[q];
+    const VectorXd values = (emulator.coefficients_.col(q).array() - emulator.centre_[q]) / emulator.scale_[q];
+    fitted[q] = GaussianProcess::fit(inputs, values, {shape, rate / norm}, options);
+  });
+  for (auto& process : fitted) emulator.processes_.push_back(std::move(*process));
+  return emulator;
+}
+
+void Emulator::predict(const MatrixXd& points, MatrixXd& mean, MatrixXd& variance) const {
+  mean.resize(points.rows(), n_outputs());
+  variance.resize(points.rows(), n_outputs());
+  for (Index q = 0; q < n_outputs(); ++q) {
+    processes_[q].predict(points, mean.col(q), variance.col(q));
+    mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
+    variance.col(q) *= scale_[q] * scale_[q];
+  }
+}
+
+void Emulator::leave_one_out(MatrixXd& mean, MatrixXd& variance) const {
+  mean.resize(inputs_.rows(), n_outputs());
+  variance.resize(inputs_.rows(), n_outputs());
+  VectorXd m, v;
+  for (Index q = 0; q < n_outputs(); ++q) {
+    processes_[q].leave_one_out(m, v);
+    mean.col(q) = m * scale_[q] + VectorXd::Constant(m.size(), centre_[q]);
+    variance.col(q) = v * scale_[q] * scale_[q];
+  }
+}
+
+EmulatorState Emulator::state() const {
+  MatrixXd parameters(n_outputs(), n_inputs() + 3);
+  for (Index q = 0; q < n_outputs(); ++q) parameters.row(q) = processes_[q].parameters().pack().transpose();
+  return {inputs_, coefficients_, parameters};
+}
+
+int Emulator::evaluations() const {
+  int total = 0;
+  for (const auto& process : processes_) total += process.evaluations;
+  return total;
+}
+
+}  // namespace amiss

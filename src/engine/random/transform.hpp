@@ -1,0 +1,9 @@
+#pragma once
+#include <cmath>
+
+namespace amiss {
+
+/// Standard normal distribution function; maps the sampler's coordinates onto the unit interval.
+inline double normal_cdf(double x) { return 0.5 * std::erfc(-x * 0.70710678118654752440); }
+
+}  // namespace amiss

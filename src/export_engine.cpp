@@ -1,0 +1,266 @@
+// Conversions between R and the engine: convert, call, convert. Nothing is computed here.
+#include <RcppEigen.h>
+
+#include "engine/ais/Sampler.hpp"
+#include "engine/attribution/SurrogateTest.hpp"
+#include "engine/basis/Basis.hpp"
+#include "engine/calibration/Calibration.hpp"
+#include "engine/discrepancy/FilterBank.hpp"
+#include "engine/discrepancy/HistoryModel.hpp"
+#include "engine/emulator/Emulator.hpp"
+#include "engine/parallel/parallel_for.hpp"
+
+using namespace amiss;  // NOLINT
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+Context make_context(const Rcpp::List& context) {
+  Context out;
+  out.seed = static_cast<std::uint64_t>(Rcpp::as<double>(context["seed"]));
+  out.threads = Rcpp::as<int>(context["threads"]);
+  out.poll = [] { Rcpp::checkUserInterrupt(); };
+  return out;
+}
+
+TimeAxis make_axis(const VectorXd& time, const std::vector<bool>& new_segment) { return {time, new_segment}; }
+
+AisOptions make_ais_options(const Rcpp::List& control) {
+  AisOptions options;
+  options.pilot_chains = control["pilot_chains"];
+  options.groups = control["groups"];
+  options.chains = control["chains"];
+  options.sweeps = control["sweeps"];
+  options.ess_drop = control["ess_drop"];
+  options.resample = control["resample"];
+  options.importance_draws = control["importance_draws"];
+  options.max_components = control["max_components"];
+  return options;
+}
+
+Rcpp::List list_ais(const AisResult& result) {
+  const std::size_t levels = result.ladder.size();
+  Rcpp::NumericVector beta(levels), step(levels), acceptance(levels), ess(levels);
+  for (std::size_t k = 0; k < levels; ++k) {
+    beta[k] = result.ladder[k].beta;
+    step[k] = result.ladder[k].step;
+    acceptance[k] = result.ladder[k].acceptance;
+    ess[k] = result.ladder[k].ess;
+  }
+  using Rcpp::_;
+  Rcpp::List out = Rcpp::List::create(
+      _["log_evidence"] = result.log_evidence, _["standard_error"] = result.standard_error,
+      _["interval"] = Rcpp::NumericVector::create(result.lower, result.upper), _["estimator"] = result.estimator,
+      _["annealed"] = Rcpp::NumericVector::create(result.annealed, result.annealed_se),
+      _["importance"] = Rcpp::NumericVector::create(result.importance, result.importance_se),
+      _["importance_ess"] = result.importance_ess, _["ess"] = result.ess,
+      _["log_weight_variance"] = result.log_weight_variance,
+      _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step, _["acceptance"] = acceptance, _["ess"] = ess),
+      _["evaluations"] = static_cast<double>(result.evaluations), _["trusted"] = result.trusted, _["verdict"] = result.verdict);
+  out["weights"] = result.weights;
+  out["log_likelihood"] = result.log_likelihood;
+  return out;
+}
+
+EmulatorState make_emulator_state(const Rcpp::List& emulator) {
+  return {Rcpp::as<MatrixXd>(emulator["inputs"]), Rcpp::as<MatrixXd>(emulator["coefficients"]),
+          Rcpp::as<MatrixXd>(emulator["hyperparameters"])};
+}
+
+HistoryModel make_history_model(const Rcpp::List& data, const Rcpp::List& priors, const Context& context) {
+  HistoryData history;
+  history.y = Rcpp::as<VectorXd>(data["y"]);
+  history.basis = Rcpp::as<MatrixXd>(data["basis"]);
+  history.responses = Rcpp::as<MatrixXd>(data["responses"]);
+  history.condition = Rcpp::as<std::vector<int>>(data["condition"]);
+  history.axis = make_axis(Rcpp::as<VectorXd>(data["time"]), Rcpp::as<std::vector<bool>>(data["new_segment"]));
+  HistoryPriors prior;
+  prior.noise_sd = priors["noise_sd"];
+  prior.noise_shape = priors["noise_shape"];
+  prior.amplitude = priors["amplitude"];
+  prior.error.correlation_times = Rcpp::as<VectorXd>(priors["correlation_times"]);
+  prior.error.ratios = Rcpp::as<VectorXd>(priors["ratios"]);
+  return HistoryModel(std::move(history), std::move(prior), context);
+}
+
+std::vector<int> all_conditions(const HistoryModel& model) {
+  std::vector<int> all(static_cast<std::size_t>(model.conditions()));
+  for (std::size_t s = 0; s < all.size(); ++s) all[s] = static_cast<int>(s);
+  return all;
+}
+
+}  // namespace
+
+// [[Rcpp::export]]
+Rcpp::List make_basis_(const Eigen::Map<Eigen::MatrixXd> outputs, const Rcpp::List& control) {
+  BasisOptions options;
+  options.explained = control["explained"];
+  options.noise_sd = control["noise_sd"];
+  options.noise_fraction = control["noise_fraction"];
+  options.max_vectors = control["max_vectors"];
+  const Basis basis = make_basis(outputs, options);
+  using Rcpp::_;
+  return Rcpp::List::create(_["vectors"] = basis.vectors, _["coefficients"] = basis.coefficients,
+                            _["singular_values"] = basis.singular_values, _["explained"] = basis.explained,
+                            _["discarded_rms"] = basis.discarded_rms, _["discarded_ss"] = basis.discarded_ss);
+}
+
+// [[Rcpp::export]]
+Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basis_list, const Rcpp::List& control,
+                           const Rcpp::List& context) {
+  Basis basis;
+  basis.vectors = Rcpp::as<MatrixXd>(basis_list["vectors"]);
+  basis.coefficients = Rcpp::as<MatrixXd>(basis_list["coefficients"]);
+  basis.singular_values = Rcpp::as<VectorXd>(basis_list["singular_values"]);
+  basis.discarded_ss = basis_list["discarded_ss"];
+  EmulatorOptions options;
+  options.starts = control["starts"];
+  options.searches = control["searches"];
+  options.max_evaluations = control["max_evaluations"];
+  const Emulator emulator = Emulator::train(inputs, basis, options, make_context(context));
+  MatrixXd mean, variance;
+  emulator.leave_one_out(mean, variance);
+  const EmulatorState state = emulator.state();
+  using Rcpp::_;
+  return Rcpp::List::create(_["inputs"] = state.inputs, _["coefficients"] = state.coefficients,
+                            _["hyperparameters"] = state.parameters, _["loo_mean"] = mean, _["loo_variance"] = variance,
+                            _["evaluations"] = emulator.evaluations());
+}
+
+// [[Rcpp::export]]
+Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& points) {
+  MatrixXd mean, variance;
+  Emulator(make_emulator_state(emulator)).predict(points, mean, variance);
+  return Rcpp::List::create(Rcpp::_["mean"] = mean, Rcpp::_["variance"] = variance);
+}
+
+// [[Rcpp::export]]
+Eigen::MatrixXd filter_bank_(const Eigen::Map<Eigen::MatrixXd> x, const Eigen::VectorXd& time_constants,
+                             const Eigen::VectorXd& time, const std::vector<bool>& new_segment) {
+  return FilterBank(x, std::vector<int>(static_cast<std::size_t>(x.cols()), 0), time_constants, make_axis(time, new_segment))
+      .responses;
+}
+
+// Evidence of the history model for each set of active conditions (0-based), and draws of the first.
+// [[Rcpp::export]]
+Rcpp::List history_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& control, const Rcpp::List& context_list) {
+  const Context context = make_context(context_list);
+  const HistoryModel model = make_history_model(data, priors, context);
+  const HistoryTarget target(model, all_conditions(model));
+  const AisResult result = sample_ais(target, make_ais_options(control), context);
+
+  const Eigen::Index draws = result.draws.cols();
+  VectorXd variance(draws);
+  Rcpp::IntegerVector setting(draws);
+  MatrixXd t(draws, model.conditions());
+  for (Eigen::Index i = 0; i < draws; ++i) {
+    const HistoryParameters point = target.parameters(result.draws.col(i));
+    variance[i] = point.variance;
+    setting[i] = point.setting;
+    t.row(i) = point.t.transpose();
+  }
+  Rcpp::List out = list_ais(result);
+  out["setting"] = setting;
+  out["variance"] = variance;
+  out["t"] = t;
+  out["columns"] = model.columns_per_condition();
+  out["centre"] = VectorXd(model.centre().transpose());
+  out["scale"] = VectorXd(model.scale().transpose());
+  out["null_setting"] = null_setting(model);
+  return out;
+}
+
+// What the record says about the basis coefficients, and the discrepancy's coefficients, for given error draws.
+// [[Rcpp::export]]
+Rcpp::List history_estimates_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws) {
+  Rcpp::List no_grid = Rcpp::clone(priors);
+  const VectorXd times = Rcpp::as<VectorXd>(priors["correlation_times"]);
+  ErrorOptions error{times, Rcpp::as<VectorXd>(priors["ratios"])};
+  no_grid["correlation_times"] = VectorXd();
+  const HistoryModel model = make_history_model(data, no_grid, Context());
+  const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
+  const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
+  const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
+  const Eigen::Index n = variance.size();
+  MatrixXd estimate(model.data().basis.cols(), n), coefficients(model.data().responses.cols(), n);
+  Rcpp::List covariance(n);
+  VectorXd log_jacobian(n);
+  std::vector<int> seen;
+  std::vector<WhitenedData> whitened;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    auto found = std::find(seen.begin(), seen.end(), setting[j]);
+    if (found == seen.end()) {
+      seen.push_back(setting[j]);
+      whitened.push_back(whiten(model.data(), times, error.setting(setting[j])));
+      found = seen.end() - 1;
+    }
+    const WhitenedData& own = whitened[found - seen.begin()];
+    const MatrixXd inverse =
+        own.root.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(own.root.rows(), own.root.cols()));
+    estimate.col(j) = own.estimate;
+    covariance[j] = MatrixXd(variance[j] * inverse * inverse.transpose());
+    log_jacobian[j] = -own.root.diagonal().cwiseAbs().array().log().sum();
+    coefficients.col(j) = model.coefficients(own, std::log(variance[j]), t.row(j).transpose());
+  }
+  using Rcpp::_;
+  return Rcpp::List::create(_["estimate"] = estimate, _["covariance"] = covariance, _["log_jacobian"] = log_jacobian,
+                            _["coefficients"] = coefficients);
+}
+
+// [[Rcpp::export]]
+Rcpp::List calibrate_(const Rcpp::List& emulator_list, const Rcpp::List& estimates, const Rcpp::List& control,
+                      const Rcpp::List& context) {
+  const Emulator emulator(make_emulator_state(emulator_list));
+  const MatrixXd estimate = Rcpp::as<MatrixXd>(estimates["estimate"]);
+  const VectorXd log_jacobian = Rcpp::as<VectorXd>(estimates["log_jacobian"]);
+  const Rcpp::List covariance = estimates["covariance"];
+  std::vector<CoefficientData> data;
+  for (Eigen::Index j = 0; j < estimate.cols(); ++j) {
+    data.push_back({estimate.col(j), Rcpp::as<MatrixXd>(covariance[j]), log_jacobian[j]});
+  }
+  const CalibrationTarget target(emulator, std::move(data));
+  const AisResult result = sample_ais(target, make_ais_options(control), make_context(context));
+  Rcpp::List out = list_ais(result);
+  out["unit"] = CalibrationTarget::unit(result.draws);
+  out["error_log_densities"] = target.log_densities(result.draws);
+  return out;
+}
+
+// Evidence without each of the given conditions (0-based), and the surrogate test.
+// [[Rcpp::export]]
+Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::IntegerVector& error_settings,
+                      const Rcpp::List& control, const Rcpp::List& context_list) {
+  const Context context = make_context(context_list);
+  const HistoryModel model = make_history_model(data, priors, context);
+  const AisOptions options = make_ais_options(control["ais"]);
+  const int conditions = model.conditions();
+  std::vector<AisResult> dropped(static_cast<std::size_t>(conditions));
+  Context inner = context;  // conditions share the threads; each has its own seed
+  inner.threads = 1;
+  inner.poll = nullptr;
+  parallel_for(conditions, context, [&](int s) {
+    std::vector<int> active = all_conditions(model);
+    active.erase(active.begin() + s);
+    Context own = inner;
+    own.seed = context.seed + 1 + static_cast<std::uint64_t>(s);
+    dropped[s] = sample_ais(HistoryTarget(model, active), options, own);
+  });
+  SurrogateOptions surrogates;
+  surrogates.surrogates = control["surrogates"];
+  surrogates.smallest_shift = control["smallest_shift"];
+  surrogates.error_settings = Rcpp::as<std::vector<int>>(error_settings);
+  const SurrogateTest test = surrogate_test(model, surrogates, context);
+
+  VectorXd log_evidence(conditions), standard_error(conditions);
+  std::vector<bool> trusted(static_cast<std::size_t>(conditions));
+  for (int s = 0; s < conditions; ++s) {
+    log_evidence[s] = dropped[s].log_evidence;
+    standard_error[s] = dropped[s].standard_error;
+    trusted[s] = dropped[s].trusted;
+  }
+  using Rcpp::_;
+  return Rcpp::List::create(_["log_evidence_dropped"] = log_evidence, _["standard_error"] = standard_error,
+                            _["trusted"] = trusted, _["statistic"] = test.statistic, _["p_value"] = test.p_value,
+                            _["adjusted"] = test.adjusted, _["null_statistics"] = test.null_statistics);
+}

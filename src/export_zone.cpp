@@ -1,0 +1,171 @@
+#include <Rcpp.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "zone/Simulation.hpp"
+
+// The zone simulator for R: convert, run, convert. Column references are 0-based, -1 for none.
+
+namespace {
+
+using namespace amiss::zone;
+
+double number(const Rcpp::List& component, const char* field) { return Rcpp::as<double>(component[field]); }
+Column column(const Rcpp::List& component, const char* field) { return Rcpp::as<int>(component[field]); }
+std::string text(const Rcpp::List& component, const char* field) {
+  return Rcpp::as<std::string>(component[field]);
+}
+
+Wall read_wall(const Rcpp::List& from) {
+  Wall wall;
+  wall.name = text(from, "name");
+  wall.area = number(from, "area");
+  for (const Rcpp::List layer : Rcpp::List(from["layers"])) {
+    wall.layers.push_back(
+        {number(layer, "thickness"), number(layer, "conductivity"), number(layer, "capacity")});
+  }
+  wall.inside_convection = number(from, "inside_convection");
+  wall.inside_emissivity = number(from, "inside_emissivity");
+  wall.outside = column(from, "outside");
+  wall.outside_film = number(from, "outside_film");
+  wall.sun = column(from, "sun");
+  wall.absorptance = number(from, "absorptance");
+  wall.sky = column(from, "sky");
+  wall.outside_emissivity = number(from, "outside_emissivity");
+  wall.sky_view = number(from, "sky_view");
+  wall.wind_speed = column(from, "wind_speed");
+  wall.wind_direction = column(from, "wind_direction");
+  wall.azimuth = number(from, "azimuth");
+  wall.wind_film = number(from, "wind_film");
+  return wall;
+}
+
+Window read_window(const Rcpp::List& from) {
+  return {text(from, "name"),      number(from, "area"),         number(from, "u_value"),
+          column(from, "outside"), number(from, "solar_factor"), column(from, "sun"),
+          number(from, "to_air")};
+}
+
+Exposure read_exposure(const std::string& name) {
+  if (name == "exposed") return Exposure::exposed;
+  return name == "sheltered" ? Exposure::sheltered : Exposure::semi_exposed;
+}
+
+Opening read_opening(const Rcpp::List& from, OpeningKind kind) {
+  Opening opening;
+  opening.name = text(from, "name");
+  opening.kind = kind;
+  if (kind == OpeningKind::orifice) {
+    opening.area = number(from, "area");
+  } else {
+    opening.width = number(from, "width");
+    opening.length = number(from, "length");
+  }
+  opening.height = number(from, "height");
+  opening.azimuth = number(from, "azimuth");
+  opening.exposure = read_exposure(text(from, "exposure"));
+  opening.shelter = number(from, "shelter");
+  opening.outside = column(from, "outside");
+  opening.wind_speed = column(from, "wind_speed");
+  opening.wind_direction = column(from, "wind_direction");
+  return opening;
+}
+
+void read_component(const Rcpp::List& from, Zone& zone) {
+  const std::string type = text(from, "type");
+  const std::string name = text(from, "name");
+  if (type == "wall") zone.walls.push_back(read_wall(from));
+  if (type == "window") zone.windows.push_back(read_window(from));
+  if (type == "opening") zone.openings.push_back(read_opening(from, OpeningKind::orifice));
+  if (type == "crack") zone.openings.push_back(read_opening(from, OpeningKind::crack));
+  if (type == "infiltration")
+    zone.infiltrations.push_back({name, number(from, "ach"), column(from, "outside")});
+  if (type == "heater") {
+    zone.heaters.push_back({name, column(from, "power"), number(from, "radiant_fraction"),
+                            number(from, "capacity"), number(from, "conductance")});
+  }
+  if (type == "supply") {
+    zone.supplies.push_back({name, column(from, "flow"), column(from, "temperature"), number(from, "scale")});
+  }
+  if (type == "coupling") {
+    zone.couplings.push_back({name, number(from, "conductance"), column(from, "temperature")});
+  }
+  if (type == "gain") {
+    zone.gains.push_back(
+        {name, column(from, "power"), number(from, "scale"), number(from, "radiant_fraction")});
+  }
+}
+
+Zone read_zone(const Rcpp::List& from) {
+  Zone zone;
+  zone.volume = number(from, "volume");
+  zone.air_capacity_factor = number(from, "air_capacity_factor");
+  zone.initial_air = number(from, "initial_air");
+  for (const Rcpp::List component : Rcpp::List(from["components"])) read_component(component, zone);
+  return zone;
+}
+
+Options read_options(const Rcpp::List& from) {
+  Options options;
+  options.max_substep_s = number(from, "max_substep_s");
+  options.cells = number(from, "cells");
+  options.spinup = Rcpp::as<int>(from["spinup"]);
+  options.initial_hours = number(from, "initial_hours");
+  return options;
+}
+
+}  // namespace
+
+// N x M mean air temperatures of M zones under the same drivers; a run that fails is a column of NaN.
+// [[Rcpp::export]]
+Rcpp::NumericMatrix zone_simulate_(Rcpp::List zones, Rcpp::NumericMatrix drivers, double step_s,
+                                   Rcpp::NumericVector hold, Rcpp::List control, int threads) {
+  const Eigen::Map<const Eigen::MatrixXd> data(drivers.begin(), drivers.nrow(), drivers.ncol());
+  const Eigen::Map<const Eigen::VectorXd> held(hold.begin(), hold.size());
+  const Options options = read_options(control);
+  std::vector<Zone> read;
+  for (const Rcpp::List zone : zones) read.push_back(read_zone(zone));
+  for (const Zone& zone : read) zone.check(drivers.ncol());
+  options.check();
+
+  const int n_runs = static_cast<int>(read.size());
+  Rcpp::NumericMatrix result(drivers.nrow(), n_runs);
+  Eigen::Map<Eigen::MatrixXd> air(result.begin(), drivers.nrow(), n_runs);
+  const int n_threads = std::clamp(threads, 1, std::max(1, n_runs));
+  const auto work = [&](int first) {
+    for (int i = first; i < n_runs; i += n_threads) {
+      try {
+        air.col(i) = simulate(read[i], data, step_s, held, options).air;
+      } catch (...) {  // an exception must not leave a thread
+        air.col(i).setConstant(std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int i = 1; i < n_threads; ++i) pool.emplace_back(work, i);
+  work(0);
+  for (std::thread& thread : pool) thread.join();
+  return result;
+}
+
+// One run with its energy balance: list(air, through (named, J), hold, stored (named, J)).
+// [[Rcpp::export]]
+Rcpp::List zone_balance_(Rcpp::List zone, Rcpp::NumericMatrix drivers, double step_s,
+                         Rcpp::NumericVector hold, Rcpp::List control) {
+  const Eigen::Map<const Eigen::MatrixXd> data(drivers.begin(), drivers.nrow(), drivers.ncol());
+  const Eigen::Map<const Eigen::VectorXd> held(hold.begin(), hold.size());
+  const Run run = simulate(read_zone(zone), data, step_s, held, read_options(control));
+  const EnergyBalance& balance = run.balance;
+  Rcpp::NumericVector through(balance.through.begin(), balance.through.end());
+  through.names() = Rcpp::wrap(balance.component);
+  return Rcpp::List::create(
+      Rcpp::_["air"] = Rcpp::NumericVector(run.air.data(), run.air.data() + run.air.size()),
+      Rcpp::_["through"] = through, Rcpp::_["hold"] = balance.hold,
+      Rcpp::_["stored"] = Rcpp::NumericVector::create(Rcpp::_["air"] = balance.stored_air,
+                                                      Rcpp::_["walls"] = balance.stored_walls,
+                                                      Rcpp::_["heaters"] = balance.stored_heaters));
+}

@@ -1,0 +1,368 @@
+#include "zone/Simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "zone/air.hpp"
+
+namespace amiss::zone {
+namespace {
+
+const double gamma = 1.0 - 1.0 / std::sqrt(2.0);
+// Weights of the two stages, and the second stage's base: state + base_ratio (first stage - state).
+const double first_weight = 1.0 - gamma;
+const double second_weight = gamma;
+const double base_ratio = (1.0 - gamma) / gamma;
+
+// A sub-step may be longer than asked by rounding, no more.
+constexpr double division_slack = 1e-9;
+
+void check_data(const Eigen::Ref<const Eigen::MatrixXd>& drivers, double step_s,
+                const Eigen::Ref<const Eigen::VectorXd>& hold) {
+  if (drivers.rows() == 0) throw std::invalid_argument("drivers: at least one row is needed; got 0");
+  if (!(step_s > 0.0 && std::isfinite(step_s))) {
+    throw std::invalid_argument("step_s must be a finite number above 0; got " + std::to_string(step_s));
+  }
+  if (hold.size() != 0 && hold.size() != drivers.rows()) {
+    throw std::invalid_argument("hold must have one value per row of the drivers (" +
+                                std::to_string(drivers.rows()) + ") or none; got " +
+                                std::to_string(hold.size()));
+  }
+}
+
+}  // namespace
+
+Run simulate(const Zone& zone, const Eigen::Ref<const Eigen::MatrixXd>& drivers, double step_s,
+             const Eigen::Ref<const Eigen::VectorXd>& hold, const Options& options) {
+  check_data(drivers, step_s, hold);
+  options.check();
+  zone.check(static_cast<int>(drivers.cols()));
+  return Simulation(zone, drivers, step_s, hold, options).run();
+}
+
+Simulation::Simulation(const Zone& zone, const Eigen::Ref<const Eigen::MatrixXd>& drivers, double step_s,
+                       const Eigen::Ref<const Eigen::VectorXd>& hold, const Options& options)
+    : zone_(zone), drivers_(drivers), hold_(hold), airflow_(zone.openings) {
+  n_substeps_ = std::max(1, static_cast<int>(std::ceil(step_s / options.max_substep_s - division_slack)));
+  substep_ = step_s / n_substeps_;
+  stage_weight_ = gamma * substep_;
+  air_capacity_ = zone.air_capacity_factor * air_density(20.0) * air_heat * zone.volume;
+  add_walls(options);
+  add_exchanges();
+  add_heaters();
+  start(options);
+}
+
+Run Simulation::run() {
+  Run result;
+  result.air.resize(drivers_.rows());
+  begin_balance();
+  for (row_ = 0; row_ < drivers_.rows(); ++row_) result.air[row_] = advance_interval();
+  result.balance = balance();
+  result.ok = result.air.allFinite();
+  if (!result.ok) result.air.setConstant(std::numeric_limits<double>::quiet_NaN());
+  return result;
+}
+
+// ---- making ----
+
+void Simulation::add_walls(const Options& options) {
+  double area = 0.0;
+  double emitting = 0.0;
+  for (const Wall& wall : zone_.walls) {
+    walls_.push_back({&wall, WallSolver(wall, substep_ * n_substeps_, options.cells)});
+    area += wall.area;
+    emitting += wall.area * wall.inside_emissivity;
+  }
+  surfaces_emit_ = emitting > 0.0;
+  for (WallState& state : walls_) {
+    state.area_share = state.wall->area / area;
+    if (surfaces_emit_) state.emissivity_share = state.wall->area * state.wall->inside_emissivity / emitting;
+    state.solver.factorise(stage_weight_, state.solver.outside_conductance());
+  }
+  update_room_matrix();
+}
+
+void Simulation::add_exchanges() {
+  const auto add = [this](const auto& components) {
+    for (const auto& component : components) {
+      Exchange exchange;
+      exchange.name = component.name;
+      exchanges_.push_back(exchange);
+    }
+  };
+  add(zone_.windows);
+  add(zone_.openings);
+  add(zone_.infiltrations);
+  add(zone_.heaters);
+  add(zone_.supplies);
+  add(zone_.couplings);
+  add(zone_.gains);
+}
+
+void Simulation::add_heaters() {
+  for (const Heater& heater : zone_.heaters) {
+    heaters_.push_back({&heater, heater.capacity / heater.conductance, drivers_(0, heater.power)});
+  }
+}
+
+void Simulation::start(const Options& options) {
+  air_ = zone_.initial_air;
+  for (Eigen::Index i = hold_.size() - 1; i >= 0; --i) {
+    if (!std::isnan(hold_[i])) air_ = hold_[i];
+  }
+  const double wanted = std::round(options.initial_hours * 3600.0 / (substep_ * n_substeps_));
+  const auto rows = static_cast<Eigen::Index>(std::clamp(wanted, 1.0, static_cast<double>(drivers_.rows())));
+  for (WallState& state : walls_) {
+    const Column outside = state.wall->outside;
+    state.solver.start_steady(air_, outside == no_column ? air_ : drivers_.col(outside).head(rows).mean());
+  }
+  spin_up(options.spinup);
+}
+
+void Simulation::spin_up(int times) {
+  for (int i = 0; i < times; ++i) {
+    for (row_ = 0; row_ < drivers_.rows() && held(); ++row_) advance_interval();
+  }
+  row_ = 0;
+}
+
+// ---- energy balance ----
+
+void Simulation::begin_balance() {
+  hold_energy_ = 0.0;
+  for (Exchange& exchange : exchanges_) exchange.energy = 0.0;
+  for (WallState& state : walls_) state.energy = 0.0;
+  begun_air_ = air_;
+  begun_walls_ = stored_walls();
+  begun_heaters_ = stored_heaters();
+}
+
+EnergyBalance Simulation::balance() const {
+  EnergyBalance result;
+  for (const WallState& state : walls_) {
+    result.component.push_back(state.wall->name);
+    result.through.push_back(state.energy);
+  }
+  for (const Exchange& exchange : exchanges_) {
+    result.component.push_back(exchange.name);
+    result.through.push_back(exchange.energy);
+  }
+  result.hold = hold_energy_;
+  result.stored_air = air_capacity_ * (air_ - begun_air_);
+  result.stored_walls = stored_walls() - begun_walls_;
+  result.stored_heaters = stored_heaters() - begun_heaters_;
+  return result;
+}
+
+double Simulation::stored_walls() const {
+  double stored = 0.0;
+  for (const WallState& state : walls_) stored += state.solver.stored();
+  return stored;
+}
+
+double Simulation::stored_heaters() const {
+  double stored = 0.0;
+  for (const HeaterState& state : heaters_) stored += state.lag * state.emitted;
+  return stored;
+}
+
+void Simulation::book(double mean_air) {
+  for (Exchange& e : exchanges_) {
+    const double heat =
+        e.conductance * (e.temperature - mean_air) + e.to_air + e.by_emissivity + e.by_area + e.kept;
+    e.energy += substep_ * heat;
+  }
+}
+
+// ---- what holds over an interval ----
+
+double Simulation::advance_interval() {
+  if (held()) hold_air();
+  set_walls();
+  set_exchanges();
+  airflow_.set_weather(drivers_, row_);
+  double sum = 0.0;
+  for (int i = 0; i < n_substeps_; ++i) sum += advance_substep();
+  return sum / n_substeps_;
+}
+
+void Simulation::hold_air() {
+  hold_energy_ += air_capacity_ * (hold_[row_] - air_);
+  air_ = hold_[row_];
+}
+
+double Simulation::film(const Wall& wall) const {
+  if (wall.wind_film == 0.0) return wall.outside_film;
+  double speed = driver(wall.wind_speed);
+  if (!std::isnan(wall.azimuth)) {
+    speed = facade_wind(speed, incidence_angle(driver(wall.wind_direction), wall.azimuth));
+  }
+  return (1.0 - wall.wind_film) * wall.outside_film + wall.wind_film * (4.5 + 2.8 + 3.0 * speed);
+}
+
+void Simulation::set_walls() {
+  bool refactorised = false;
+  for (WallState& state : walls_) {
+    const Wall& wall = *state.wall;
+    if (wall.outside == no_column) continue;
+    const double outside = driver(wall.outside);
+    const double conductance = wall.area * film(wall);
+    if (conductance != state.solver.outside_conductance()) {
+      state.solver.factorise(stage_weight_, conductance);
+      refactorised = true;
+    }
+    double absorbed = 0.0;
+    if (wall.sun != no_column) absorbed += wall.absorptance * driver(wall.sun);
+    if (wall.sky != no_column) {
+      const double black = stefan_boltzmann * std::pow(outside + zero_celsius, 4);
+      absorbed -= wall.outside_emissivity * wall.sky_view * (black - driver(wall.sky));
+    }
+    state.outside_heat = conductance * outside + wall.area * absorbed;
+  }
+  if (refactorised) update_room_matrix();
+}
+
+// The exchanges of openings and heaters change within the interval: see set_flows() and set_heaters().
+void Simulation::set_exchanges() {
+  auto e = exchanges_.begin();
+  for (const Window& window : zone_.windows) {
+    const double sun = window.sun == no_column ? 0.0 : window.solar_factor * window.area * driver(window.sun);
+    e->conductance = window.u_value * window.area;
+    e->temperature = driver(window.outside);
+    e->to_air = window.to_air * sun;
+    e++->by_area = (1.0 - window.to_air) * sun;
+  }
+  e += static_cast<std::ptrdiff_t>(zone_.openings.size());
+  for (const Infiltration& infiltration : zone_.infiltrations) {
+    e->temperature = driver(infiltration.outside);
+    const double flow = air_density(e->temperature) * zone_.volume * infiltration.ach / 3600.0;
+    e++->conductance = air_heat * flow;
+  }
+  e += static_cast<std::ptrdiff_t>(zone_.heaters.size());
+  for (const Supply& supply : zone_.supplies) {
+    e->temperature = driver(supply.temperature);
+    const double flow = air_density(e->temperature) * std::max(0.0, driver(supply.flow)) / 3600.0;
+    e++->conductance = supply.scale * air_heat * flow;
+  }
+  for (const Coupling& coupling : zone_.couplings) {
+    e->temperature = driver(coupling.temperature);
+    e++->conductance = coupling.conductance;
+  }
+  for (const Gain& gain : zone_.gains) {
+    const double power = gain.scale * driver(gain.power);
+    e->to_air = (1.0 - gain.radiant_fraction) * power;
+    e++->by_emissivity = gain.radiant_fraction * power;
+  }
+}
+
+// ---- what changes from sub-step to sub-step ----
+
+void Simulation::set_flows() {
+  airflow_.solve(air_);
+  auto e = exchanges_.begin() + static_cast<std::ptrdiff_t>(zone_.windows.size());
+  for (std::size_t i = 0; i < airflow_.size(); ++i, ++e) {
+    e->temperature = airflow_.outside(i);
+    e->conductance = air_heat * std::max(0.0, airflow_.flow(i));
+  }
+}
+
+// Exact for a power that is constant over the sub-step; the mean emission is what the zone receives.
+void Simulation::set_heaters() {
+  auto e = exchanges_.begin() + static_cast<std::ptrdiff_t>(zone_.windows.size() + zone_.openings.size() +
+                                                            zone_.infiltrations.size());
+  for (HeaterState& state : heaters_) {
+    const double power = driver(state.heater->power);
+    const double before = state.emitted;
+    state.emitted = state.lag > 0.0 ? power + (before - power) * std::exp(-substep_ / state.lag) : power;
+    const double kept = state.lag * (state.emitted - before) / substep_;
+    const double fraction = state.heater->radiant_fraction;
+    e->to_air = (1.0 - fraction) * (power - kept);
+    e->by_emissivity = fraction * (power - kept);
+    e++->kept = kept;
+  }
+}
+
+// Radiant heat that finds no surface goes to the air.
+void Simulation::sum_load() {
+  load_ = Load{};
+  for (const Exchange& e : exchanges_) {
+    load_.conductance += e.conductance;
+    load_.to_air += e.conductance * e.temperature + e.to_air;
+    load_.by_emissivity += e.by_emissivity;
+    load_.by_area += e.by_area;
+  }
+  if (!surfaces_emit_) load_.to_air += std::exchange(load_.by_emissivity, 0.0);
+  if (walls_.empty()) load_.to_air += std::exchange(load_.by_area, 0.0);
+}
+
+void Simulation::update_room_matrix() {
+  room_ = RoomMatrix{};
+  for (const WallState& state : walls_) {
+    const double air = state.solver.to_air();
+    const double star = state.solver.to_star();
+    const double response = stage_weight_ * state.solver.surface_response();
+    room_.air += air;
+    room_.star += star;
+    room_.air_air += air * air * response;
+    room_.air_star += air * star * response;
+    room_.star_star += star * star * response;
+  }
+}
+
+// Returns the mean air temperature of the sub-step.
+double Simulation::advance_substep() {
+  set_flows();
+  set_heaters();
+  sum_load();
+  const double before = air_;
+  const Stage first = solve_stage(true, before, first_weight);
+  for (WallState& state : walls_) state.solver.set_second_base(base_ratio);
+  const Stage second = solve_stage(false, before + base_ratio * (first.air - before), second_weight);
+  for (WallState& state : walls_) state.solver.accept();
+  air_ = second.air;
+
+  const double mean = first_weight * first.air + second_weight * second.air;
+  if (held()) {
+    const double from_walls = first_weight * first.from_walls + second_weight * second.from_walls;
+    hold_energy_ -= substep_ * (from_walls + load_.to_air - load_.conductance * mean);
+  }
+  book(mean);
+  return mean;
+}
+
+// With y0 = p + s w (gc Ta + gr Ts) on every inner surface, the equations of a stage of weight w are
+//   C (Ta - base) = w (load - conductance Ta + sum gc (y0 - Ta)),    0 = sum gr (y0 - Ts).
+Simulation::Stage Simulation::solve_stage(bool first, double base_air, double quadrature_weight) {
+  double to_air = 0.0;   // sum gc p
+  double to_star = 0.0;  // sum gr p
+  for (WallState& state : walls_) {
+    const double inside = state.emissivity_share * load_.by_emissivity + state.area_share * load_.by_area;
+    const double surface = state.solver.eliminate(first, inside, state.outside_heat);
+    to_air += state.solver.to_air() * surface;
+    to_star += state.solver.to_star() * surface;
+  }
+
+  const double star_pivot = surfaces_emit_ ? room_.star - room_.star_star : 1.0;
+  double air = air_;
+  if (!held()) {
+    const double feedback = room_.air_star / star_pivot;
+    const double loss = load_.conductance + room_.air - room_.air_air - feedback * room_.air_star;
+    const double gain = load_.to_air + to_air + feedback * to_star;
+    air = (air_capacity_ * base_air + stage_weight_ * gain) / (air_capacity_ + stage_weight_ * loss);
+  }
+  const double star = (to_star + room_.air_star * air) / star_pivot;
+
+  for (WallState& state : walls_) {
+    const double from_room = state.solver.to_air() * air + state.solver.to_star() * star;
+    const double outer = state.solver.substitute(from_room);
+    state.energy +=
+        quadrature_weight * substep_ * (state.outside_heat - state.solver.outside_conductance() * outer);
+  }
+  return {air, to_air + (room_.air_air - room_.air) * air + room_.air_star * star};
+}
+
+}  // namespace amiss::zone

@@ -1,0 +1,425 @@
+#include <gtest/gtest.h>
+
+#include <boost/math/distributions/students_t.hpp>
+#include <limits>
+#include <stdexcept>
+
+#include "engine/ais/Sampler.hpp"
+#include "engine/linalg/log_sum_exp.hpp"
+#include "helpers.hpp"
+
+namespace amiss {
+namespace {
+
+using namespace test;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Context seeded(std::uint64_t seed, int threads = 1) {
+  Context context;
+  context.seed = seed;
+  context.threads = threads;
+  return context;
+}
+
+// y = A x + error of standard deviation s: evidence and posterior are known.
+struct LinearGaussian {
+  MatrixXd a;
+  VectorXd y;
+  double s;
+  LinearGaussian(Index d, double sd) : a(normal_matrix(d + 4, d, 51)), s(sd) {
+    y = a * normal_vector(d, 52) + s * normal_vector(d + 4, 53);
+  }
+  FunctionTarget target() const {
+    return {a.cols(), [this](const VectorXd& x) {
+              return -0.5 * (y - a * x).squaredNorm() / (s * s) -
+                     static_cast<double>(y.size()) * (0.5 * kLogTwoPi + std::log(s));
+            }};
+  }
+  double log_evidence() const {
+    const MatrixXd noise = s * s * MatrixXd::Identity(y.size(), y.size());
+    return log_normal_density(y, VectorXd::Zero(y.size()), a * a.transpose() + noise);
+  }
+  MatrixXd covariance() const {
+    return (a.transpose() * a / (s * s) + MatrixXd::Identity(a.cols(), a.cols())).inverse();
+  }
+  VectorXd mean() const { return covariance() * a.transpose() * y / (s * s); }
+};
+
+// Four reported standard errors hold with certainty for practical purposes, and the error itself has to be far below
+// a factor of two in a Bayes factor (0.69 nat).
+void expect_evidence(const AisResult& result, double truth, double most = 0.15) {
+  EXPECT_LT(std::abs(result.log_evidence - truth), 4 * result.standard_error);
+  EXPECT_LT(std::abs(result.log_evidence - truth), most);
+}
+
+TEST(SampleAis, EvidenceOfLinearGaussianModels) {
+  for (Index d : {3, 10}) {
+    const LinearGaussian model(d, 0.3);
+    const AisResult result = sample_ais(model.target(), {}, seeded(1));
+    EXPECT_TRUE(result.trusted) << result.verdict;
+    expect_evidence(result, model.log_evidence());
+    EXPECT_LT(std::abs(result.annealed - model.log_evidence()), 4 * result.annealed_se + 0.05) << d;
+    EXPECT_LT(std::abs(result.importance - model.log_evidence()), 4 * result.importance_se + 0.02) << d;
+  }
+}
+
+TEST(SampleAis, DrawsHaveThePosteriorsMomentsAndLikelihoods) {
+  const LinearGaussian model(3, 0.3);
+  AisOptions options;
+  options.chains = 250;
+  const FunctionTarget target = model.target();
+  const AisResult result = sample_ais(target, options, seeded(2));
+  EXPECT_NEAR(result.weights.sum(), 1.0, 1e-12);
+  const VectorXd mean = result.draws * result.weights;
+  const MatrixXd centred = result.draws.colwise() - mean;
+  const MatrixXd covariance = centred * result.weights.asDiagonal() * centred.transpose();
+  // Monte Carlo errors of 1000 effective draws: 1 / sqrt(1000) of a standard deviation for means, sqrt(2 / 1000) for
+  // variances; 4.5 of them, the posterior standardised.
+  ASSERT_GT(result.ess, 1000);
+  const Eigen::LLT<MatrixXd> factor(model.covariance());
+  const VectorXd z = factor.matrixL().solve(mean - model.mean());
+  EXPECT_LT(z.cwiseAbs().maxCoeff(), 0.142);
+  const MatrixXd half = factor.matrixL().solve(covariance);
+  const MatrixXd standard = factor.matrixL().solve(half.transpose());
+  EXPECT_LT((standard - MatrixXd::Identity(3, 3)).cwiseAbs().maxCoeff(), 0.2);
+  EXPECT_EQ(result.log_likelihood, target.log_likelihood(result.draws));
+}
+
+TEST(SampleAis, OneAndTwoThreadsGiveTheSameBits) {
+  const LinearGaussian model(4, 0.5);
+  const AisResult a = sample_ais(model.target(), {}, seeded(3, 1)), b = sample_ais(model.target(), {}, seeded(3, 2));
+  EXPECT_EQ(a.log_evidence, b.log_evidence);
+  EXPECT_EQ(a.lower, b.lower);
+  EXPECT_EQ(a.upper, b.upper);
+  EXPECT_EQ(a.draws, b.draws);
+  EXPECT_EQ(a.weights, b.weights);
+  EXPECT_EQ(a.evaluations, b.evaluations);
+}
+
+TEST(SampleAis, SeedsGiveDifferentRuns) {
+  const LinearGaussian model(4, 0.5);
+  EXPECT_NE(sample_ais(model.target(), {}, seeded(4)).annealed, sample_ais(model.target(), {}, seeded(5)).annealed);
+}
+
+TEST(SampleAis, CountsEveryEvaluation) {
+  long count = 0;
+  const FunctionTarget target(2, [&](const VectorXd& x) {
+    ++count;
+    return -5 * (x.array() - 1).matrix().squaredNorm();
+  });
+  EXPECT_EQ(sample_ais(target, {}, seeded(6)).evaluations, count);
+}
+
+TEST(SampleAis, LadderRisesToOneAndFlatLikelihoodNeedsOneStep) {
+  const AisResult result = sample_ais(LinearGaussian(5, 0.1).target(), {}, seeded(7));
+  double beta = 0.0;
+  for (const Temperature& level : result.ladder) {
+    EXPECT_GT(level.beta, beta);
+    beta = level.beta;
+    EXPECT_GT(level.acceptance, 0.1);
+    EXPECT_LT(level.acceptance, 0.9);
+    EXPECT_GT(level.ess, 0.2);
+  }
+  EXPECT_EQ(beta, 1.0);
+  const AisResult flat = sample_ais(FunctionTarget(3, [](const VectorXd&) { return -2.5; }), {}, seeded(7));
+  EXPECT_EQ(flat.ladder.size(), 1u);
+  EXPECT_NEAR(flat.annealed, -2.5, 1e-12);
+  EXPECT_NEAR(flat.ess, static_cast<double>(flat.weights.size()), 1e-6);
+}
+
+TEST(SampleAis, PlainAisWithoutResamplingIsRightOnAnEasyTarget) {
+  const LinearGaussian model(3, 0.8);
+  AisOptions options;
+  options.resample = false;
+  options.ess_drop = 0.95;
+  options.importance_draws = 0;
+  const AisResult result = sample_ais(model.target(), options, seeded(8));
+  EXPECT_EQ(result.estimator, "annealed");
+  EXPECT_TRUE(std::isnan(result.importance));
+  expect_evidence(result, model.log_evidence(), 0.3);
+  EXPECT_GT(result.weights.maxCoeff(), result.weights.minCoeff());
+  EXPECT_LT((result.draws * result.weights - model.mean()).cwiseAbs().maxCoeff(), 0.3);
+}
+
+TEST(SampleAis, TwoModesAreRightOrNotTrusted) {
+  // Modes of unequal mass at 6 and more of their own standard deviations from one another.
+  const Eigen::Vector2d first(2.0, 1.0), second(-2.0, 0.0);
+  const double s = 0.35, v = s * s;
+  const FunctionTarget target(2, [=](const VectorXd& x) {
+    return log_sum_exp(Eigen::Vector2d(std::log(0.3) - 0.5 * (x - first).squaredNorm() / v,
+                                       std::log(0.7) - 0.5 * (x - second).squaredNorm() / v)) -
+           kLogTwoPi - std::log(v);
+  });
+  const MatrixXd wide = (1 + v) * MatrixXd::Identity(2, 2);
+  const double truth =
+      std::log(0.3 * std::exp(log_normal_density(first, VectorXd::Zero(2), wide)) +
+               0.7 * std::exp(log_normal_density(second, VectorXd::Zero(2), wide)));
+  int trusted = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const AisResult result = sample_ais(target, {}, seeded(seed));
+    if (!result.trusted) continue;
+    ++trusted;
+    EXPECT_LT(std::abs(result.log_evidence - truth), 4 * result.standard_error + 0.05) << "seed " << seed;
+  }
+  EXPECT_GE(trusted, 5);  // this case is not hard enough to be refused most of the time
+}
+
+TEST(SampleAis, LikelihoodOfZeroOnHalfTheSpace) {
+  for (double nothing : {-kInfinity, std::numeric_limits<double>::quiet_NaN()}) {
+    const FunctionTarget half(2, [=](const VectorXd& x) { return x[0] > 0 ? 0.0 : nothing; });
+    const AisResult plain = sample_ais(half, {}, seeded(9));
+    expect_evidence(plain, std::log(0.5));
+    EXPECT_GT(plain.draws.row(0).minCoeff(), 0.0);
+    // The same with a normal likelihood, symmetric about the border.
+    const double s = 0.4;
+    const FunctionTarget narrow(2, [=](const VectorXd& x) { return x[0] > 0 ? -0.5 * x.squaredNorm() / (s * s) : nothing; });
+    expect_evidence(sample_ais(narrow, {}, seeded(9)), std::log(0.5) - std::log1p(1 / (s * s)));
+  }
+}
+
+// Likelihood 1 on 3 % of the prior: many a group of four chains starts with no chain alive.
+FunctionTarget small_region() {
+  return {1, [](const VectorXd& x) { return x[0] > 1.8808 ? 0.0 : -kInfinity; }};
+}
+
+TEST(SampleAis, GroupsWithoutAChainAliveLeaveTheResultUsable) {
+  for (bool resampled : {true, false}) {
+    AisOptions options;
+    options.groups = 40;
+    options.chains = 4;
+    options.resample = resampled;
+    const AisResult result = sample_ais(small_region(), options, seeded(10));
+    EXPECT_NEAR(result.weights.sum(), 1.0, 1e-9);
+    EXPECT_TRUE(result.weights.allFinite());
+    EXPECT_TRUE(std::isfinite(result.ess));
+    EXPECT_FALSE(std::isnan(result.standard_error));
+    for (const Temperature& level : result.ladder) {
+      EXPECT_GE(level.acceptance, 0.0);
+      EXPECT_LE(level.acceptance, 1.0);
+    }
+    for (Index i = 0; i < result.weights.size(); ++i) {
+      if (result.weights[i] > 0) EXPECT_GT(result.draws(0, i), 1.88);
+    }
+    if (result.trusted) EXPECT_LT(std::abs(result.log_evidence - std::log(0.03)), 4 * result.standard_error);
+  }
+}
+
+TEST(SampleAis, NothingButZeroLikelihoodIsAnError) {
+  const FunctionTarget never(2, [](const VectorXd&) { return -kInfinity; });
+  EXPECT_THROW(sample_ais(never, {}, seeded(1)), std::runtime_error);
+}
+
+int seeds_covered(const AisOptions& options) {
+  const LinearGaussian model(2, 0.4);
+  const double truth = model.log_evidence();
+  int covered = 0;
+  for (std::uint64_t seed = 101; seed <= 140; ++seed) {
+    const AisResult result = sample_ais(model.target(), options, seeded(seed));
+    EXPECT_LT(result.lower, result.upper);
+    covered += result.lower <= truth && truth <= result.upper ? 1 : 0;
+  }
+  return covered;
+}
+
+TEST(SampleAis, StatedIntervalCoversTheTruth) {
+  // Binomial(40, 0.95) falls below 33 with probability 0.003.
+  EXPECT_GE(seeds_covered({}), 33);
+}
+
+TEST(SampleAis, BootstrapIntervalCoversTheTruth) {
+  AisOptions options;
+  options.importance_draws = 0;
+  options.groups = 16;
+  // A percentile interval of 16 values covers about 0.93; Binomial(40, 0.93) falls below 31 with probability 0.002.
+  EXPECT_GE(seeds_covered(options), 31);
+}
+
+TEST(SampleAis, StatedStandardErrorIsThatOfRepeatedRuns) {
+  const LinearGaussian model(2, 0.4);
+  AisOptions options;
+  options.importance_draws = 0;
+  VectorXd values(40), stated(40);
+  for (int i = 0; i < 40; ++i) {
+    const AisResult result = sample_ais(model.target(), options, seeded(200 + static_cast<std::uint64_t>(i)));
+    values[i] = result.annealed;
+    stated[i] = result.annealed_se;
+  }
+  const double actual = std::sqrt((values.array() - values.mean()).square().sum() / 39);
+  // A standard deviation of 40 values is known to 11 %, the mean stated one to 5 %; 4 of both together.
+  EXPECT_NEAR(std::sqrt(stated.squaredNorm() / 40) / actual, 1.0, 0.5);
+}
+
+TEST(AisOptions, RefusesImpossibleValues) {
+  const FunctionTarget flat(1, [](const VectorXd&) { return 0.0; });
+  for (auto spoil : {+[](AisOptions& o) { o.groups = 1; }, +[](AisOptions& o) { o.chains = 3; },
+                     +[](AisOptions& o) { o.sweeps = 0; }, +[](AisOptions& o) { o.ess_drop = 1.0; },
+                     +[](AisOptions& o) { o.importance_draws = -1; }, +[](AisOptions& o) { o.max_components = 0; }}) {
+    AisOptions options;
+    spoil(options);
+    EXPECT_THROW(sample_ais(flat, options, Context()), std::invalid_argument);
+  }
+  AisOptions one_importance_draw;  // its standard error is 0 / 0
+  one_importance_draw.importance_draws = 1;
+  const AisResult result = sample_ais(flat, one_importance_draw, Context());
+  EXPECT_FALSE(std::isnan(result.standard_error));
+}
+
+// -- Student t ---------------------------------------------------------------------------------------------------
+
+const VectorXd kLocation = Eigen::Vector2d(1.0, -2.0);
+const MatrixXd kRoot = (Eigen::Matrix2d() << 1.5, 0.0, -0.8, 0.6).finished();
+constexpr double kDof = 4.0;
+
+TEST(StudentT, DensityInOneDimensionIsStudents) {
+  const boost::math::students_t t(5.0);
+  const StudentT own(VectorXd::Constant(1, 2.0), MatrixXd::Constant(1, 1, 3.0), 5.0);
+  for (double x : {-20.0, 0.0, 2.0, 5.5}) {
+    EXPECT_NEAR(own.log_density(VectorXd::Constant(1, x)), std::log(pdf(t, (x - 2.0) / 3.0) / 3.0), 1e-12) << x;
+  }
+}
+
+TEST(StudentT, DensityInTwoDimensionsIsMarginalTimesConditional) {
+  const MatrixXd scale = kRoot * kRoot.transpose();
+  const StudentT own(kLocation, kRoot, kDof);
+  for (unsigned i = 0; i < 5; ++i) {
+    const VectorXd x = 2.0 * normal_vector(2, 60 + i);
+    const double d = (x[0] - kLocation[0]) / std::sqrt(scale(0, 0));
+    const double marginal = pdf(boost::math::students_t(kDof), d) / std::sqrt(scale(0, 0));
+    // Roth (2013): the conditional is a t with one more degree of freedom.
+    const double centre = kLocation[1] + scale(1, 0) / scale(0, 0) * (x[0] - kLocation[0]);
+    const double width = std::sqrt((kDof + d * d) / (kDof + 1) * (scale(1, 1) - scale(1, 0) * scale(1, 0) / scale(0, 0)));
+    const double conditional = pdf(boost::math::students_t(kDof + 1), (x[1] - centre) / width) / width;
+    EXPECT_NEAR(own.log_density(x), std::log(marginal * conditional), 1e-12);
+  }
+}
+
+// Kolmogorov distances of both coordinates and of a slanted one, each in units in which it is a standard t.
+void expect_student(const std::vector<VectorXd>& points) {
+  const boost::math::students_t t(kDof);
+  for (const VectorXd& direction : {VectorXd(Eigen::Vector2d(1, 0)), VectorXd(Eigen::Vector2d(0, 1)), VectorXd(Eigen::Vector2d(1, 2))}) {
+    const double width = (kRoot.transpose() * direction).norm();
+    std::vector<double> z;
+    for (const VectorXd& x : points) z.push_back(direction.dot(x - kLocation) / width);
+    // Exceeded with probability 1e-4 (Kolmogorov).
+    EXPECT_LT(kolmogorov_distance(z, [&](double x) { return cdf(t, x); }), 2.23 / std::sqrt(static_cast<double>(z.size())));
+  }
+}
+
+TEST(StudentT, DrawsHaveTheDistribution) {
+  const StudentT own(kLocation, kRoot, kDof);
+  Stream stream(1, 2, 3);
+  std::vector<VectorXd> points;
+  for (int i = 0; i < 40000; ++i) points.push_back(own.draw(stream));
+  expect_student(points);
+}
+
+TEST(StudentT, StepLeavesTheDistributionAsItIs) {
+  const StudentT own(kLocation, kRoot, kDof);
+  for (double s : {0.2, 0.7, 1.0}) {
+    Stream stream(1, 2, 4);
+    std::vector<VectorXd> points;
+    for (int i = 0; i < 40000; ++i) {
+      VectorXd x = own.draw(stream);
+      for (int k = 0; k < 3; ++k) x = own.step(x, s, stream);
+      points.push_back(x);
+    }
+    expect_student(points);
+  }
+}
+
+TEST(StudentT, StepIsReversible) {
+  const StudentT own(kLocation, kRoot, kDof);
+  Stream stream(1, 2, 5);
+  const auto radius = [&](const VectorXd& x) { return kRoot.triangularView<Eigen::Lower>().solve(x - kLocation).norm(); };
+  int outwards = 0, inwards = 0;
+  for (int i = 0; i < 40000; ++i) {
+    const VectorXd x = own.draw(stream), y = own.step(x, 0.6, stream);
+    outwards += radius(x) < 1.0 && radius(y) > 2.0 ? 1 : 0;
+    inwards += radius(x) > 2.0 && radius(y) < 1.0 ? 1 : 0;
+  }
+  ASSERT_GT(outwards, 1000);
+  // Given their sum, one of both counts is Binomial(sum, 1/2): 4 standard deviations of the difference.
+  EXPECT_LT(std::abs(outwards - inwards), 4 * std::sqrt(static_cast<double>(outwards + inwards)));
+}
+
+TEST(StudentT, ShortStepsStayClose) {
+  const StudentT own(kLocation, kRoot, kDof);
+  Stream stream(1, 2, 6);
+  for (int i = 0; i < 100; ++i) EXPECT_LT((own.step(kLocation, 1e-6, stream) - kLocation).norm(), 1e-3);
+}
+
+TEST(StudentT, FitMatchesWeightedMomentsShrunkTowardsTheDiagonal) {
+  const MatrixXd x = kRoot * normal_matrix(2, 9, 61);
+  const VectorXd raw = uniform_matrix(9, 1, 62), weights = raw / raw.sum();
+  const VectorXd mean = x * weights;
+  MatrixXd scale = (x.colwise() - mean) * weights.asDiagonal() * (x.colwise() - mean).transpose();
+  const double points = 1 / weights.squaredNorm(), shrink = points / (points + 2);
+  scale(0, 1) *= shrink;
+  scale(1, 0) *= shrink;
+  const StudentT expected(mean, scale.llt().matrixL(), 6.0), own = StudentT::fit(x, weights, 6.0);
+  for (unsigned i = 0; i < 5; ++i) {
+    const VectorXd at = normal_vector(2, 63 + i);
+    EXPECT_NEAR(own.log_density(at), expected.log_density(at), 1e-10);
+  }
+}
+
+TEST(StudentTMixture, FindsTwoSeparateComponents) {
+  MatrixXd x = 0.5 * normal_matrix(2, 400, 71);
+  x.leftCols(100).row(0).array() += 6.0;
+  Stream stream(1, 1, 1);
+  const auto mixture = StudentTMixture::fit(x, VectorXd::Constant(400, 1.0 / 400), 3, 8.0, stream);
+  ASSERT_EQ(mixture.size(), 2u);
+  // A quarter of the mass lies in the component on the right; Binomial(4000, 1/4), 4 standard deviations.
+  int right = 0;
+  for (int i = 0; i < 4000; ++i) right += mixture.draw(stream)[0] > 3.0 ? 1 : 0;
+  EXPECT_NEAR(right, 1000, 110);
+}
+
+TEST(StudentTMixture, OneComponentServesOneCluster) {
+  Stream stream(1, 1, 2);
+  EXPECT_EQ(StudentTMixture::fit(normal_matrix(3, 400, 72), VectorXd::Constant(400, 1.0 / 400), 3, 8.0, stream).size(), 1u);
+}
+
+TEST(StudentTMixture, WeightsOfThePointsCount) {
+  MatrixXd x = 0.5 * normal_matrix(1, 400, 73);
+  x.leftCols(200).array() += 6.0;
+  VectorXd weights = VectorXd::Constant(400, 1.0);
+  weights.head(200).setConstant(9.0);
+  weights /= weights.sum();
+  Stream stream(1, 1, 3);
+  const auto mixture = StudentTMixture::fit(x, weights, 2, 8.0, stream);
+  ASSERT_EQ(mixture.size(), 2u);
+  const VectorXd left = VectorXd::Zero(1), right = VectorXd::Constant(1, 6.0);
+  // Densities at the centres stand as 9 to 1; scales of clusters estimated from 200 points differ by 10 % or less.
+  EXPECT_NEAR(mixture.log_density(right) - mixture.log_density(left), std::log(9.0), 0.25);
+}
+
+TEST(StudentTMixture, DensityIsNormalised) {
+  MatrixXd x = 0.5 * normal_matrix(1, 300, 74);
+  x.leftCols(100).array() += 5.0;
+  Stream stream(1, 1, 4);
+  const auto mixture = StudentTMixture::fit(x, VectorXd::Constant(300, 1.0 / 300), 3, 8.0, stream);
+  // Substitution x = tan(a) maps the line onto (-pi/2, pi/2).
+  const int n = 200000;
+  const double pi = std::acos(-1.0), h = pi / n;
+  double total = 0.0;
+  for (int i = 1; i < n; ++i) {
+    const double a = -pi / 2 + h * i;
+    total += std::exp(mixture.log_density(VectorXd::Constant(1, std::tan(a)))) / std::pow(std::cos(a), 2) * h;
+  }
+  EXPECT_NEAR(total, 1.0, 1e-6);
+}
+
+TEST(LogSumExp, IsSafeForLargeSmallAndInfiniteValues) {
+  EXPECT_NEAR(log_sum_exp(Eigen::Vector2d(1000.0, 1000.0)), 1000.0 + std::log(2.0), 1e-12);
+  EXPECT_NEAR(log_sum_exp(Eigen::Vector3d(-2000.0, -kInfinity, -2000.0 + std::log(3.0))), -2000.0 + std::log(4.0), 1e-12);
+  EXPECT_EQ(log_sum_exp(Eigen::Vector2d(-kInfinity, -kInfinity)), -kInfinity);
+  EXPECT_NEAR(log_mean_exp(Eigen::Vector2d(std::log(1.0), std::log(3.0))), std::log(2.0), 1e-15);
+  const VectorXd share = normalised_exp(Eigen::Vector2d(-800.0, -800.0 + std::log(3.0)));
+  EXPECT_NEAR(share[0], 0.25, 1e-12);
+  EXPECT_NEAR(share[1], 0.75, 1e-12);
+}
+
+}  // namespace
+}  // namespace amiss

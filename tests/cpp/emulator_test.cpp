@@ -1,0 +1,251 @@
+#include <gtest/gtest.h>
+
+#include "engine/emulator/Emulator.hpp"
+#include "helpers.hpp"
+
+namespace amiss {
+namespace {
+
+using namespace test;
+
+GaussianProcessParameters parameters(double amplitude, double nugget, double lambda, const VectorXd& beta) {
+  GaussianProcessParameters p;
+  p.log_amplitude = std::log(amplitude);
+  p.log_nugget = std::log(nugget);
+  p.log_lambda = std::log(lambda);
+  p.logit_beta = (beta.array() / (1 - beta.array())).log();
+  return p;
+}
+
+// Equation (2) as it stands in the paper, without noise.
+MatrixXd smooth_covariance(const MatrixXd& a, const MatrixXd& b, double amplitude, const VectorXd& beta) {
+  MatrixXd c(a.rows(), b.rows());
+  for (Index i = 0; i < a.rows(); ++i) {
+    for (Index j = 0; j < b.rows(); ++j) {
+      c(i, j) = amplitude;
+      for (Index p = 0; p < beta.size(); ++p) c(i, j) *= std::pow(beta[p], 4 * std::pow(a(i, p) - b(j, p), 2));
+    }
+  }
+  return c;
+}
+
+const VectorXd kBeta = Eigen::Vector3d(0.3, 0.9, 0.05);
+constexpr double kAmplitude = 1.7, kNugget = 0.05, kLambda = 8.0;
+const GammaPrior kPrior{3.0, 0.4};
+
+struct Sample {
+  MatrixXd inputs = uniform_matrix(15, 3, 21);
+  VectorXd values = normal_vector(15, 22);
+  GaussianProcessParameters own = parameters(kAmplitude, kNugget, kLambda, kBeta);
+  double noise = kNugget + 1 / kLambda;
+  MatrixXd covariance() const {
+    return smooth_covariance(inputs, inputs, kAmplitude, kBeta) + noise * MatrixXd::Identity(15, 15);
+  }
+};
+
+TEST(GaussianProcess, LogDensityIsEquationThree) {
+  const Sample s;
+  VectorXd none(0);
+  const double constant = -0.5 * 15 * kLogTwoPi;
+  const double expected = log_normal_density(s.values, VectorXd::Zero(15), s.covariance()) - constant +
+                          (kPrior.shape - 1) * std::log(kLambda) - kPrior.rate * kLambda;
+  // The jitter of 1e-10 of the amplitude moves the value by about 1e-8.
+  EXPECT_NEAR(GaussianProcess::log_density(s.inputs, s.values, kPrior, s.own.pack(), none), expected, 1e-6);
+}
+
+TEST(GaussianProcess, GradientOfTheLogDensityIsItsDerivative) {
+  const Sample s;
+  for (const GammaPrior& prior : {kPrior, GammaPrior{}}) {
+    const VectorXd x = s.own.pack();
+    VectorXd gradient(x.size()), none(0);
+    GaussianProcess::log_density(s.inputs, s.values, prior, x, gradient);
+    const VectorXd expected = numerical_gradient(
+        [&](const VectorXd& at) { return GaussianProcess::log_density(s.inputs, s.values, prior, at, none); }, x);
+    for (Index i = 0; i < x.size(); ++i) {
+      ASSERT_GT(std::abs(expected[i]), 1e-3) << "coordinate " << i << " tests nothing";
+      EXPECT_NEAR(gradient[i] / expected[i], 1.0, 1e-5) << "coordinate " << i;
+    }
+  }
+}
+
+TEST(GaussianProcess, PredictsTheConditionalNormalDistribution) {
+  const Sample s;
+  const GaussianProcess process(s.inputs, s.values, s.own);
+  const MatrixXd points = uniform_matrix(6, 3, 23);
+  VectorXd mean(6), variance(6);
+  process.predict(points, mean, variance);
+  const MatrixXd cross = smooth_covariance(points, s.inputs, kAmplitude, kBeta);
+  const MatrixXd inverse = s.covariance().inverse();
+  EXPECT_LT((mean - cross * inverse * s.values).cwiseAbs().maxCoeff(), 1e-7);
+  const MatrixXd conditional =
+      smooth_covariance(points, points, kAmplitude, kBeta) - cross * inverse * cross.transpose();
+  EXPECT_LT((variance - conditional.diagonal()).cwiseAbs().maxCoeff(), 1e-7);
+}
+
+TEST(GaussianProcess, LeaveOneOutEqualsRefitsWithOnePointLess) {
+  const Sample s;
+  VectorXd mean, variance;
+  GaussianProcess(s.inputs, s.values, s.own).leave_one_out(mean, variance);
+  for (Index i = 0; i < 15; ++i) {
+    MatrixXd inputs(14, 3);
+    VectorXd values(14), m(1), v(1);
+    inputs << s.inputs.topRows(i), s.inputs.bottomRows(14 - i);
+    values << s.values.head(i), s.values.tail(14 - i);
+    GaussianProcess(inputs, values, s.own).predict(s.inputs.row(i), m, v);
+    EXPECT_NEAR(mean[i], m[0], 1e-8) << i;
+    EXPECT_NEAR(variance[i], v[0] + s.noise, 1e-8) << i;  // the point left out is seen with noise
+  }
+}
+
+TEST(GaussianProcess, FitEndsAtAMaximumOfTheDensity) {
+  const MatrixXd inputs = uniform_matrix(40, 2, 24);
+  VectorXd values(40);
+  for (Index i = 0; i < 40; ++i) values[i] = std::sin(5 * inputs(i, 0)) + 0.3 * inputs(i, 1);
+  values += 0.1 * normal_vector(40, 25);
+  EmulatorOptions options;
+  options.max_evaluations = 500;
+  const GaussianProcess process = GaussianProcess::fit(inputs, values, kPrior, options);
+  const VectorXd mode = process.parameters().pack();
+  VectorXd none(0);
+  EXPECT_EQ(process.log_joint, GaussianProcess::log_density(inputs, values, kPrior, mode, none));
+  for (Index i = 0; i < mode.size(); ++i) {
+    for (double step : {-0.3, 0.3}) {
+      VectorXd moved = mode;
+      moved[i] += step;
+      EXPECT_GE(process.log_joint, GaussianProcess::log_density(inputs, values, kPrior, moved, none) - 1e-3)
+          << "coordinate " << i;
+    }
+  }
+}
+
+// A simulator with three parameters, of which the last does nothing.
+VectorXd simulate(const VectorXd& u) {
+  VectorXd y(50);
+  for (Index i = 0; i < y.size(); ++i) {
+    const double t = 0.1 * static_cast<double>(i);
+    y[i] = 20 + 4 * u[0] * std::exp(-t * (0.2 + u[1])) + std::sin(3 * u[1] + t);
+  }
+  return y;
+}
+
+struct Trained {
+  MatrixXd inputs = uniform_matrix(40, 3, 31);
+  MatrixXd outputs = MatrixXd(50, 40);
+  Basis basis;
+  Trained() {
+    for (Index m = 0; m < 40; ++m) outputs.col(m) = simulate(inputs.row(m));
+    BasisOptions options;
+    options.explained = 0.9999;
+    basis = make_basis(outputs, options);
+  }
+  Emulator emulator(int threads = 1) const {
+    Context context;
+    context.threads = threads;
+    return Emulator::train(inputs, basis, {}, context);
+  }
+};
+
+TEST(Emulator, PredictsRunsItHasNotSeenAndKnowsHowWell) {
+  const Trained trained;
+  const MatrixXd points = uniform_matrix(300, 3, 32);
+  MatrixXd mean, variance, truth(300, 50);
+  trained.emulator().predict(points, mean, variance);
+  for (Index i = 0; i < 300; ++i) truth.row(i) = simulate(points.row(i)).transpose();
+  const MatrixXd error = mean * trained.basis.vectors.transpose() - truth;
+  const double spread = (truth.rowwise() - truth.colwise().mean()).norm();
+  EXPECT_LT(error.norm() / spread, 0.03);  // R2 above 0.999 for a smooth response
+
+  // The first and the last coefficient (the mean) against their own 95 % intervals. A process fitted by its mode is
+  // somewhat over-confident, and errors of neighbouring points are alike: 80 % of 300 points is demanded.
+  const MatrixXd own = trained.basis.vectors.colPivHouseholderQr().solve(truth.transpose()).transpose();
+  for (Index q : {Index(0), mean.cols() - 1}) {
+    const Eigen::ArrayXd z = (own.col(q) - mean.col(q)).array() / variance.col(q).array().sqrt();
+    EXPECT_GT((z.abs() < 1.96).count(), 240) << "coefficient " << q;
+    EXPECT_GT(std::sqrt(z.square().mean()), 0.1) << "intervals of coefficient " << q << " are far too wide";
+  }
+}
+
+TEST(Emulator, RunsOnTheDesignAreReproduced) {
+  const Trained trained;
+  MatrixXd mean, variance;
+  trained.emulator().predict(trained.inputs, mean, variance);
+  const MatrixXd& truth = trained.basis.coefficients;
+  const VectorXd spread = (truth.rowwise() - truth.colwise().mean()).colwise().norm();
+  EXPECT_LT((mean.col(0) - truth.col(0)).norm() / spread[0], 0.01);
+  EXPECT_LT((mean.rightCols(1) - truth.rightCols(1)).norm() / spread.tail(1)[0], 0.01);
+}
+
+TEST(Emulator, TrainsEachCoefficientWithTheStatedNoisePrior) {
+  const Trained trained;
+  const EmulatorState state = trained.emulator().state();
+  const Basis& basis = trained.basis;
+  const double discarded = (trained.outputs - basis.vectors * basis.coefficients.transpose()).squaredNorm();
+  const double shape = 2.0 + 40.0 * static_cast<double>(50 - basis.size()) / 2.0;
+  const double largest = basis.vectors.col(0).norm();  // the first vector is scaled by the largest singular value
+  const double rate = std::sqrt(2.220446049250313e-16) * largest + 0.5 * discarded;
+  for (Index q = 0; q < basis.size(); ++q) {
+    const VectorXd w = basis.coefficients.col(q);
+    const double centre = w.mean(), sd = std::sqrt((w.array() - centre).square().sum() / 39.0);
+    const VectorXd standard = (w.array() - centre) / sd;
+    // In units of sd, lambda is larger by sd^2.
+    const GammaPrior prior{shape, rate / (basis.vectors.col(q).squaredNorm() * sd * sd)};
+    const VectorXd own = state.parameters.row(q).transpose();
+    VectorXd none(0);
+    const double fitted = GaussianProcess::fit(trained.inputs, standard, prior, {}).log_joint;
+    EXPECT_NEAR(GaussianProcess::log_density(trained.inputs, standard, prior, own, none), fitted,
+                1e-4 * std::abs(fitted))
+        << "coefficient " << q;
+    EXPECT_NEAR(own[2], std::log((prior.shape - 1) / prior.rate), 1.0) << "coefficient " << q;
+  }
+}
+
+TEST(Emulator, StateMakesTheSameEmulatorAgain) {
+  const Emulator emulator = Trained().emulator();
+  const Emulator again(emulator.state());
+  const MatrixXd points = uniform_matrix(20, 3, 33);
+  MatrixXd mean, variance, mean2, variance2;
+  emulator.predict(points, mean, variance);
+  again.predict(points, mean2, variance2);
+  EXPECT_EQ(mean, mean2);
+  EXPECT_EQ(variance, variance2);
+}
+
+TEST(Emulator, OneAndTwoThreadsGiveTheSameBits) {
+  const Trained trained;
+  EXPECT_EQ(trained.emulator(1).state().parameters, trained.emulator(2).state().parameters);
+}
+
+TEST(Emulator, LeaveOneOutIsInTheCoefficientsOwnScale) {
+  const Trained trained;
+  const Emulator emulator = trained.emulator();
+  MatrixXd mean, variance;
+  emulator.leave_one_out(mean, variance);
+  const EmulatorState state = emulator.state();
+  // Leave out run 7 by hand, with centre and scale of all runs kept.
+  for (Index q : {Index(0), trained.basis.size() - 1}) {
+    const VectorXd w = state.coefficients.col(q);
+    const double centre = w.mean(), sd = std::sqrt((w.array() - centre).square().sum() / 39.0);
+    const auto p = GaussianProcessParameters::unpack(state.parameters.row(q).transpose());
+    MatrixXd inputs(39, 3);
+    VectorXd values(39), m(1), v(1);
+    inputs << state.inputs.topRows(7), state.inputs.bottomRows(32);
+    values << ((w.array() - centre) / sd).head(7), ((w.array() - centre) / sd).tail(32);
+    GaussianProcess(inputs, values, p).predict(state.inputs.row(7), m, v);
+    const double noise = std::exp(p.log_nugget) + std::exp(-p.log_lambda);
+    // Nearly interpolating covariances have condition numbers around 1e7 to 1e10.
+    EXPECT_NEAR(mean(7, q), centre + sd * m[0], 1e-4 * sd);
+    EXPECT_NEAR(variance(7, q) / (sd * sd * (v[0] + noise)), 1.0, 1e-2);
+  }
+}
+
+TEST(Emulator, CoefficientThatNeverChangesIsPredictedByItsValue) {
+  Basis basis = Trained().basis;
+  basis.coefficients.col(basis.size() - 1).setConstant(4.5);
+  const Emulator emulator = Emulator::train(Trained().inputs, basis, {}, Context());
+  MatrixXd mean, variance;
+  emulator.predict(uniform_matrix(5, 3, 34), mean, variance);
+  EXPECT_LT((mean.rightCols(1).array() - 4.5).abs().maxCoeff(), 1e-12);
+}
+
+}  // namespace
+}  // namespace amiss

@@ -1,0 +1,4 @@
+library(testthat)
+library(amiss)
+
+test_check("amiss")

@@ -1,0 +1,145 @@
+room <- function(...) {
+  zone(
+    wall("facade", 12, layer(0.02, 0.8, 1.4e6), layer(0.2, 0.2, 8e5), outside = "Te", sun = "Gv"),
+    window("window", 2, outside = "Te"),
+    heater("heater", power = "P"),
+    ..., volume = 40)
+}
+
+weather <- function(n = 96) {
+  t <- 2 * pi * seq_len(n) / 96
+  cbind(Te = 8 + 6 * sin(t), Gv = pmax(0, 400 * sin(t)), P = 300 * (seq_len(n) %% 24 < 12), Ws = 3 + cos(t), Wd = 200)
+}
+
+k <- function(prior = uniform(0.1, 0.3)) free("k", prior, "W/mK")
+
+test_that("a zone says what it needs", {
+  x <- room(infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
+  expect_s3_class(x, "amiss_zone")
+  expect_identical(names(zone_parameters(x)), "ach")
+  expect_setequal(zone_boundary(x), c("Te", "Gv", "P"))
+  expect_lte(length(capture.output(print(x))), 15)
+  expect_output(print(x), "Free parameters: ach")
+})
+
+test_that("components are edited by name", {
+  x <- add_component(room(), coupling("door", 10, "T_hall"))
+  expect_true("T_hall" %in% zone_boundary(x))
+  expect_identical(component(x, "door")$conductance, 10)
+  x <- change_component(x, "door", conductance = 20)
+  expect_identical(component(x, "door")$conductance, 20)
+  expect_false("T_hall" %in% zone_boundary(drop_component(x, "door")))
+  x <- change_component(x, "facade", layers = list(layer(0.1, k(), 1e6)), sun = NULL)
+  expect_identical(names(zone_parameters(x)), "k")
+  expect_null(component(x, "facade")$sun)
+  expect_true("sun" %in% names(component(x, "facade")))
+  expect_identical(change_component(x, "zone", air_capacity_factor = 3)$air_capacity_factor, 3)
+})
+
+test_that("misuse is a classed error that names component, field and value", {
+  expect_error(layer(-0.1, 1, 1e6), "thickness.*-0.1", class = "amiss_error_input")
+  expect_error(wall("w", -2, layer(0.1, 1, 1e6)), "'w'.*area.*-2", class = "amiss_error_input")
+  expect_error(wall("w", 2), "layer", class = "amiss_error_input")
+  expect_error(wall("w", 2, layer(0.1, 1, 1e6), wind_film = 1), "wind_speed", class = "amiss_error_input")
+  expect_error(opening("o", 1, "Te", exposure = "windy"), "windy", class = "amiss_error_input")
+  expect_error(room(heater("heater", "P")), "heater", class = "amiss_error_input")
+  expect_error(heater("zone", "P"), "zone", class = "amiss_error_input")
+  expect_error(component(room(), "attic"), "attic.*facade", class = "amiss_error_input")
+  expect_error(drop_component(room(), "attic"), "attic", class = "amiss_error_input")
+  expect_error(change_component(room(), "heater", lag = 3), "lag.*capacity", class = "amiss_error_input")
+  expect_error(change_component(room(), "heater", 3), class = "amiss_error_input")
+  expect_error(change_component(room(), "heater", radiant_fraction = 1.5), "1.5", class = "amiss_error_input")
+  expect_error(change_component(room(), "zone", volume = 0), "volume", class = "amiss_error_input")
+})
+
+test_that("a free parameter may stand in several places with one prior only", {
+  x <- zone(wall("w", 1, layer(0.1, k(), 1e6), layer(0.2, k(), 1e6)), volume = 1)
+  expect_length(zone_parameters(x), 1)
+  x <- zone(wall("w", 1, layer(0.1, k(), 1e6), layer(0.2, k(uniform(0, 1)), 1e6)), volume = 1)
+  expect_error(zone_parameters(x), "two different priors", class = "amiss_error_input")
+})
+
+test_that("resolving puts numbers in, in the unit of the field", {
+  area <- free("area", uniform(700, 1300), "mm2")
+  x <- room(opening("low", area * 1e-6, "Te"), opening("high", 2 * (area / 1e6), "Te", height = 2))
+  expect_identical(zone_parameters(x)$area$unit, "mm2")
+  y <- zone_resolve(x, c(area = 1000))
+  expect_length(zone_parameters(y), 0)
+  expect_equal(component(y, "low")$area, 1e-3)
+  expect_equal(component(y, "high")$area, 2e-3)
+  expect_error(zone_resolve(x, c(other = 1)), "area", class = "amiss_error_input")
+  expect_error(zone_resolve(x, c(area = -5)), "low.*area", class = "amiss_error_input")
+  expect_error(area + 1, "multiplied", class = "amiss_error_input")
+  expect_error(1 / area, "multiplied", class = "amiss_error_input")
+})
+
+test_that("runs follow their parameters and do not depend on threads", {
+  x <- room(infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
+  values <- cbind(ach = c(0.1, 0.5, 0.9, 0.1, 0.3))
+  air <- simulate_zone(x, values, weather(), 900)
+  expect_identical(dim(air), c(96L, 5L))
+  expect_true(all(is.finite(air)))
+  expect_identical(air[, 1], air[, 4])
+  expect_true(mean(air[, 1]) > mean(air[, 2]) && mean(air[, 2]) > mean(air[, 3]))
+  expect_identical(air, simulate_zone(x, values, weather(), 900, threads = 2))
+})
+
+test_that("held intervals return what they are held at", {
+  hold <- c(rep(21, 40), rep(NA, 56))
+  air <- simulate_zone(room(), NULL, weather(), 900, hold = hold, control = list(spinup = 2))
+  expect_equal(air[1:40, 1], hold[1:40])
+  expect_false(any(air[41:96, 1] == 21))
+})
+
+test_that("a steady zone loses what it is given, and the energy balance closes", {
+  x <- zone(coupling("door", 10, "Te"), heater("heater", "P"), volume = 20)
+  drivers <- cbind(Te = rep(5, 300), P = 200)
+  expect_equal(simulate_zone(x, NULL, drivers, 3600)[300, 1], 25, tolerance = 1e-8)
+  indexed <- index_zone(room(), colnames(weather()))
+  run <- zone_balance_(indexed, weather(), 900, numeric(), zone_control)
+  expect_equal(sum(run$through) + run$hold, sum(run$stored), tolerance = 1e-9)
+  expect_equal(run$through[["heater"]], sum(weather()[, "P"]) * 900)
+})
+
+test_that("data that cannot be simulated are refused", {
+  expect_error(simulate_zone(room(), NULL, weather()[, -1], 900), "Te", class = "amiss_error_input")
+  gap <- weather()
+  gap[3, "P"] <- NA
+  expect_error(simulate_zone(room(), NULL, gap, 900), "P", class = "amiss_error_input")
+  gap <- weather()
+  gap[3, "Ws"] <- NA
+  expect_true(all(is.finite(simulate_zone(room(), NULL, gap, 900))))
+  expect_error(simulate_zone(room(), NULL, weather(), 900, hold = 1:3), "hold", class = "amiss_error_input")
+  expect_error(simulate_zone(room(), NULL, weather(), 900, control = list(cell = 2)), "cells", class = "amiss_error_input")
+  free_room <- room(infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
+  expect_error(simulate_zone(free_room, NULL, weather(), 900), "ach", class = "amiss_error_input")
+})
+
+test_that("the paper's box has the paper's parameters and runs", {
+  drivers <- weather()
+  colnames(drivers)[3] <- "RHP"
+  middle <- function(p) (p$prior$lower + p$prior$upper) / 2
+  outer <- c("outer_k", "outer_c", "insulation_k", "insulation_c", "heater_radiant")
+  expected <- list(M1 = c("wall_k", "wall_c", "heater_radiant"), M2 = outer, M3 = c(outer, "crack_area"),
+                   M4 = c(outer, "window_transmission"), M5 = c(outer, "crack_area"), M6 = c(outer, "crack_area"))
+  for (model in names(expected)) {
+    box <- paper_box(model)
+    expect_setequal(names(zone_parameters(box)), expected[[model]])
+    values <- t(vapply(zone_parameters(box), middle, 0))
+    expect_true(all(is.finite(simulate_zone(box, values, drivers, 900))))
+  }
+  expect_identical(zone_parameters(paper_box("M6"))$outer_c$prior$upper, 3360)
+  expect_setequal(zone_boundary(paper_box("M3")), c("Te", "Gv", "Ws", "Wd", "RHP"))
+  expect_error(paper_box("M7"), "M7", class = "amiss_error_input")
+})
+
+test_that("the paper's box loses heat as measured, and more with a crack", {
+  drivers <- cbind(Te = rep(0, 2000), Gv = 0, Ws = 3, Wd = 180, RHP = 100)
+  loss <- function(model, ...) {
+    values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179, heater_radiant = 0.79, ...)
+    100 / simulate_zone(paper_box(model), values, drivers, 3600)[2000, 1]
+  }
+  expect_gt(loss("M2"), 3.6)
+  expect_lt(loss("M2"), 4.3)
+  expect_gt(loss("M3", crack_area = 790), loss("M2") + 0.1)
+})

@@ -1,0 +1,30 @@
+# Shared by the scripts in tools/ and .ci/ (sourced, not run): where things are, and how the package is installed.
+# Everything these scripts make lies in build/ and demo/ of the clone.
+
+root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+library="$root/build/library"  # the package, and packages that the system lacks
+export LC_ALL=C.UTF-8
+export R_LIBS="$library${R_LIBS:+:$R_LIBS}"
+
+say() { printf '\n== %s\n' "$*"; }
+fail() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
+
+# Installs the package into build/library from a copy of the sources, so that the clone stays clean.
+# Objects are kept from one run to the next. make does not follow headers, so they are dropped when a header,
+# the build's own files or R have changed.
+install_package() {
+  local copy="$root/build/package" state
+  mkdir -p "$library" "$copy"
+  find "$copy" -mindepth 1 -maxdepth 1 ! -name src ! -name .state -exec rm -rf {} +
+  tar -C "$root" -c --exclude='*.o' --exclude='*.so' --exclude=./{build,demo,.git,tests,tools,bench} . |
+    tar -C "$copy" -x
+  state="$(cd "$copy" && { R --version; g++ --version; cat DESCRIPTION src/Makevars;
+    find src -name '*.hpp' | sort | xargs cat; } | sha256sum)"
+  if [[ "$(cat "$copy/.state" 2>/dev/null)" != "$state" ]]; then
+    find "$copy/src" -name '*.o' -delete
+    printf '%s\n' "$state" > "$copy/.state"
+  fi
+  rm -rf "$library/00LOCK-package"
+  MAKEFLAGS="${MAKEFLAGS:--j2}" R CMD INSTALL --no-multiarch --library="$library" "$copy" > "$root/build/install.log" 2>&1 ||
+    { cat "$root/build/install.log" >&2; fail "the package could not be installed"; }
+}
