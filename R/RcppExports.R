@@ -2,42 +2,38 @@
 # Generator token: 10BE3573-1514-4C36-9D1C-5A225CD40393
 
 make_basis_ <- function(outputs, control) {
-    .Call('_amiss_make_basis_', PACKAGE = 'amiss', outputs, control)
+    .Call(`_amiss_make_basis_`, outputs, control)
 }
 
 train_emulator_ <- function(inputs, basis_list, control, context) {
-    .Call('_amiss_train_emulator_', PACKAGE = 'amiss', inputs, basis_list, control, context)
+    .Call(`_amiss_train_emulator_`, inputs, basis_list, control, context)
 }
 
 predict_emulator_ <- function(emulator, points) {
-    .Call('_amiss_predict_emulator_', PACKAGE = 'amiss', emulator, points)
+    .Call(`_amiss_predict_emulator_`, emulator, points)
 }
 
 filter_bank_ <- function(x, time_constants, time, new_segment) {
-    .Call('_amiss_filter_bank_', PACKAGE = 'amiss', x, time_constants, time, new_segment)
+    .Call(`_amiss_filter_bank_`, x, time_constants, time, new_segment)
 }
 
-history_ <- function(data, priors, control, context_list) {
-    .Call('_amiss_history_', PACKAGE = 'amiss', data, priors, control, context_list)
+calibrate_ <- function(data, priors, emulator_list, control, context_list) {
+    .Call(`_amiss_calibrate_`, data, priors, emulator_list, control, context_list)
 }
 
-history_estimates_ <- function(data, priors, draws) {
-    .Call('_amiss_history_estimates_', PACKAGE = 'amiss', data, priors, draws)
-}
-
-calibrate_ <- function(emulator_list, estimates, control, context) {
-    .Call('_amiss_calibrate_', PACKAGE = 'amiss', emulator_list, estimates, control, context)
+history_coefficients_ <- function(data, priors, draws) {
+    .Call(`_amiss_history_coefficients_`, data, priors, draws)
 }
 
 attribute_ <- function(data, priors, error_settings, control, context_list) {
-    .Call('_amiss_attribute_', PACKAGE = 'amiss', data, priors, error_settings, control, context_list)
+    .Call(`_amiss_attribute_`, data, priors, error_settings, control, context_list)
 }
 
 zone_simulate_ <- function(zones, drivers, step_s, hold, control, threads) {
-    .Call('_amiss_zone_simulate_', PACKAGE = 'amiss', zones, drivers, step_s, hold, control, threads)
+    .Call(`_amiss_zone_simulate_`, zones, drivers, step_s, hold, control, threads)
 }
 
 zone_balance_ <- function(zone, drivers, step_s, hold, control) {
-    .Call('_amiss_zone_balance_', PACKAGE = 'amiss', zone, drivers, step_s, hold, control)
+    .Call(`_amiss_zone_balance_`, zone, drivers, step_s, hold, control)
 }
 

@@ -23,7 +23,7 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   threads <- check_threads(threads)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   full_setting <- fit$history$setting[which.max(fit$history$log_likelihood)]
-  settings <- unique(c(full_setting, fit$history$null_setting))
+  settings <- unique(c(full_setting, fit$null_setting))
   result <- call_engine(attribute_(data, fit$priors, settings, control, engine_context(seed, threads)))
   conditions <- fit$measurements$conditions
   log10_bf <- (fit$history$log_evidence - result$log_evidence_dropped) / log(10)
@@ -50,7 +50,7 @@ variance_shares <- function(fit, data) {
 
 # Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).
 condition_responses <- function(fit, data) {
-  phi <- sweep(sweep(data$responses, 2, fit$history$centre), 2, fit$history$scale, "/")
+  phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
   b <- rowMeans(fit$coefficients)
   vapply(seq_along(fit$measurements$conditions), function(s) {
     own <- data$condition == s - 1L

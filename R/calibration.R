@@ -1,4 +1,4 @@
-ais_control <- list(pilot_chains = 64, groups = 8, chains = 32, sweeps = 3, ess_drop = 0.7, resample = TRUE,
+ais_control <- list(pilot_chains = 96, groups = 8, chains = 32, sweeps = 3, ess_drop = 0.7, resample = TRUE,
                     importance_draws = 1000, max_components = 3)
 
 calibration_control <- list(confidence = NULL, amplitude = NULL, time_constants = NULL, error_times = NULL,
@@ -7,17 +7,17 @@ calibration_control <- list(confidence = NULL, amplitude = NULL, time_constants 
 #' Calibrate a simulator on measurements
 #'
 #' Two posteriors are sampled by annealed importance sampling. The first is that of the discrepancy and the error,
-#' on the part of the record outside the simulation space, which no parameter can reach. The second is that of the
-#' parameters, on the part inside, under the error that the first has learnt. The product of the two normalising
-#' constants is the evidence of the model, as a density of the calibration record.
+#' on the part of the record outside the simulation space, which no parameter can reach. The second joins the
+#' parameters to it, on the whole record; its normalising constant is the evidence of the model, as a density of the
+#' calibration record.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].
 #' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
 #'   `amplitude` (scale of the half-Cauchy prior of each condition's share of the discrepancy, in the target's unit;
 #'   default the noise), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
-#'   (variance beside the white noise) of the autocorrelated error, `error_draws` (number of error draws carried
-#'   into the calibration), and `ais`, a list for the sampler (`pilot_chains`, `groups`, `chains`, `sweeps`,
+#'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept
+#'   for the discrepancy over time), and `ais`, a list for the sampler (`pilot_chains`, `groups`, `chains`, `sweeps`,
 #'   `ess_drop`, `resample`, `importance_draws`, `max_components`).
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
@@ -38,22 +38,18 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
                  amplitude = control$amplitude, correlation_times = control$error_times, ratios = control$error_ratios)
 
-  history <- call_engine(history_(data, priors, control$ais, engine_context(seed, threads)))
-  picked <- systematic_draws(history$weights, control$error_draws)
-  errors <- list(setting = history$setting[picked], variance = history$variance[picked], t = history$t[picked, , drop = FALSE])
-  estimates <- call_engine(history_estimates_(data, priors, errors))
-  posterior <- call_engine(calibrate_(emulator$processes, estimates, control$ais, engine_context(seed + 1, threads)))
-
-  values <- unit_to_values(posterior$unit, emulator$parameters)
-  error_se <- error_draw_error(posterior)
-  log_evidence <- history$log_evidence + posterior$log_evidence
-  se <- sqrt(history$standard_error^2 + posterior$standard_error^2 + error_se^2)
+  result <- call_engine(calibrate_(data, priors, emulator$processes, control$ais, engine_context(seed, threads)))
+  history <- result$history
+  posterior <- result$posterior
+  picked <- systematic_draws(posterior$weights, control$error_draws)
+  errors <- list(setting = posterior$setting[picked], variance = posterior$variance[picked], t = posterior$t[picked, , drop = FALSE])
   structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
-                 seed = seed, rows = rows, values = values, weights = posterior$weights,
-                 history = history, posterior = posterior, errors = errors,
-                 coefficients = estimates$coefficients, priors = priors,
-                 log_evidence = log_evidence, standard_error = se, interval = log_evidence + c(-1.96, 1.96) * se,
-                 trust = trust(history, posterior, error_se)), class = "amiss_calibration")
+                 seed = seed, rows = rows, values = unit_to_values(posterior$unit, emulator$parameters),
+                 weights = posterior$weights, history = history, posterior = posterior, errors = errors, priors = priors,
+                 coefficients = call_engine(history_coefficients_(data, priors, errors)),
+                 centre = result$centre, scale = result$scale, null_setting = result$null_setting,
+                 log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
+                 interval = posterior$interval, trust = trust(history, posterior)), class = "amiss_calibration")
 }
 
 fill_calibration_control <- function(control, measurements, n, call = rlang::caller_env()) {
@@ -95,21 +91,10 @@ systematic_draws <- function(weights, n) {
   findInterval((seq_len(n) - 0.5) / n, cumsum(weights / sum(weights)), left.open = TRUE) + 1L
 }
 
-# Monte Carlo error from carrying a finite number of error draws: how unevenly they share in the likelihood.
-error_draw_error <- function(posterior) {
-  log_d <- posterior$error_log_densities
-  share <- exp(sweep(log_d, 2, apply(log_d, 2, max)))
-  share <- as.numeric(sweep(share, 2, colSums(share), "/") %*% posterior$weights)
-  n <- length(share)
-  if (n < 2) return(0)
-  sqrt(max(0, sum(share^2) - 1 / n) * n / (n - 1))
-}
-
-trust <- function(history, posterior, error_se) {
+trust <- function(history, posterior) {
   why <- c(if (!history$trusted) paste("discrepancy:", history$verdict),
-           if (!posterior$trusted) paste("parameters:", posterior$verdict),
-           if (error_se > 0.7) "the error seen outside the simulation space does not fit what is left inside it")
-  list(trusted = is.null(why), verdict = if (is.null(why)) "trusted: chains move, weights are even and two estimators agree" else paste(why, collapse = "; "))
+           if (!posterior$trusted) paste("parameters:", posterior$verdict))
+  list(trusted = is.null(why), verdict = if (is.null(why)) posterior$verdict else paste(why, collapse = "; "))
 }
 
 #' @export

@@ -11,7 +11,7 @@ discrepancy <- function(fit) {
   check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   outside <- function(x) as.matrix(stats::lm.fit(data$basis, x)$residuals)
-  phi <- sweep(sweep(data$responses, 2, fit$history$centre), 2, fit$history$scale, "/")
+  phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
   draws <- outside(phi %*% fit$coefficients)
   simulated <- simulated_mean(fit)
   responses <- condition_responses(fit, data)

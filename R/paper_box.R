@@ -23,7 +23,9 @@ paper_box <- function(model = "M3", azimuth = 180) {
   inside <- 0.96
   window_area <- 0.60^2
   layers <- box_layers(model)
-  side <- function(name, area = inside^2, sun = NULL) do.call(wall, c(list(name, area), layers, outside = "Te", sun = sun))
+  side <- function(name, area = inside^2, sun = NULL) {
+    do.call(wall, c(list(name, area), layers, list(outside = "Te", sun = sun)))
+  }
   transmission <- if (model == "M4") free("window_transmission", uniform(0.5, 0.72)) else 0.61
   box <- zone(
     side("front", inside^2 - window_area, sun = "Gv"),

@@ -1,7 +1,7 @@
 #' Predict with a calibrated simulator
 #'
-#' The simulator itself is run at draws of the posterior (no emulator error), and the error and the discrepancy
-#' learnt in calibration widen the band.
+#' The simulator itself is run at draws of the posterior (no emulator error); errors as large
+#' as those that calibration left widen the band.
 #'
 #' @param object A calibration ([calibrate()]) of an ensemble that knows its simulator.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both.
@@ -25,36 +25,20 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
   runs <- simulate_measured(simulator, object$values[picked, , drop = FALSE], m, use, check_threads(threads))
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
   if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
-  sd <- error_sd(object, rows)
-  with_seed(seed, summarise_prediction(m, rows, runs, sd))
+  with_seed(seed, summarise_prediction(m, rows, runs, error_sd(object)))
 }
 
-# Standard deviation of error and discrepancy at the given rows, for each error draw (rows x draws).
-error_sd <- function(fit, rows) {
-  responses <- filter_responses(fit$measurements, fit$control$time_constants)[rows, , drop = FALSE]
-  phi <- sweep(sweep(responses, 2, fit$history$centre), 2, fit$history$scale, "/")
-  condition <- rep(fit$measurements$condition, each = length(fit$control$time_constants))
-  levels <- length(fit$control$error_ratios)
-  squares <- vapply(seq_along(fit$measurements$conditions), function(s) rowMeans(phi[, condition == s, drop = FALSE]^2), numeric(length(rows)))
-  ratio_of <- function(g) {
-    total <- 0
-    for (k in seq_along(fit$control$error_times)) {
-      total <- total + fit$control$error_ratios[g %% levels + 1]
-      g <- g %/% levels
-    }
-    total
-  }
-  squares <- matrix(squares, nrow = length(rows))
-  vapply(seq_along(fit$errors$variance), function(j) {
-    sqrt(fit$errors$variance[j] * (1 + ratio_of(fit$errors$setting[j])) + as.numeric(squares %*% fit$errors$t[j, ]))
-  }, numeric(length(rows)))
+# What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy
+# as large as they were seen, the Q fitted coefficients taken off the degrees of freedom.
+error_sd <- function(fit) {
+  r <- residuals(fit)
+  sqrt(sum(r^2) / (length(r) - ncol(fit$emulator$basis$vectors)))
 }
 
 summarise_prediction <- function(m, rows, runs, sd) {
   n <- 200
   member <- rep_len(seq_len(ncol(runs)), n)
-  error <- rep_len(seq_len(ncol(sd)), n)
-  samples <- runs[, member, drop = FALSE] + sd[, error, drop = FALSE] * stats::rnorm(length(rows) * n)
+  samples <- runs[, member, drop = FALSE] + sd * stats::rnorm(length(rows) * n)
   y <- m$y[rows]
   sorted <- t(apply(samples, 1, sort))
   # CRPS of an ensemble: mean |x - y| - 1/2 mean |x - x'| (Gneiting and Raftery 2007), by the sorted members.

@@ -109,7 +109,8 @@ check_number_field <- function(value, rule, where, field, call) {
     (if (rule$open) value > rule$lower else value >= rule$lower)
   if (inside) return(invisible())
   limits <- paste0(if (rule$open) "(" else "[", rule$lower, ", ", rule$upper, "]")
-  abort_input("{where}: {.field {field}} must be one number in {limits} or {.fn free}; got {.val {value}}.", call = call)
+  abort_input("{where}: {.field {field}} must be one number in {limits} or {.fn free}; got {.val {value}}.",
+              call = call)
 }
 
 check_layers <- function(layers, where, call) {
@@ -388,7 +389,8 @@ zone_parameters <- function(zone) {
     if (inherits(x, "amiss_scaled_free")) x <- x$free
     known <- found[[x$name]]
     if (!is.null(known) && !identical(known$prior, x$prior)) {
-      abort_input(c("The free parameter {.val {x$name}} stands with two different priors: {format(known$prior)} and {format(x$prior)}.",
+      abort_input(c("The free parameter {.val {x$name}} stands with two different priors:",
+                    "*" = "{format(known$prior)}", "*" = "{format(x$prior)}",
                     i = "Use one prior, or two names."), call = call)
     }
     if (is.null(known)) found[[x$name]] <<- x
@@ -465,7 +467,8 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
   if (is.null(hold)) hold <- numeric()
   check_input(checkmate::check_numeric(hold), "hold")
   if (!length(hold) %in% c(0, nrow(drivers)) || any(is.infinite(hold))) {
-    abort_input("{.arg hold} must have one finite number or NA per row of the drivers ({nrow(drivers)}); got {length(hold)}.")
+    abort_input(c("{.arg hold} must have one finite number or NA per row of the drivers; got {length(hold)} values.",
+                  i = "The drivers have {nrow(drivers)} rows."))
   }
   control <- check_zone_control(control, call)
   zones <- lapply(seq_len(nrow(values)), function(i) {
@@ -476,7 +479,8 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
 }
 
 check_drivers <- function(zone, drivers, call) {
-  check_input(checkmate::check_matrix(drivers, mode = "numeric", min.rows = 1, col.names = "unique"), "drivers", call = call)
+  verdict <- checkmate::check_matrix(drivers, mode = "numeric", min.rows = 1, col.names = "unique")
+  check_input(verdict, "drivers", call = call)
   needed <- zone_boundary(zone)
   absent <- setdiff(needed, colnames(drivers))
   if (length(absent) > 0) {

@@ -63,44 +63,31 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
-// history_
-Rcpp::List history_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& control, const Rcpp::List& context_list);
-RcppExport SEXP _amiss_history_(SEXP dataSEXP, SEXP priorsSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
+// calibrate_
+Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& control, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_calibrate_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
-    rcpp_result_gen = Rcpp::wrap(history_(data, priors, control, context_list));
+    rcpp_result_gen = Rcpp::wrap(calibrate_(data, priors, emulator_list, control, context_list));
     return rcpp_result_gen;
 END_RCPP
 }
-// history_estimates_
-Rcpp::List history_estimates_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws);
-RcppExport SEXP _amiss_history_estimates_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP) {
+// history_coefficients_
+Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws);
+RcppExport SEXP _amiss_history_coefficients_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type draws(drawsSEXP);
-    rcpp_result_gen = Rcpp::wrap(history_estimates_(data, priors, draws));
-    return rcpp_result_gen;
-END_RCPP
-}
-// calibrate_
-Rcpp::List calibrate_(const Rcpp::List& emulator_list, const Rcpp::List& estimates, const Rcpp::List& control, const Rcpp::List& context);
-RcppExport SEXP _amiss_calibrate_(SEXP emulator_listSEXP, SEXP estimatesSEXP, SEXP controlSEXP, SEXP contextSEXP) {
-BEGIN_RCPP
-    Rcpp::RObject rcpp_result_gen;
-    Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type estimates(estimatesSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
-    rcpp_result_gen = Rcpp::wrap(calibrate_(emulator_list, estimates, control, context));
+    rcpp_result_gen = Rcpp::wrap(history_coefficients_(data, priors, draws));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -156,9 +143,8 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 4},
     {"_amiss_predict_emulator_", (DL_FUNC) &_amiss_predict_emulator_, 2},
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
-    {"_amiss_history_", (DL_FUNC) &_amiss_history_, 4},
-    {"_amiss_history_estimates_", (DL_FUNC) &_amiss_history_estimates_, 3},
-    {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 4},
+    {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
+    {"_amiss_history_coefficients_", (DL_FUNC) &_amiss_history_coefficients_, 3},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
     {"_amiss_zone_simulate_", (DL_FUNC) &_amiss_zone_simulate_, 6},
     {"_amiss_zone_balance_", (DL_FUNC) &_amiss_zone_balance_, 5},

@@ -90,6 +90,23 @@ std::vector<int> all_conditions(const HistoryModel& model) {
   return all;
 }
 
+template <class Parameters>
+void add_history_draws(Rcpp::List& out, const AisResult& result, Parameters parameters, const HistoryModel& model) {
+  const Eigen::Index draws = result.draws.cols();
+  VectorXd variance(draws);
+  Rcpp::IntegerVector setting(draws);
+  MatrixXd t(draws, model.conditions());
+  for (Eigen::Index i = 0; i < draws; ++i) {
+    const HistoryParameters point = parameters(VectorXd(result.draws.col(i)));
+    variance[i] = point.variance;
+    setting[i] = point.setting;
+    t.row(i) = point.t.transpose();
+  }
+  out["setting"] = setting;
+  out["variance"] = variance;
+  out["t"] = t;
+}
+
 }  // namespace
 
 // [[Rcpp::export]]
@@ -142,89 +159,46 @@ Eigen::MatrixXd filter_bank_(const Eigen::Map<Eigen::MatrixXd> x, const Eigen::V
       .responses;
 }
 
-// Evidence of the history model for each set of active conditions (0-based), and draws of the first.
+// The history posterior on the part of y outside the simulation space, then the joint posterior on all of y.
 // [[Rcpp::export]]
-Rcpp::List history_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& control, const Rcpp::List& context_list) {
+Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
+                      const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = make_context(context_list);
+  const AisOptions options = make_ais_options(control);
   const HistoryModel model = make_history_model(data, priors, context);
-  const HistoryTarget target(model, all_conditions(model));
-  const AisResult result = sample_ais(target, make_ais_options(control), context);
+  const HistoryTarget history(model, all_conditions(model));
+  const AisResult outside = sample_ais(history, options, context);
 
-  const Eigen::Index draws = result.draws.cols();
-  VectorXd variance(draws);
-  Rcpp::IntegerVector setting(draws);
-  MatrixXd t(draws, model.conditions());
-  for (Eigen::Index i = 0; i < draws; ++i) {
-    const HistoryParameters point = target.parameters(result.draws.col(i));
-    variance[i] = point.variance;
-    setting[i] = point.setting;
-    t.row(i) = point.t.transpose();
-  }
-  Rcpp::List out = list_ais(result);
-  out["setting"] = setting;
-  out["variance"] = variance;
-  out["t"] = t;
-  out["columns"] = model.columns_per_condition();
-  out["centre"] = VectorXd(model.centre().transpose());
-  out["scale"] = VectorXd(model.scale().transpose());
-  out["null_setting"] = null_setting(model);
-  return out;
+  Context second = context;
+  second.seed = context.seed + 1;
+  Stream stream(context.seed, 0, 0);
+  const Emulator emulator(make_emulator_state(emulator_list));
+  const CalibrationTarget target(
+      history, StudentTMixture::fit(outside.draws, outside.weights, options.max_components, 8.0, stream), emulator);
+  const AisResult joint = sample_ais(target, options, second);
+
+  Rcpp::List outside_list = list_ais(outside), joint_list = list_ais(joint);
+  add_history_draws(outside_list, outside, [&](const VectorXd& x) { return history.parameters(x); }, model);
+  add_history_draws(joint_list, joint, [&](const VectorXd& x) { return target.history(x); }, model);
+  joint_list["unit"] = target.unit(joint.draws);
+  using Rcpp::_;
+  return Rcpp::List::create(_["history"] = outside_list, _["posterior"] = joint_list,
+                            _["centre"] = VectorXd(model.centre().transpose()), _["scale"] = VectorXd(model.scale().transpose()),
+                            _["null_setting"] = null_setting(model));
 }
 
-// What the record says about the basis coefficients, and the discrepancy's coefficients, for given error draws.
+// Posterior mean coefficients (p x draws) of the scaled filter columns, for given draws of the history parameters.
 // [[Rcpp::export]]
-Rcpp::List history_estimates_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws) {
-  Rcpp::List no_grid = Rcpp::clone(priors);
-  const VectorXd times = Rcpp::as<VectorXd>(priors["correlation_times"]);
-  ErrorOptions error{times, Rcpp::as<VectorXd>(priors["ratios"])};
-  no_grid["correlation_times"] = VectorXd();
-  const HistoryModel model = make_history_model(data, no_grid, Context());
+Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws) {
+  const HistoryModel model = make_history_model(data, priors, Context());
   const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
   const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
   const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
-  const Eigen::Index n = variance.size();
-  MatrixXd estimate(model.data().basis.cols(), n), coefficients(model.data().responses.cols(), n);
-  Rcpp::List covariance(n);
-  VectorXd log_jacobian(n);
-  std::vector<int> seen;
-  std::vector<WhitenedData> whitened;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    auto found = std::find(seen.begin(), seen.end(), setting[j]);
-    if (found == seen.end()) {
-      seen.push_back(setting[j]);
-      whitened.push_back(whiten(model.data(), times, error.setting(setting[j])));
-      found = seen.end() - 1;
-    }
-    const WhitenedData& own = whitened[found - seen.begin()];
-    const MatrixXd inverse =
-        own.root.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(own.root.rows(), own.root.cols()));
-    estimate.col(j) = own.estimate;
-    covariance[j] = MatrixXd(variance[j] * inverse * inverse.transpose());
-    log_jacobian[j] = -own.root.diagonal().cwiseAbs().array().log().sum();
-    coefficients.col(j) = model.coefficients(own, std::log(variance[j]), t.row(j).transpose());
+  MatrixXd coefficients(model.data().responses.cols(), variance.size());
+  for (Eigen::Index j = 0; j < variance.size(); ++j) {
+    coefficients.col(j) = model.coefficients(model.whitened(setting[j]), std::log(variance[j]), t.row(j).transpose());
   }
-  using Rcpp::_;
-  return Rcpp::List::create(_["estimate"] = estimate, _["covariance"] = covariance, _["log_jacobian"] = log_jacobian,
-                            _["coefficients"] = coefficients);
-}
-
-// [[Rcpp::export]]
-Rcpp::List calibrate_(const Rcpp::List& emulator_list, const Rcpp::List& estimates, const Rcpp::List& control,
-                      const Rcpp::List& context) {
-  const Emulator emulator(make_emulator_state(emulator_list));
-  const MatrixXd estimate = Rcpp::as<MatrixXd>(estimates["estimate"]);
-  const VectorXd log_jacobian = Rcpp::as<VectorXd>(estimates["log_jacobian"]);
-  const Rcpp::List covariance = estimates["covariance"];
-  std::vector<CoefficientData> data;
-  for (Eigen::Index j = 0; j < estimate.cols(); ++j) {
-    data.push_back({estimate.col(j), Rcpp::as<MatrixXd>(covariance[j]), log_jacobian[j]});
-  }
-  const CalibrationTarget target(emulator, std::move(data));
-  const AisResult result = sample_ais(target, make_ais_options(control), make_context(context));
-  Rcpp::List out = list_ais(result);
-  out["unit"] = CalibrationTarget::unit(result.draws);
-  out["error_log_densities"] = target.log_densities(result.draws);
-  return out;
+  return coefficients;
 }
 
 // Evidence without each of the given conditions (0-based), and the surrogate test.

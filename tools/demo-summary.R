@@ -15,7 +15,7 @@ from_to <- function(what, pair, unit = "") {
 numbers <- function(x) suppressWarnings(as.numeric(unlist(x)))
 
 describe_cause <- function(cause) {
-  if (is.null(cause)) return("No cause is named: the evidence does not single one out.")
+  if (length(cause) == 0) return("No cause is named: the evidence does not single one out.")
   bayes_factor <- numbers(cause$log10_bf)
   c(cause$sentence %||% sprintf("The cause named is %s.", cause$mechanism),
     sprintf("Mechanism: %s; boundary condition: %s", cause$mechanism %||% "none",
@@ -24,15 +24,15 @@ describe_cause <- function(cause) {
 }
 
 describe_gain <- function(gain) {
-  if (is.null(gain)) return("No gain: the model was not extended.")
+  if (length(gain) == 0) return("No gain: the model was not extended.")
   bayes_factor <- numbers(gain$log10_bf)
   coverage <- numbers(gain$coverage95_validation)
   c(if (length(bayes_factor) == 1 && !is.na(bayes_factor)) paste("Extended model:", odds(bayes_factor)),
     from_to("Error (RMSE) on the calibration data", numbers(gain$rmse_calibration)),
     from_to("Error (RMSE) on data held out", numbers(gain$rmse_validation)),
-    if (length(coverage) >= 1 && !anyNA(coverage)) {
+    if (length(coverage) %in% 1:2 && !anyNA(coverage)) {
       sprintf("Share of data held out within the 95 %% band: %s",
-              paste(sprintf("%.0f %%", 100 * coverage), collapse = " before, "))
+              paste0(sprintf("%.0f %%", 100 * coverage), if (length(coverage) == 2) c(" before", " after"), collapse = ", "))
     })
 }
 

@@ -31,7 +31,8 @@ HistoryData make_data(double effect, unsigned seed) {
   const FilterBank bank(x, {0, 1, 2}, Eigen::Vector2d(0.0, 4.0), data.axis);
   data.responses = bank.responses;
   data.condition = bank.condition;
-  data.y = data.basis * Eigen::Vector2d(1.0, 20.0) + effect * bank.responses.col(1) + 0.5 * normal_vector(kN, 100 * seed + 9);
+  data.y = data.basis * Eigen::Vector2d(1.0, 20.0) + effect * bank.responses.col(1) +
+           0.5 * normal_vector(kN, 100 * seed + 9);
   return data;
 }
 
@@ -90,7 +91,8 @@ TEST(SurrogateTest, StatisticIsTheLossOfLogLikelihoodOfFreeFits) {
   }
   const SurrogateTest test = surrogate_test(model, few_surrogates(1), Context());
   ASSERT_GT(full - without, 1.0);
-  EXPECT_NEAR(test.statistic[0], full - without, 1e-3);  // the grid is within 0.02 of log t at a smooth maximum
+  EXPECT_NEAR(test.statistic[0], full - without,
+              1e-3);  // the grid is within 0.02 of log t at a smooth maximum
 }
 
 TEST(SurrogateTest, PValuesCountTheSurrogatesAndCarryHolmsCorrection) {
@@ -110,12 +112,16 @@ TEST(SurrogateTest, NullStatisticsAreThoseOfShiftedConditions) {
   options.smallest_shift = 0.4;
   const SurrogateTest test = surrogate_test(make_model(data), options, Context());
   ASSERT_EQ(test.null_statistics.rows(), 120 - 2 * 48 + 1);  // every shift from 48 to 72, once
-  // The statistics of a model whose responses were shifted beforehand must be among them, for each allowed shift.
+  // The statistics of a model whose responses were shifted beforehand must be among them, for each allowed
+  // shift.
   for (Index lag : {48, 60, 72}) {
     HistoryData moved = data;
     for (Index i = 0; i < kN; ++i) moved.responses.row((i + lag) % kN) = data.responses.row(i);
     const VectorXd expected = surrogate_test(make_model(moved), few_surrogates(1), Context()).statistic;
-    const double gap = (test.null_statistics.rowwise() - expected.transpose()).rowwise().lpNorm<Eigen::Infinity>().minCoeff();
+    const double gap = (test.null_statistics.rowwise() - expected.transpose())
+                           .rowwise()
+                           .lpNorm<Eigen::Infinity>()
+                           .minCoeff();
     EXPECT_LT(gap, 1e-4) << lag;
   }
 }
@@ -123,7 +129,8 @@ TEST(SurrogateTest, NullStatisticsAreThoseOfShiftedConditions) {
 TEST(SurrogateTest, NullDataAreMostlyNotSignificant) {
   int alarms = 0;
   for (unsigned seed = 11; seed <= 30; ++seed) {
-    const SurrogateTest test = surrogate_test(make_model(make_data(0.0, seed)), few_surrogates(59), Context());
+    const SurrogateTest test =
+        surrogate_test(make_model(make_data(0.0, seed)), few_surrogates(59), Context());
     alarms += test.adjusted.minCoeff() <= 0.05 ? 1 : 0;
   }
   // At 5 % over all conditions together, Binomial(20, 0.05) exceeds 4 with probability 0.003.
@@ -134,7 +141,8 @@ TEST(SurrogateTest, OneAndTwoThreadsGiveTheSameBits) {
   const HistoryModel model = make_model(make_data(0.3, 5));
   Context one, two;
   two.threads = 2;
-  const SurrogateTest a = surrogate_test(model, few_surrogates(20), one), b = surrogate_test(model, few_surrogates(20), two);
+  const SurrogateTest a = surrogate_test(model, few_surrogates(20), one),
+                      b = surrogate_test(model, few_surrogates(20), two);
   EXPECT_EQ(a.statistic, b.statistic);
   EXPECT_EQ(a.null_statistics, b.null_statistics);
   EXPECT_EQ(a.p_value, b.p_value);
@@ -162,7 +170,8 @@ TEST(NullSetting, PicksWhiteForWhiteNoiseAndMemoryForMemory) {
   const ErrorOptions error{VectorXd::Constant(1, 5.0), Eigen::Vector3d(0.0, 1.0, 10.0)};
   HistoryData data = make_data(0.0, 7);
   EXPECT_EQ(null_setting(make_model(data, error)), 0);
-  const MatrixXd root = error_covariance(data.axis, error.correlation_times, VectorXd::Constant(1, 10.0)).llt().matrixL();
+  const MatrixXd root =
+      error_covariance(data.axis, error.correlation_times, VectorXd::Constant(1, 10.0)).llt().matrixL();
   data.y = 20.0 + (0.5 * root * normal_vector(kN, 91)).array();
   EXPECT_EQ(null_setting(make_model(data, error)), 2);
 }

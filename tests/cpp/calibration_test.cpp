@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <boost/math/distributions/normal.hpp>
-#include <stdexcept>
 
 #include "engine/ais/Sampler.hpp"
 #include "engine/calibration/Calibration.hpp"
@@ -11,6 +10,8 @@ namespace amiss {
 namespace {
 
 using namespace test;
+
+constexpr Index kN = 30;
 
 // Two coefficients of very different size, smooth in the parameters; hyper-parameters as given.
 Emulator make_emulator(Index n_inputs) {
@@ -28,101 +29,166 @@ Emulator make_emulator(Index n_inputs) {
   return Emulator(state);
 }
 
-std::vector<CoefficientData> make_data() {
-  std::vector<CoefficientData> data;
-  for (int j = 0; j < 3; ++j) {
-    CoefficientData own;
-    own.estimate = Eigen::Vector2d(0.015 + 0.001 * j, 21.4 - 0.2 * j);
-    const double a = 0.002 + 0.001 * j, b = 0.3 + 0.1 * j;
-    own.covariance = (Eigen::Matrix2d() << a * a, 0.6 * a * b, 0.6 * a * b, b * b).finished();
-    own.log_jacobian = -4.0 + 0.7 * j;
-    data.push_back(own);
-  }
+HistoryData make_data() {
+  HistoryData data;
+  data.axis = uneven_axis(kN, {14});
+  data.basis.resize(kN, 2);
+  data.basis << 60.0 * normal_vector(kN, 82), VectorXd::Ones(kN);
+  data.responses = normal_matrix(kN, 3, 83);
+  data.condition = {0, 0, 1};
+  data.y = data.basis * Eigen::Vector2d(0.015, 21.4) + normal_vector(kN, 84);
   return data;
+}
+
+HistoryModel make_model(const ErrorOptions& error) {
+  HistoryPriors priors;
+  priors.noise_sd = 0.9;
+  priors.error = error;
+  return HistoryModel(make_data(), priors, Context());
+}
+
+const ErrorOptions kError{VectorXd::Constant(1, 2.0), Eigen::Vector2d(0.0, 3.0)};
+
+StudentTMixture make_reference(Index dimension, double width) {
+  Stream stream(1, 1, 1);
+  const MatrixXd points = width * normal_matrix(dimension, 300, 85);
+  return StudentTMixture::fit(points, VectorXd::Constant(300, 1.0 / 300), 1, 8.0, stream);
+}
+
+double log_prior(const VectorXd& x) {
+  return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));
 }
 
 double cdf_normal(double x) { return cdf(boost::math::normal(), x); }
 
-TEST(CalibrationTarget, UnitIsTheNormalDistributionFunctionPointByPoint) {
-  const MatrixXd x = normal_matrix(2, 4, 82), u = CalibrationTarget::unit(x);
-  ASSERT_EQ(u.rows(), 4);
+// log p(y | sigma, t, z) written down for y itself: y = K w + discrepancy + error, w ~ N(w'(z), S(z)), the
+// discrepancy in the complement of K under the metric of the error.
+double dense_density(const HistoryData& data, const HistoryParameters& p, const VectorXd& ratios,
+                     const Emulator& emulator, const VectorXd& u) {
+  const MatrixXd error = error_covariance(data.axis, kError.correlation_times, ratios);
+  const MatrixXd inverse = error.inverse();
+  const MatrixXd& k = data.basis;
+  MatrixXd phi = data.responses.rowwise() - data.responses.colwise().mean();
+  for (Index j = 0; j < 3; ++j) {
+    phi.col(j) *= std::sqrt(p.t[data.condition[j]] / (j < 2 ? 2.0 : 1.0) * kN / phi.col(j).squaredNorm());
+  }
+  phi -= MatrixXd(k * (k.transpose() * inverse * k).inverse() * k.transpose() * inverse * phi);
+  MatrixXd mean, variance;
+  emulator.predict(u.transpose(), mean, variance);
+  const MatrixXd covariance =
+      p.variance * error + phi * phi.transpose() + k * MatrixXd(variance.row(0).asDiagonal()) * k.transpose();
+  return log_normal_density(data.y, k * mean.row(0).transpose(), covariance);
+}
+
+struct Joint {
+  Emulator emulator = make_emulator(2);
+  HistoryModel model = make_model(kError);
+  HistoryTarget history{model, {0, 1}};
+  CalibrationTarget target(double width = 1.0) const {
+    return {history, make_reference(history.dimension(), width), emulator};
+  }
+};
+
+TEST(CalibrationTarget, CoordinatesAreTheHistorysThenTheParameters) {
+  const Joint joint;
+  const CalibrationTarget target = joint.target();
+  ASSERT_EQ(target.dimension(), 4 + 2);
+  const MatrixXd x = normal_matrix(6, 3, 86), u = target.unit(x);
+  ASSERT_EQ(u.rows(), 3);
   ASSERT_EQ(u.cols(), 2);
-  for (Index i = 0; i < 4; ++i) {
-    for (Index p = 0; p < 2; ++p) EXPECT_NEAR(u(i, p), cdf_normal(x(p, i)), 1e-14);
+  for (Index i = 0; i < 3; ++i) {
+    for (Index p = 0; p < 2; ++p) EXPECT_NEAR(u(i, p), cdf_normal(x(4 + p, i)), 1e-14);
+    const HistoryParameters own = target.history(x.col(i)),
+                            expected = joint.history.parameters(x.col(i).head(4));
+    EXPECT_EQ(own.variance, expected.variance);
+    EXPECT_EQ(own.setting, expected.setting);
+    EXPECT_EQ(own.t, expected.t);
   }
 }
 
-TEST(CalibrationTarget, DensitiesEqualTheDenseGaussianOnes) {
-  const Emulator emulator = make_emulator(2);
-  const std::vector<CoefficientData> data = make_data();
-  const CalibrationTarget target(emulator, data);
-  ASSERT_EQ(target.dimension(), 2);
-  const MatrixXd x = normal_matrix(2, 5, 83);
-  const MatrixXd own = target.log_densities(x);
-  ASSERT_EQ(own.rows(), 3);
-  ASSERT_EQ(own.cols(), 5);
-  for (Index i = 0; i < 5; ++i) {
-    MatrixXd mean, variance;
-    emulator.predict(x.col(i).transpose().unaryExpr(&cdf_normal), mean, variance);
-    for (std::size_t j = 0; j < data.size(); ++j) {
-      // The density of two variables written out: condition numbers do not matter here.
-      const Eigen::Matrix2d c = data[j].covariance + MatrixXd(variance.row(0).asDiagonal());
-      const Eigen::Vector2d d = data[j].estimate - mean.row(0).transpose();
-      const double det = c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1);
-      const double square = (c(1, 1) * d[0] * d[0] - 2 * c(0, 1) * d[0] * d[1] + c(0, 0) * d[1] * d[1]) / det;
-      EXPECT_NEAR(own(static_cast<Index>(j), i), data[j].log_jacobian - kLogTwoPi - 0.5 * (std::log(det) + square),
-                  1e-9 * (1 + square));
-    }
+TEST(CalibrationTarget, ReferenceTimesLikelihoodIsPriorTimesTheDenseDensityOfTheMeasurement) {
+  const Joint joint;
+  const CalibrationTarget target = joint.target();
+  const MatrixXd x = 0.7 * normal_matrix(6, 8, 87);
+  const VectorXd own = target.log_likelihood(x);
+  const MatrixXd u = target.unit(x);
+  for (Index i = 0; i < x.cols(); ++i) {
+    const HistoryParameters p = target.history(x.col(i));
+    const double dense =
+        dense_density(make_data(), p, kError.setting(p.setting), joint.emulator, u.row(i).transpose());
+    EXPECT_NEAR(own[i] + target.log_reference(x.col(i)), log_prior(x.col(i)) + dense,
+                1e-8 * (1 + std::abs(dense)));
   }
 }
 
 TEST(CalibrationTarget, EmulatorVarianceMatters) {
-  const Emulator emulator = make_emulator(2);
+  const Joint joint;
   MatrixXd mean, variance;
-  emulator.predict(MatrixXd::Constant(1, 2, 0.5), mean, variance);
-  EXPECT_GT(variance(0, 0), 1e-3 * make_data()[0].covariance(0, 0));  // else the dense comparison tests less
+  joint.emulator.predict(MatrixXd::Constant(1, 2, 0.5), mean, variance);
+  const MatrixXd root = joint.model.whitened(0).root;
+  const MatrixXd noise = (root.transpose() * root).inverse();
+  // Else the dense comparison would not see it.
+  EXPECT_GT(variance(0, 0) / noise(0, 0), 1e-3);
+  EXPECT_GT(variance(0, 1) / noise(1, 1), 1e-3);
 }
 
-TEST(CalibrationTarget, LikelihoodIsTheMeanOverErrorDraws) {
-  const Emulator emulator = make_emulator(2);
-  const CalibrationTarget target(emulator, make_data());
-  const MatrixXd x = 0.3 * normal_matrix(2, 5, 84);
-  const MatrixXd parts = target.log_densities(x);
-  const VectorXd own = target.log_likelihood(x);
-  for (Index i = 0; i < 5; ++i) {
-    const double top = parts.col(i).maxCoeff();
-    EXPECT_NEAR(own[i], top + std::log((parts.col(i).array() - top).exp().sum() / 3.0), 1e-12);
+TEST(CalibrationTarget, ReferenceIsTheMixtureTimesThePriorOfTheParameters) {
+  const Joint joint;
+  const CalibrationTarget target = joint.target(0.5);
+  const StudentTMixture mixture = make_reference(4, 0.5);
+  const VectorXd x = normal_vector(6, 88);
+  EXPECT_NEAR(target.log_reference(x), mixture.log_density(x.head(4)) + log_prior(x.tail(2)), 1e-12);
+  Stream stream(1, 2, 3);
+  MatrixXd draws(6, 4000);
+  for (Index i = 0; i < draws.cols(); ++i) draws.col(i) = target.draw_reference(stream);
+  const VectorXd sd = (draws.rowwise().squaredNorm() / 4000).cwiseSqrt();
+  // A t of 8 degrees of freedom with scale 0.5 has sd 0.577; scale of 300 points 4 %, sd of 4000 draws 2 %: 4
+  // of both.
+  for (Index d = 0; d < 4; ++d) EXPECT_NEAR(sd[d], 0.577, 0.18 * 0.577);
+  // Standard normal: sd of 4000 draws is known to 1.1 %; 4.5 of them.
+  for (Index d = 4; d < 6; ++d) EXPECT_NEAR(sd[d], 1.0, 0.05);
+}
+
+TEST(CalibrationTarget, EvidenceEqualsQuadratureWhateverTheReference) {
+  const Emulator emulator = make_emulator(1);
+  const HistoryModel model = make_model({});
+  const HistoryTarget history(model, {});  // coordinates: sigma and one parameter
+  const CalibrationTarget exact(history, make_reference(1, 1.0), emulator);
+  // Trapezoidal rule over prior times likelihood, accurate to rounding for a smooth integrand.
+  const int m = 400;
+  const double h = 16.0 / m;
+  VectorXd log_terms((m + 1) * (m + 1));
+  MatrixXd row(2, m + 1);
+  for (int i = 0; i <= m; ++i) {
+    for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
+    const VectorXd ll = exact.log_likelihood(row);
+    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + exact.log_reference(row.col(j));
+  }
+  const double top = log_terms.maxCoeff();
+  const double truth = top + std::log((log_terms.array() - top).exp().sum() * h * h);
+  for (double width : {0.6, 1.0, 1.5}) {
+    const CalibrationTarget target(history, make_reference(1, width), emulator);
+    const AisResult result = sample_ais(target, {}, Context());
+    EXPECT_TRUE(result.trusted) << result.verdict;
+    // Four reported standard errors, and well below what matters to a Bayes factor.
+    EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.1)) << width;
   }
 }
 
-TEST(CalibrationTarget, EvidenceOfOneParameterEqualsQuadrature) {
-  const Emulator emulator = make_emulator(1);
-  const CalibrationTarget target(emulator, make_data());
-  // Uniform prior of u: midpoint rule on the unit interval, through the quantile function.
-  const boost::math::normal normal;
-  const int n = 4000;
-  MatrixXd x(1, n);
-  for (int i = 0; i < n; ++i) x(0, i) = quantile(normal, (i + 0.5) / n);
-  const double truth = std::log(target.log_likelihood(x).array().exp().mean());
-  Context context;
-  const AisResult result = sample_ais(target, {}, context);
-  EXPECT_TRUE(result.trusted) << result.verdict;
-  // Four reported standard errors, and well below what matters to a Bayes factor.
-  EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.1));
-}
-
-TEST(CalibrationTarget, CovarianceThatIsNoneGivesLikelihoodZero) {
-  const Emulator emulator = make_emulator(2);
-  std::vector<CoefficientData> data = make_data();
-  data.resize(1);
-  data[0].covariance(0, 1) = data[0].covariance(1, 0) = 100.0;
-  EXPECT_EQ(CalibrationTarget(emulator, data).log_likelihood(MatrixXd::Zero(2, 1))[0],
-            -std::numeric_limits<double>::infinity());
-}
-
-TEST(CalibrationTarget, NeedsErrorDraws) {
-  const Emulator emulator = make_emulator(1);
-  EXPECT_THROW(CalibrationTarget(emulator, {}), std::invalid_argument);
+TEST(CalibrationTarget, UnitsOfTheBasisDoNotMatter) {
+  const Joint joint;
+  HistoryData scaled = make_data();
+  scaled.basis *= 100.0;
+  EmulatorState state = joint.emulator.state();
+  state.coefficients /= 100.0;
+  const Emulator emulator(state);
+  HistoryPriors priors = joint.model.priors();
+  const HistoryModel model(scaled, priors, Context());
+  const HistoryTarget history(model, {0, 1});
+  const CalibrationTarget other(history, make_reference(4, 1.0), emulator);
+  const MatrixXd x = normal_matrix(6, 5, 89);
+  const VectorXd a = joint.target().log_likelihood(x), b = other.log_likelihood(x);
+  for (Index i = 0; i < 5; ++i) EXPECT_NEAR(a[i], b[i], 1e-7 * (1 + std::abs(a[i])));
 }
 
 }  // namespace

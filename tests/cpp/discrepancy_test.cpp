@@ -40,7 +40,9 @@ HistoryPriors make_priors() {
   return priors;
 }
 
-HistoryModel make_model(const HistoryData& data = make_data()) { return HistoryModel(data, make_priors(), Context()); }
+HistoryModel make_model(const HistoryData& data = make_data()) {
+  return HistoryModel(data, make_priors(), Context());
+}
 
 // Columns centred and scaled to unit population variance, weighted by sqrt(t_s / p_s).
 MatrixXd weighted_responses(const HistoryData& data, const VectorXd& t) {
@@ -75,7 +77,9 @@ TEST(HistoryModel, LikelihoodEqualsTheDenseOneWithAnExplicitComplement) {
   ASSERT_EQ(model.settings(), 9);
   for (int g = 0; g < 9; ++g) {
     const VectorXd ratios = model.priors().error.setting(g);
-    EXPECT_NEAR(model.log_likelihood(g, std::log(kVariance), kT), dense_outside(data, ratios, kVariance, kT), 1e-8) << g;
+    EXPECT_NEAR(model.log_likelihood(g, std::log(kVariance), kT), dense_outside(data, ratios, kVariance, kT),
+                1e-8)
+        << g;
     EXPECT_NEAR(model.log_likelihood(g, std::log(kVariance), VectorXd::Zero(3)),
                 dense_outside(data, ratios, kVariance, VectorXd::Zero(3)), 1e-8)
         << g;
@@ -86,9 +90,12 @@ TEST(HistoryModel, GradientIsTheDerivative) {
   const HistoryModel model = make_model();
   const VectorXd x = (VectorXd(4) << std::log(kVariance), kT.array().log()).finished();
   for (int g : {0, 4, 8}) {
-    const auto f = [&](const VectorXd& at) { return model.log_likelihood(g, at[0], at.tail(3).array().exp()); };
+    const auto f = [&](const VectorXd& at) {
+      return model.log_likelihood(g, at[0], at.tail(3).array().exp());
+    };
     VectorXd gradient;
-    EXPECT_EQ(model.log_likelihood(g, x[0], kT, &gradient), f(x));
+    const VectorXd t = x.tail(3).array().exp();
+    EXPECT_EQ(model.log_likelihood(g, x[0], t, &gradient), f(x));
     const VectorXd expected = numerical_gradient(f, x);
     for (Index i = 0; i < 4; ++i) {
       ASSERT_GT(std::abs(expected[i]), 1e-3);
@@ -105,7 +112,8 @@ TEST(HistoryModel, GradientHoldsWhereAConditionIsLeftOut) {
   const auto f = [&](const VectorXd& at) {
     return model.log_likelihood(4, at[0], Eigen::Vector3d(std::exp(at[1]), 0.0, std::exp(at[2])));
   };
-  const VectorXd expected = numerical_gradient(f, Eigen::Vector3d(std::log(kVariance), std::log(kT[0]), std::log(kT[2])));
+  const VectorXd expected =
+      numerical_gradient(f, Eigen::Vector3d(std::log(kVariance), std::log(kT[0]), std::log(kT[2])));
   EXPECT_NEAR(gradient[0] / expected[0], 1.0, 1e-5);
   EXPECT_NEAR(gradient[1] / expected[1], 1.0, 1e-5);
   EXPECT_EQ(gradient[2], 0.0);  // d / d log t = t d / d t
@@ -166,7 +174,9 @@ TEST(HistoryModel, UnitsOfTheBasisDoNotMatter) {
     const MatrixXd covariance = kVariance * (own.root.transpose() * own.root).inverse();
     return log_normal_density(own.estimate, coefficients, covariance);
   };
-  const auto log_root = [](const WhitenedData& own) { return own.root.diagonal().cwiseAbs().array().log().sum(); };
+  const auto log_root = [](const WhitenedData& own) {
+    return own.root.diagonal().cwiseAbs().array().log().sum();
+  };
   for (int g : {0, 7}) {
     const WhitenedData &plain = a.whitened(g), &other = b.whitened(g);
     EXPECT_NEAR(a.log_likelihood(g, -0.5, kT), b.log_likelihood(g, -0.5, kT), 1e-9);
@@ -186,7 +196,8 @@ TEST(HistoryModel, ConditionThatNeverChangesHasNoEffect) {
   HistoryData data = make_data();
   data.responses.col(2).setConstant(17.0);
   const HistoryModel model = make_model(data);
-  EXPECT_NEAR(model.log_likelihood(4, -0.5, kT), model.log_likelihood(4, -0.5, Eigen::Vector3d(kT[0], 0.0, kT[2])), 1e-9);
+  EXPECT_NEAR(model.log_likelihood(4, -0.5, kT),
+              model.log_likelihood(4, -0.5, Eigen::Vector3d(kT[0], 0.0, kT[2])), 1e-9);
 }
 
 TEST(HistoryModel, CoefficientsAreThePosteriorMean) {
@@ -203,7 +214,8 @@ TEST(HistoryModel, CoefficientsAreThePosteriorMean) {
                             .finished();
   const MatrixXd phi = outside * weighted_responses(data, kT);
   const MatrixXd normal = phi.transpose() * inverse * phi + kVariance * MatrixXd::Identity(5, 5);
-  const VectorXd expected = root.cwiseProduct(normal.inverse() * phi.transpose() * inverse * outside * data.y);
+  const VectorXd expected =
+      root.cwiseProduct(normal.inverse() * phi.transpose() * inverse * outside * data.y);
   const VectorXd own = model.coefficients(model.whitened(5), std::log(kVariance), kT);
   EXPECT_LT((own - expected).cwiseAbs().maxCoeff(), 1e-9);
 }
@@ -236,8 +248,8 @@ TEST(HistoryTarget, CoordinatesMapToThePriorsQuantiles) {
   ASSERT_EQ(target.dimension(), 1 + 2 + 2);
   const HistoryPriors priors = make_priors();
   // lambda* ~ Gamma(a*, rate a* sd^2); sqrt(t) ~ half-Cauchy(amplitude).
-  const boost::math::gamma_distribution<> precision(priors.noise_shape,
-                                                    1 / (priors.noise_shape * priors.noise_sd * priors.noise_sd));
+  const boost::math::gamma_distribution<> precision(
+      priors.noise_shape, 1 / (priors.noise_shape * priors.noise_sd * priors.noise_sd));
   const boost::math::cauchy cauchy(0.0, priors.amplitude);
   const boost::math::normal normal;
   for (double u : {0.03, 0.5, 0.9}) {
@@ -298,12 +310,14 @@ TEST(HistoryTarget, EvidenceOfTheNoiseAloneEqualsQuadrature) {
   for (int i = 0; i <= m; ++i) {
     for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
     const VectorXd ll = target.log_likelihood(row);
-    for (int j = 0; j <= m; ++j) sum += std::exp(ll[j] + 60.0 - 0.5 * row.col(j).squaredNorm() - kLogTwoPi) * h * h;
+    for (int j = 0; j <= m; ++j)
+      sum += std::exp(ll[j] + 60.0 - 0.5 * row.col(j).squaredNorm() - kLogTwoPi) * h * h;
   }
   const AisResult result = sample_ais(target, {}, Context());
   EXPECT_TRUE(result.trusted) << result.verdict;
   // Four reported standard errors, and in any case less than matters to a Bayes factor.
-  EXPECT_LT(std::abs(result.log_evidence - (std::log(sum) - 60.0)), std::min(4 * result.standard_error, 0.15));
+  EXPECT_LT(std::abs(result.log_evidence - (std::log(sum) - 60.0)),
+            std::min(4 * result.standard_error, 0.15));
 }
 
 TEST(FilterBank, RespondsToAStepExactly) {
@@ -335,7 +349,8 @@ TEST(FilterBank, SegmentsAreIndependent) {
   VectorXd other = x;
   other.head(9) = normal_vector(9, 46);
   const VectorXd times = Eigen::Vector2d(1.0, 8.0);
-  const MatrixXd a = FilterBank(x, {0}, times, axis).responses, b = FilterBank(other, {0}, times, axis).responses;
+  const MatrixXd a = FilterBank(x, {0}, times, axis).responses,
+                 b = FilterBank(other, {0}, times, axis).responses;
   EXPECT_EQ(a.bottomRows(11), b.bottomRows(11));
   EXPECT_NE(a.topRows(9), b.topRows(9));
 }

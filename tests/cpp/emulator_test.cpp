@@ -23,7 +23,8 @@ MatrixXd smooth_covariance(const MatrixXd& a, const MatrixXd& b, double amplitud
   for (Index i = 0; i < a.rows(); ++i) {
     for (Index j = 0; j < b.rows(); ++j) {
       c(i, j) = amplitude;
-      for (Index p = 0; p < beta.size(); ++p) c(i, j) *= std::pow(beta[p], 4 * std::pow(a(i, p) - b(j, p), 2));
+      for (Index p = 0; p < beta.size(); ++p)
+        c(i, j) *= std::pow(beta[p], 4 * std::pow(a(i, p) - b(j, p), 2));
     }
   }
   return c;
@@ -60,7 +61,8 @@ TEST(GaussianProcess, GradientOfTheLogDensityIsItsDerivative) {
     VectorXd gradient(x.size()), none(0);
     GaussianProcess::log_density(s.inputs, s.values, prior, x, gradient);
     const VectorXd expected = numerical_gradient(
-        [&](const VectorXd& at) { return GaussianProcess::log_density(s.inputs, s.values, prior, at, none); }, x);
+        [&](const VectorXd& at) { return GaussianProcess::log_density(s.inputs, s.values, prior, at, none); },
+        x);
     for (Index i = 0; i < x.size(); ++i) {
       ASSERT_GT(std::abs(expected[i]), 1e-3) << "coordinate " << i << " tests nothing";
       EXPECT_NEAR(gradient[i] / expected[i], 1.0, 1e-5) << "coordinate " << i;
@@ -155,8 +157,9 @@ TEST(Emulator, PredictsRunsItHasNotSeenAndKnowsHowWell) {
   const double spread = (truth.rowwise() - truth.colwise().mean()).norm();
   EXPECT_LT(error.norm() / spread, 0.03);  // R2 above 0.999 for a smooth response
 
-  // The first and the last coefficient (the mean) against their own 95 % intervals. A process fitted by its mode is
-  // somewhat over-confident, and errors of neighbouring points are alike: 80 % of 300 points is demanded.
+  // The first and the last coefficient (the mean) against their own 95 % intervals. A process fitted by its
+  // mode is somewhat over-confident, and errors of neighbouring points are alike: 80 % of 300 points is
+  // demanded.
   const MatrixXd own = trained.basis.vectors.colPivHouseholderQr().solve(truth.transpose()).transpose();
   for (Index q : {Index(0), mean.cols() - 1}) {
     const Eigen::ArrayXd z = (own.col(q) - mean.col(q)).array() / variance.col(q).array().sqrt();
@@ -181,7 +184,8 @@ TEST(Emulator, TrainsEachCoefficientWithTheStatedNoisePrior) {
   const Basis& basis = trained.basis;
   const double discarded = (trained.outputs - basis.vectors * basis.coefficients.transpose()).squaredNorm();
   const double shape = 2.0 + 40.0 * static_cast<double>(50 - basis.size()) / 2.0;
-  const double largest = basis.vectors.col(0).norm();  // the first vector is scaled by the largest singular value
+  const double largest =
+      basis.vectors.col(0).norm();  // the first vector is scaled by the largest singular value
   const double rate = std::sqrt(2.220446049250313e-16) * largest + 0.5 * discarded;
   for (Index q = 0; q < basis.size(); ++q) {
     const VectorXd w = basis.coefficients.col(q);
@@ -235,6 +239,24 @@ TEST(Emulator, LeaveOneOutIsInTheCoefficientsOwnScale) {
     // Nearly interpolating covariances have condition numbers around 1e7 to 1e10.
     EXPECT_NEAR(mean(7, q), centre + sd * m[0], 1e-4 * sd);
     EXPECT_NEAR(variance(7, q) / (sd * sd * (v[0] + noise)), 1.0, 1e-2);
+  }
+}
+
+TEST(Emulator, PredictionIsInTheCoefficientsOwnScale) {
+  const Emulator emulator = Trained().emulator();
+  const EmulatorState state = emulator.state();
+  const MatrixXd points = uniform_matrix(8, 3, 35);
+  MatrixXd mean, variance;
+  emulator.predict(points, mean, variance);
+  VectorXd m(8), v(8);
+  for (Index q = 0; q < mean.cols(); ++q) {
+    const VectorXd w = state.coefficients.col(q);
+    const double centre = w.mean(), sd = std::sqrt((w.array() - centre).square().sum() / 39.0);
+    const auto p = GaussianProcessParameters::unpack(state.parameters.row(q).transpose());
+    GaussianProcess(state.inputs, (w.array() - centre) / sd, p).predict(points, m, v);
+    // Rounding of centre and scale, enlarged by the condition number of a nearly interpolating covariance.
+    EXPECT_LT((mean.col(q).array() - centre - sd * m.array()).abs().maxCoeff(), 1e-5 * sd) << q;
+    EXPECT_LT((variance.col(q).array() / (sd * sd * v.array()) - 1.0).abs().maxCoeff(), 1e-5) << q;
   }
 }
 

@@ -42,7 +42,8 @@ inline double log_normal_density(const VectorXd& y, const VectorXd& mean, const 
 }
 
 /// Covariance of the error with sigma = 1, from its definition; independent across segments.
-inline MatrixXd error_covariance(const TimeAxis& axis, const VectorXd& correlation_times, const VectorXd& ratios) {
+inline MatrixXd error_covariance(const TimeAxis& axis, const VectorXd& correlation_times,
+                                 const VectorXd& ratios) {
   const Index n = axis.size();
   std::vector<int> segment(static_cast<std::size_t>(n));
   int current = 0;
@@ -77,7 +78,8 @@ inline TimeAxis even_axis(Index n) {
 }
 
 /// Derivative of f at x by central differences.
-inline VectorXd numerical_gradient(const std::function<double(const VectorXd&)>& f, const VectorXd& x, double h = 1e-5) {
+inline VectorXd numerical_gradient(const std::function<double(const VectorXd&)>& f, const VectorXd& x,
+                                   double h = 1e-5) {
   VectorXd gradient(x.size());
   for (Index i = 0; i < x.size(); ++i) {
     VectorXd up = x, down = x;
@@ -95,7 +97,8 @@ inline double kolmogorov_distance(std::vector<double> sample, const std::functio
   double distance = 0.0;
   for (std::size_t i = 0; i < sample.size(); ++i) {
     const double p = cdf(sample[i]);
-    distance = std::max({distance, std::abs(p - static_cast<double>(i) / n), std::abs(p - static_cast<double>(i + 1) / n)});
+    distance = std::max(
+        {distance, std::abs(p - static_cast<double>(i) / n), std::abs(p - static_cast<double>(i + 1) / n)});
   }
   return distance;
 }
@@ -103,7 +106,8 @@ inline double kolmogorov_distance(std::vector<double> sample, const std::functio
 /// A target given by a function of one point.
 class FunctionTarget : public Target {
  public:
-  FunctionTarget(Index dimension, std::function<double(const VectorXd&)> f) : dimension_(dimension), f_(std::move(f)) {}
+  FunctionTarget(Index dimension, std::function<double(const VectorXd&)> f)
+      : dimension_(dimension), f_(std::move(f)) {}
   Index dimension() const override { return dimension_; }
   VectorXd log_likelihood(const MatrixXd& x) const override {
     VectorXd values(x.cols());

@@ -26,7 +26,8 @@ TEST(Maximise, FindsTheBoundedMaximumOfACoupledQuadratic) {
     gradient = -a * (x - centre);
     return -0.5 * (x - centre).dot(a * (x - centre));
   };
-  const Maximum found = maximise(f, Eigen::Vector2d(0, 0), Eigen::Vector2d(-5, -5), Eigen::Vector2d(1, 5), 1e-12);
+  const Maximum found =
+      maximise(f, Eigen::Vector2d(0, 0), Eigen::Vector2d(-5, -5), Eigen::Vector2d(1, 5), 1e-12);
   // With x0 held at its bound 1, the derivative in x1 vanishes at 1/2 + 1/3.
   EXPECT_NEAR(found.x[0], 1.0, 1e-9);
   EXPECT_NEAR(found.x[1], 5.0 / 6.0, 1e-5);

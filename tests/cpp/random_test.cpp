@@ -13,7 +13,8 @@ namespace {
 
 using namespace test;
 
-// A sample of n values from the stated distribution exceeds 2.23 / sqrt(n) with probability 1e-4 (Kolmogorov).
+// A sample of n values from the stated distribution exceeds 2.23 / sqrt(n) with probability 1e-4
+// (Kolmogorov).
 constexpr int kDraws = 20000;
 const double kDistance = 2.23 / std::sqrt(static_cast<double>(kDraws));
 
@@ -44,8 +45,9 @@ TEST(Stream, EveryTripleGivesAnotherStream) {
 
 TEST(Stream, FirstDrawsOfNeighbouringItemsAreUniform) {
   std::uint64_t item = 0;
-  EXPECT_LT(kolmogorov_distance(sample([&] { return Stream(1, 1, item++).uniform(); }), [](double u) { return u; }),
-            kDistance);
+  EXPECT_LT(
+      kolmogorov_distance(sample([&] { return Stream(1, 1, item++).uniform(); }), [](double u) { return u; }),
+      kDistance);
 }
 
 TEST(Stream, NeighbouringItemsAreUncorrelated) {
@@ -57,23 +59,25 @@ TEST(Stream, NeighbouringItemsAreUncorrelated) {
 
 TEST(Stream, UniformHasItsDistribution) {
   Stream stream(11, 1, 1);
-  EXPECT_LT(kolmogorov_distance(sample([&] { return stream.uniform(); }), [](double u) { return u; }), kDistance);
+  EXPECT_LT(kolmogorov_distance(sample([&] { return stream.uniform(); }), [](double u) { return u; }),
+            kDistance);
 }
 
 TEST(Stream, NormalHasItsDistribution) {
   Stream stream(12, 1, 1);
   const boost::math::normal normal;
-  EXPECT_LT(kolmogorov_distance(sample([&] { return stream.normal(); }), [&](double x) { return cdf(normal, x); }),
-            kDistance);
+  EXPECT_LT(
+      kolmogorov_distance(sample([&] { return stream.normal(); }), [&](double x) { return cdf(normal, x); }),
+      kDistance);
 }
 
 TEST(Stream, GammaHasItsDistributionBelowAndAboveShapeOne) {
   for (double shape : {0.4, 1.0, 6.5}) {
     Stream stream(13, 1, 1);
     const boost::math::gamma_distribution<> gamma(shape, 1.0);
-    EXPECT_LT(
-        kolmogorov_distance(sample([&] { return stream.gamma(shape); }), [&](double x) { return cdf(gamma, x); }),
-        kDistance)
+    EXPECT_LT(kolmogorov_distance(sample([&] { return stream.gamma(shape); }),
+                                  [&](double x) { return cdf(gamma, x); }),
+              kDistance)
         << shape;
   }
 }

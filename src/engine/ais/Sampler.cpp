@@ -41,7 +41,8 @@ VectorXd evaluate(const Target& target, const MatrixXd& x) {
 
 Chains start(const Target& target, int n, Stream& stream) {
   Chains chains;
-  chains.x = stream.normals(target.dimension(), n);
+  chains.x.resize(target.dimension(), n);
+  for (int i = 0; i < n; ++i) chains.x.col(i) = target.draw_reference(stream);
   chains.ll = evaluate(target, chains.x);
   chains.log_w = VectorXd::Zero(n);
   return chains;
@@ -99,7 +100,7 @@ double move(const Target& target, Chains& chains, const Level& level, Stream& st
     const double log_u = std::log(stream.uniform());
     if (!std::isfinite(ll[i])) continue;
     const double log_ratio = level.beta * (ll[i] - chains.ll[i]) -
-                             0.5 * (proposed.col(i).squaredNorm() - chains.x.col(i).squaredNorm()) +
+                             target.log_reference(chains.x.col(i)) + target.log_reference(proposed.col(i)) +
                              level.proposal.log_density(chains.x.col(i)) - level.proposal.log_density(proposed.col(i));
     if (log_u < log_ratio) {
       chains.x.col(i) = proposed.col(i);
@@ -114,7 +115,7 @@ std::vector<Level> pilot(const Target& target, const AisOptions& options, const 
   Stream stream(context.seed, kPilot, 0);
   Chains chains = start(target, options.pilot_chains, stream);
   evaluations += options.pilot_chains;
-  if (!std::isfinite(chains.ll.maxCoeff())) throw std::runtime_error("ais: the likelihood is zero at every prior draw");
+  if (!std::isfinite(chains.ll.maxCoeff())) throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
   std::vector<Level> levels;
   double beta = 0.0, step = 0.8;
   while (beta < 1.0) {
@@ -201,57 +202,89 @@ Spread bootstrap(const VectorXd& values, double estimate, Stream stream) {
   return {sd * widen, estimate + widen * (replicates[24] - estimate), estimate + widen * (replicates[974] - estimate)};
 }
 
-void importance_sample(const Target& target, const AisOptions& options, const Context& context, AisResult& result) {
-  Stream stream(context.seed, kImportance, 0);
-  const auto mixture = StudentTMixture::fit(result.draws, result.weights, options.max_components, kImportanceDof, stream);
-  const int n = options.importance_draws;
-  MatrixXd x(target.dimension(), n);
+struct ImportanceSample {
+  MatrixXd x;
+  VectorXd ll;
+  double log_evidence = -std::numeric_limits<double>::infinity();
+  double se = std::numeric_limits<double>::infinity();
+  double ess = 0.0;
+  VectorXd weights;
+};
+
+ImportanceSample importance_sample(const Target& target, const StudentTMixture& mixture, int n, const Context& context, Stream& stream) {
+  ImportanceSample sample;
+  sample.x.resize(target.dimension(), n);
+  sample.ll.resize(n);
   VectorXd log_w(n);
   for (int i = 0; i < n; ++i) {
-    x.col(i) = mixture.draw(stream);
-    log_w[i] = -0.5 * x.col(i).squaredNorm() - 0.91893853320467274 * static_cast<double>(x.rows()) - mixture.log_density(x.col(i));
+    sample.x.col(i) = mixture.draw(stream);
+    log_w[i] = target.log_reference(sample.x.col(i)) - mixture.log_density(sample.x.col(i));
   }
   // Blocks of fixed size, so that the result does not depend on how many threads share them.
   constexpr int kBlock = 64;
   parallel_for((n + kBlock - 1) / kBlock, context, [&](int b) {
     const int first = b * kBlock, count = std::min(kBlock, n - first);
-    log_w.segment(first, count) += evaluate(target, x.middleCols(first, count));
+    sample.ll.segment(first, count) = evaluate(target, sample.x.middleCols(first, count));
   });
-  result.evaluations += n;
-  result.importance = log_mean_exp(log_w);
-  if (!std::isfinite(result.importance)) {
-    result.importance_se = std::numeric_limits<double>::infinity();
-    return;
-  }
-  const Eigen::ArrayXd relative = (log_w.array() - result.importance).exp();
-  result.importance_se = std::sqrt((relative - 1.0).square().sum() / (n - 1.0) / n);
-  result.importance_ess = n / relative.square().mean();
+  log_w += sample.ll;
+  if (!std::isfinite(log_w.maxCoeff())) return sample;
+  sample.log_evidence = log_mean_exp(log_w);
+  sample.weights = normalised_exp(log_w);
+  sample.ess = 1.0 / sample.weights.squaredNorm();
+  sample.se = std::sqrt(std::max(0.0, n / sample.ess - 1.0) / (n - 1.0));
+  return sample;
 }
 
-void choose_estimator(AisResult& result) {
-  const bool importance = std::isfinite(result.importance) && result.importance_se < result.annealed_se && result.importance_ess > 50;
-  if (importance) {
-    result.estimator = "importance";
-    result.log_evidence = result.importance;
-    result.standard_error = result.importance_se;
-    result.lower = result.importance - 1.96 * result.importance_se;
-    result.upper = result.importance + 1.96 * result.importance_se;
+// Each round's mixture is fitted to the weighted draws of the round before, the first to the annealed draws; the last
+// round alone is the estimator. If it is the better one, its draws replace the annealed ones.
+void second_estimator(const Target& target, const AisOptions& options, const Context& context, AisResult& result) {
+  constexpr int kRounds = 5;
+  constexpr double kGood = 0.2;     // effective share of the draws at which refitting stops
+  constexpr double kUsable = 30.0;  // effective draws below which the estimate is not used
+  Stream stream(context.seed, kImportance, 0);
+  const int n = options.importance_draws;
+  ImportanceSample sample{result.draws, result.log_likelihood, 0.0, 0.0, 0.0, result.weights};
+  for (int round = 0; round < kRounds && (round < 2 || sample.ess < kGood * n); ++round) {
+    const auto mixture = StudentTMixture::fit(sample.x, sample.weights, options.max_components, kImportanceDof, stream);
+    sample = importance_sample(target, mixture, n, context, stream);
+    result.evaluations += n;
+    if (!std::isfinite(sample.log_evidence)) break;
   }
+  result.importance = sample.log_evidence;
+  result.importance_se = sample.se;
+  result.importance_ess = sample.ess;
+  if (sample.se < result.annealed_se && sample.ess > kUsable) {
+    result.estimator = "importance";
+    result.log_evidence = sample.log_evidence;
+    result.standard_error = sample.se;
+    result.lower = sample.log_evidence - 1.96 * sample.se;
+    result.upper = sample.log_evidence + 1.96 * sample.se;
+    result.draws = std::move(sample.x);
+    result.weights = std::move(sample.weights);
+    result.log_likelihood = std::move(sample.ll);
+    result.ess = sample.ess;
+  }
+}
+
+// An unbiased estimate of Z with few chains is seldom too large (Markov: Z_hat > k Z with probability below 1 / k)
+// and easily too small. So the annealed estimate may lie below the importance sample by more than above it.
+bool estimators_agree(const AisResult& result) {
+  const double gap = result.annealed - result.importance;
+  const double error = std::hypot(result.annealed_se, result.importance_se);
+  return gap < 3.5 * error + 0.1 && gap > -(3.5 * error + 5.0);
 }
 
 void judge(AisResult& result, const AisOptions& options) {
   double least = 1.0;
   for (const auto& level : result.ladder) least = std::min(least, level.acceptance);
-  const double gap = std::abs(result.annealed - result.importance);
-  const double allowed = 3.5 * std::hypot(result.annealed_se, result.importance_se) + 0.1;
   result.trusted = false;
   if (least < 0.02) {
     result.verdict = "not trusted: the chains hardly move at some temperature";
-  } else if (result.ess < 0.05 * static_cast<double>(result.draws.cols())) {
+  } else if (result.ess < 0.02 * static_cast<double>(result.draws.cols())) {
     result.verdict = "not trusted: a few chains carry all the weight";
   } else if (result.standard_error > 1.0) {
     result.verdict = "not trusted: the standard error exceeds one nat";
-  } else if (options.importance_draws > 0 && !(gap < allowed)) {
+  } else if (options.importance_draws > 0 && !estimators_agree(result)) {
     result.verdict = "not trusted: the two estimators of the evidence disagree";
   } else {
     result.trusted = true;
@@ -313,8 +346,7 @@ AisResult sample_ais(const Target& target, const AisOptions& options, const Cont
   }
   result.importance = result.importance_se = std::numeric_limits<double>::quiet_NaN();
   if (options.importance_draws > 0) {
-    importance_sample(target, options, context, result);
-    choose_estimator(result);
+    second_estimator(target, options, context, result);
   }
   judge(result, options);
   return result;

@@ -39,10 +39,10 @@ struct AisResult {
   double annealed = 0.0, annealed_se = 0.0;      ///< frozen annealed run; interval by bootstrap over groups
   double importance = 0.0, importance_se = 0.0;  ///< Student-t mixture; NaN if left out
   double importance_ess = 0.0;                   ///< effective size of the importance draws
-  double ess = 0.0;                              ///< effective size of the annealed draws
+  double ess = 0.0;                              ///< effective size of the draws below
   double log_weight_variance = 0.0;              ///< of the groups' log evidences
 
-  Eigen::MatrixXd draws;     ///< dimension x draws, in the target's coordinates
+  Eigen::MatrixXd draws;     ///< dimension x draws of the chosen estimator, in the target's coordinates
   Eigen::VectorXd weights;   ///< of the draws, sum 1
   Eigen::VectorXd log_likelihood;  ///< of the draws
   std::vector<Temperature> ladder;
@@ -51,7 +51,7 @@ struct AisResult {
   std::string verdict;       ///< why it can or cannot be trusted, one sentence
 };
 
-/// Annealed importance sampling (Neal 2001) of prior N(0, I) x likelihood. A pilot (an adaptive sequential Monte
+/// Annealed importance sampling (Neal 2001) of reference x likelihood. A pilot (an adaptive sequential Monte
 /// Carlo sampler; Del Moral, Doucet and Jasra 2006) finds the ladder of temperatures and, at each, a Student-t
 /// proposal and a step length. Both are then frozen, and fresh independent groups of chains are run, so that each
 /// group's estimate of the evidence is unbiased. The chains move by preconditioned Crank-Nicolson steps that are

@@ -1,10 +1,12 @@
 #pragma once
 #include "engine/linalg/Eigen.hpp"
+#include "engine/random/Stream.hpp"
 
 namespace amiss {
 
-/// A posterior to be sampled and normalised. Its coordinates x have the prior N(0, I): u = Phi(x) is uniform on
-/// the unit cube, and a prior's quantile function maps u onto the parameters.
+/// A posterior to be sampled and normalised: a reference distribution, normalised and easy to draw from, times a
+/// likelihood. By default the reference is the prior in coordinates x ~ N(0, I): u = Phi(x) is uniform on the unit
+/// cube, and a prior's quantile function maps u onto the parameters.
 class Target {
  public:
   virtual ~Target() = default;
@@ -12,6 +14,12 @@ class Target {
   /// Log-likelihood of each column of x (dimension x n). Called from several threads at once. A value that is not
   /// finite counts as likelihood zero.
   virtual Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const = 0;
+
+  virtual Eigen::VectorXd draw_reference(Stream& stream) const { return stream.normals(dimension()); }
+  virtual double log_reference(const Eigen::VectorXd& x) const {
+    constexpr double kHalfLogTwoPi = 0.91893853320467274178;
+    return -0.5 * x.squaredNorm() - kHalfLogTwoPi * static_cast<double>(x.size());
+  }
 };
 
 }  // namespace amiss

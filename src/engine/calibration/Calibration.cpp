@@ -2,9 +2,7 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
-#include "engine/linalg/log_sum_exp.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -13,44 +11,63 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-CalibrationTarget::CalibrationTarget(const Emulator& emulator, std::vector<CoefficientData> data)
-    : emulator_(emulator), data_(std::move(data)) {
-  if (data_.empty()) throw std::invalid_argument("calibration: no error draws");
+namespace {
+
+constexpr double kLogTwoPi = 1.83787706640934548356;
+
+double log_standard_normal(const VectorXd& x) { return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size())); }
+
+}  // namespace
+
+CalibrationTarget::CalibrationTarget(const HistoryTarget& history, StudentTMixture reference, const Emulator& emulator)
+    : history_(history), reference_(std::move(reference)), emulator_(emulator) {
+  const HistoryModel& model = history.model();
+  for (int g = 0; g < model.settings(); ++g) {
+    const MatrixXd& root = model.whitened(g).root;
+    const MatrixXd inverse = root.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(root.rows(), root.cols()));
+    unit_covariance_.push_back(inverse * inverse.transpose());
+  }
 }
 
-MatrixXd CalibrationTarget::unit(const MatrixXd& x) { return x.transpose().unaryExpr(&normal_cdf); }
+MatrixXd CalibrationTarget::unit(const MatrixXd& x) const {
+  return x.bottomRows(emulator_.n_inputs()).transpose().unaryExpr(&normal_cdf);
+}
 
-MatrixXd CalibrationTarget::log_densities(const MatrixXd& x) const {
-  constexpr double kLogTwoPi = 1.83787706640934548356;
-  MatrixXd mean, variance;
-  emulator_.predict(unit(x), mean, variance);
-  MatrixXd values(static_cast<Index>(data_.size()), x.cols());
-  const Index q = mean.cols();
-  MatrixXd covariance(q, q);
-  for (Index i = 0; i < x.cols(); ++i) {
-    for (std::size_t j = 0; j < data_.size(); ++j) {
-      covariance = data_[j].covariance;
-      covariance.diagonal() += variance.row(i).transpose();
-      // The coefficients differ by orders of magnitude: factorise the correlation.
-      const VectorXd scale = covariance.diagonal().cwiseSqrt();
-      covariance.array() /= (scale * scale.transpose()).array();
-      const Eigen::LLT<MatrixXd> factor(covariance);
-      const VectorXd z = factor.matrixL().solve(
-          (data_[j].estimate - mean.row(i).transpose()).cwiseQuotient(scale));
-      const double log_det = 2.0 * (factor.matrixLLT().diagonal().array().log().sum() + scale.array().log().sum());
-      values(static_cast<Index>(j), i) =
-          factor.info() == Eigen::Success
-              ? data_[j].log_jacobian - 0.5 * (static_cast<double>(q) * kLogTwoPi + log_det + z.squaredNorm())
-              : -std::numeric_limits<double>::infinity();
-    }
-  }
-  return values;
+VectorXd CalibrationTarget::draw_reference(Stream& stream) const {
+  VectorXd x(dimension());
+  x << reference_.draw(stream), stream.normals(emulator_.n_inputs());
+  return x;
+}
+
+double CalibrationTarget::log_reference(const VectorXd& x) const {
+  return reference_.log_density(x.head(history_.dimension())) + log_standard_normal(x.tail(emulator_.n_inputs()));
+}
+
+double CalibrationTarget::log_density_inside(const HistoryParameters& point, const VectorXd& mean, const VectorXd& variance) const {
+  const WhitenedData& data = history_.model().whitened(point.setting);
+  MatrixXd covariance = point.variance * unit_covariance_[point.setting];
+  covariance.diagonal() += variance;
+  // The coefficients differ by orders of magnitude: factorise the correlation.
+  const VectorXd scale = covariance.diagonal().cwiseSqrt();
+  covariance.array() /= (scale * scale.transpose()).array();
+  const Eigen::LLT<MatrixXd> factor(covariance);
+  if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
+  const VectorXd z = factor.matrixL().solve((data.estimate - mean).cwiseQuotient(scale));
+  const double half_log_det = factor.matrixLLT().diagonal().array().log().sum() + scale.array().log().sum();
+  const double log_jacobian = -data.root.diagonal().cwiseAbs().array().log().sum();
+  return log_jacobian - half_log_det - 0.5 * (static_cast<double>(mean.size()) * kLogTwoPi + z.squaredNorm());
 }
 
 VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {
-  const MatrixXd parts = log_densities(x);
-  VectorXd values(x.cols());
-  for (Index i = 0; i < x.cols(); ++i) values[i] = log_mean_exp(parts.col(i));
+  MatrixXd mean, variance;
+  emulator_.predict(unit(x), mean, variance);
+  const MatrixXd history_x = x.topRows(history_.dimension());
+  VectorXd values = history_.log_likelihood(history_x);
+  for (Index i = 0; i < x.cols(); ++i) {
+    // The history posterior is in the target, not in the reference.
+    values[i] += log_standard_normal(history_x.col(i)) - reference_.log_density(history_x.col(i));
+    values[i] += log_density_inside(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose());
+  }
   return values;
 }
 

@@ -1,39 +1,43 @@
 #pragma once
-#include <vector>
-
+#include "engine/ais/StudentT.hpp"
 #include "engine/ais/Target.hpp"
+#include "engine/discrepancy/HistoryModel.hpp"
 #include "engine/emulator/Emulator.hpp"
 
 namespace amiss {
 
-/// What the measurement says about the coefficients of the basis under one error of the history posterior:
-///     estimate ~ N(w(z), covariance).
-struct CoefficientData {
-  Eigen::VectorXd estimate;    ///< Q
-  Eigen::MatrixXd covariance;  ///< Q x Q: sigma^2 (R'R)^-1
-  double log_jacobian = 0.0;   ///< -log |R|, which makes this a density of y
-};
-
-/// Calibration posterior (equation 5) of the parameters in the unit cube. The error enters as equally probable draws
-/// from what the part of y outside the simulation space says about it, so that the normalising constant is the
-/// density of the inside part given the outside part, and both together are the evidence of the model:
-///     likelihood(z) = mean_j N(estimate_j; w'(z), S(z) + covariance_j) / |R_j|,
-/// w' and S the emulator's mean and variance.
+/// Joint posterior of the discrepancy, the error and the parameters, given the whole record. Coordinates: those of the
+/// history posterior, then one for each parameter, u = Phi(x).
+///
+/// Under an error setting with W K = O R, the part of y inside the simulation space is seen as
+///     estimate = R^-1 O' W y ~ N(w(z), sigma^2 (R'R)^-1),
+/// and with the emulator's mean w' and variance S (equation 5, with one error for inside and outside)
+///     p(y | z, ...) = p(outside part | ...) N(estimate; w'(z), S(z) + sigma^2 (R'R)^-1) / |R|.
+/// |R|^-1 is the Jacobian that makes this a density of y, whatever the basis (for white error |K'K|^-1/2).
+///
+/// The reference is a Student-t mixture close to the history posterior, times the prior of the parameters, so that
+/// annealing only has to bring in what the inside part says. The normalising constant is the evidence of the model.
 class CalibrationTarget : public Target {
  public:
-  CalibrationTarget(const Emulator& emulator, std::vector<CoefficientData> data);
+  CalibrationTarget(const HistoryTarget& history, StudentTMixture reference, const Emulator& emulator);
 
-  Eigen::Index dimension() const override { return emulator_.n_inputs(); }
+  Eigen::Index dimension() const override { return history_.dimension() + emulator_.n_inputs(); }
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
+  Eigen::VectorXd draw_reference(Stream& stream) const override;
+  double log_reference(const Eigen::VectorXd& x) const override;
 
-  /// Log densities under each error draw (errors x n), of which the likelihood is the mean.
-  Eigen::MatrixXd log_densities(const Eigen::MatrixXd& x) const;
-  /// u = Phi(x), n x P.
-  static Eigen::MatrixXd unit(const Eigen::MatrixXd& x);
+  /// Parameters in the unit cube, n x P.
+  Eigen::MatrixXd unit(const Eigen::MatrixXd& x) const;
+  HistoryParameters history(const Eigen::VectorXd& x) const { return history_.parameters(x.head(history_.dimension())); }
+
+  /// Log density of y inside the simulation space, for coefficients with the given mean and variance.
+  double log_density_inside(const HistoryParameters& point, const Eigen::VectorXd& mean, const Eigen::VectorXd& variance) const;
 
  private:
+  const HistoryTarget& history_;
+  StudentTMixture reference_;
   const Emulator& emulator_;
-  std::vector<CoefficientData> data_;
+  std::vector<Eigen::MatrixXd> unit_covariance_;  // (R'R)^-1 of each error setting
 };
 
 }  // namespace amiss

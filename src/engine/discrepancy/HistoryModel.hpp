@@ -95,6 +95,7 @@ class HistoryTarget : public Target {
   Eigen::Index dimension() const override;
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
   HistoryParameters parameters(const Eigen::VectorXd& x) const;
+  const HistoryModel& model() const { return model_; }
 
  private:
   const HistoryModel& model_;
