@@ -49,15 +49,18 @@ Rcpp::List list_ais(const AisResult& result) {
     ess[k] = result.ladder[k].ess;
   }
   using Rcpp::_;
-  Rcpp::List out = Rcpp::List::create(
-      _["log_evidence"] = result.log_evidence, _["standard_error"] = result.standard_error,
-      _["interval"] = Rcpp::NumericVector::create(result.lower, result.upper), _["estimator"] = result.estimator,
-      _["annealed"] = Rcpp::NumericVector::create(result.annealed, result.annealed_se),
-      _["importance"] = Rcpp::NumericVector::create(result.importance, result.importance_se),
-      _["importance_ess"] = result.importance_ess, _["ess"] = result.ess,
-      _["log_weight_variance"] = result.log_weight_variance,
-      _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step, _["acceptance"] = acceptance, _["ess"] = ess),
-      _["evaluations"] = static_cast<double>(result.evaluations), _["trusted"] = result.trusted, _["verdict"] = result.verdict);
+  Rcpp::List out =
+      Rcpp::List::create(_["log_evidence"] = result.log_evidence, _["standard_error"] = result.standard_error,
+                         _["interval"] = Rcpp::NumericVector::create(result.lower, result.upper),
+                         _["estimator"] = result.estimator,
+                         _["annealed"] = Rcpp::NumericVector::create(result.annealed, result.annealed_se),
+                         _["second"] = Rcpp::NumericVector::create(result.second, result.second_se),
+                         _["second_ess"] = result.second_ess, _["ess"] = result.ess,
+                         _["log_weight_variance"] = result.log_weight_variance,
+                         _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step,
+                                                               _["acceptance"] = acceptance, _["ess"] = ess),
+                         _["evaluations"] = static_cast<double>(result.evaluations),
+                         _["trusted"] = result.trusted, _["verdict"] = result.verdict);
   out["weights"] = result.weights;
   out["log_likelihood"] = result.log_likelihood;
   return out;
@@ -74,7 +77,8 @@ HistoryModel make_history_model(const Rcpp::List& data, const Rcpp::List& priors
   history.basis = Rcpp::as<MatrixXd>(data["basis"]);
   history.responses = Rcpp::as<MatrixXd>(data["responses"]);
   history.condition = Rcpp::as<std::vector<int>>(data["condition"]);
-  history.axis = make_axis(Rcpp::as<VectorXd>(data["time"]), Rcpp::as<std::vector<bool>>(data["new_segment"]));
+  history.axis =
+      make_axis(Rcpp::as<VectorXd>(data["time"]), Rcpp::as<std::vector<bool>>(data["new_segment"]));
   HistoryPriors prior;
   prior.noise_sd = priors["noise_sd"];
   prior.noise_shape = priors["noise_shape"];
@@ -91,7 +95,8 @@ std::vector<int> all_conditions(const HistoryModel& model) {
 }
 
 template <class Parameters>
-void add_history_draws(Rcpp::List& out, const AisResult& result, Parameters parameters, const HistoryModel& model) {
+void add_history_draws(Rcpp::List& out, const AisResult& result, Parameters parameters,
+                       const HistoryModel& model) {
   const Eigen::Index draws = result.draws.cols();
   VectorXd variance(draws);
   Rcpp::IntegerVector setting(draws);
@@ -124,8 +129,8 @@ Rcpp::List make_basis_(const Eigen::Map<Eigen::MatrixXd> outputs, const Rcpp::Li
 }
 
 // [[Rcpp::export]]
-Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basis_list, const Rcpp::List& control,
-                           const Rcpp::List& context) {
+Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basis_list,
+                           const Rcpp::List& control, const Rcpp::List& context) {
   Basis basis;
   basis.vectors = Rcpp::as<MatrixXd>(basis_list["vectors"]);
   basis.coefficients = Rcpp::as<MatrixXd>(basis_list["coefficients"]);
@@ -141,8 +146,8 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
   const EmulatorState state = emulator.state();
   using Rcpp::_;
   return Rcpp::List::create(_["inputs"] = state.inputs, _["coefficients"] = state.coefficients,
-                            _["hyperparameters"] = state.parameters, _["loo_mean"] = mean, _["loo_variance"] = variance,
-                            _["evaluations"] = emulator.evaluations());
+                            _["hyperparameters"] = state.parameters, _["loo_mean"] = mean,
+                            _["loo_variance"] = variance, _["evaluations"] = emulator.evaluations());
 }
 
 // [[Rcpp::export]]
@@ -155,7 +160,8 @@ Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& 
 // [[Rcpp::export]]
 Eigen::MatrixXd filter_bank_(const Eigen::Map<Eigen::MatrixXd> x, const Eigen::VectorXd& time_constants,
                              const Eigen::VectorXd& time, const std::vector<bool>& new_segment) {
-  return FilterBank(x, std::vector<int>(static_cast<std::size_t>(x.cols()), 0), time_constants, make_axis(time, new_segment))
+  return FilterBank(x, std::vector<int>(static_cast<std::size_t>(x.cols()), 0), time_constants,
+                    make_axis(time, new_segment))
       .responses;
 }
 
@@ -174,37 +180,45 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   Stream stream(context.seed, 0, 0);
   const Emulator emulator(make_emulator_state(emulator_list));
   const CalibrationTarget target(
-      history, StudentTMixture::fit(outside.draws, outside.weights, options.max_components, 8.0, stream), emulator);
+      history, StudentTMixture::fit(outside.draws, outside.weights, options.max_components, 8.0, stream),
+      emulator);
   const AisResult joint = sample_ais(target, options, second);
 
   Rcpp::List outside_list = list_ais(outside), joint_list = list_ais(joint);
-  add_history_draws(outside_list, outside, [&](const VectorXd& x) { return history.parameters(x); }, model);
-  add_history_draws(joint_list, joint, [&](const VectorXd& x) { return target.history(x); }, model);
+  add_history_draws(
+      outside_list, outside, [&](const VectorXd& x) { return history.parameters(x); }, model);
+  add_history_draws(
+      joint_list, joint, [&](const VectorXd& x) { return target.history(x); }, model);
   joint_list["unit"] = target.unit(joint.draws);
   using Rcpp::_;
   return Rcpp::List::create(_["history"] = outside_list, _["posterior"] = joint_list,
-                            _["centre"] = VectorXd(model.centre().transpose()), _["scale"] = VectorXd(model.scale().transpose()),
+                            _["centre"] = VectorXd(model.centre().transpose()),
+                            _["scale"] = VectorXd(model.scale().transpose()),
                             _["null_setting"] = null_setting(model));
 }
 
-// Posterior mean coefficients (p x draws) of the scaled filter columns, for given draws of the history parameters.
+// Posterior mean coefficients (p x draws) of the scaled filter columns, for given draws of the history
+// parameters.
 // [[Rcpp::export]]
-Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws) {
+Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& priors,
+                                      const Rcpp::List& draws) {
   const HistoryModel model = make_history_model(data, priors, Context());
   const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
   const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
   const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
   MatrixXd coefficients(model.data().responses.cols(), variance.size());
   for (Eigen::Index j = 0; j < variance.size(); ++j) {
-    coefficients.col(j) = model.coefficients(model.whitened(setting[j]), std::log(variance[j]), t.row(j).transpose());
+    coefficients.col(j) =
+        model.coefficients(model.whitened(setting[j]), std::log(variance[j]), t.row(j).transpose());
   }
   return coefficients;
 }
 
 // Evidence without each of the given conditions (0-based), and the surrogate test.
 // [[Rcpp::export]]
-Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::IntegerVector& error_settings,
-                      const Rcpp::List& control, const Rcpp::List& context_list) {
+Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors,
+                      const Rcpp::IntegerVector& error_settings, const Rcpp::List& control,
+                      const Rcpp::List& context_list) {
   const Context context = make_context(context_list);
   const HistoryModel model = make_history_model(data, priors, context);
   const AisOptions options = make_ais_options(control["ais"]);
@@ -235,6 +249,7 @@ Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   }
   using Rcpp::_;
   return Rcpp::List::create(_["log_evidence_dropped"] = log_evidence, _["standard_error"] = standard_error,
-                            _["trusted"] = trusted, _["statistic"] = test.statistic, _["p_value"] = test.p_value,
-                            _["adjusted"] = test.adjusted, _["null_statistics"] = test.null_statistics);
+                            _["trusted"] = trusted, _["statistic"] = test.statistic,
+                            _["p_value"] = test.p_value, _["adjusted"] = test.adjusted,
+                            _["null_statistics"] = test.null_statistics);
 }

@@ -1,6 +1,7 @@
 #include "engine/ais/Sampler.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -18,7 +19,8 @@ using Eigen::VectorXd;
 constexpr double kMoveDof = 6.0;        // of the proposals while annealing
 constexpr double kImportanceDof = 8.0;  // of the final mixture
 constexpr double kAcceptance = 0.35;    // aimed at by the step length
-enum Purpose : std::uint64_t { kPilot = 1, kFrozen, kImportance, kBootstrap };
+enum Purpose : std::uint64_t { kPilot = 1, kFrozen, kBootstrap, kImportance };
+constexpr std::uint64_t kBridged = 16;  // added to the purposes of the second annealed run
 
 struct Chains {
   MatrixXd x;      // dimension x n
@@ -80,7 +82,8 @@ void resample(Chains& chains, Stream& stream) {
   double cumulative = w[0];
   const double offset = stream.uniform();
   for (Index i = 0, from = 0; i < n; ++i) {
-    while (cumulative < (static_cast<double>(i) + offset) / static_cast<double>(n) && from < n - 1) cumulative += w[++from];
+    while (cumulative < (static_cast<double>(i) + offset) / static_cast<double>(n) && from < n - 1)
+      cumulative += w[++from];
     x.col(i) = chains.x.col(from);
     ll[i] = chains.ll[from];
   }
@@ -99,9 +102,10 @@ double move(const Target& target, Chains& chains, const Level& level, Stream& st
   for (Index i = 0; i < n; ++i) {
     const double log_u = std::log(stream.uniform());
     if (!std::isfinite(ll[i])) continue;
-    const double log_ratio = level.beta * (ll[i] - chains.ll[i]) -
-                             target.log_reference(chains.x.col(i)) + target.log_reference(proposed.col(i)) +
-                             level.proposal.log_density(chains.x.col(i)) - level.proposal.log_density(proposed.col(i));
+    const double log_ratio = level.beta * (ll[i] - chains.ll[i]) - target.log_reference(chains.x.col(i)) +
+                             target.log_reference(proposed.col(i)) +
+                             level.proposal.log_density(chains.x.col(i)) -
+                             level.proposal.log_density(proposed.col(i));
     if (log_u < log_ratio) {
       chains.x.col(i) = proposed.col(i);
       chains.ll[i] = ll[i];
@@ -111,16 +115,19 @@ double move(const Target& target, Chains& chains, const Level& level, Stream& st
   return static_cast<double>(accepted) / static_cast<double>(n);
 }
 
-std::vector<Level> pilot(const Target& target, const AisOptions& options, const Context& context, long& evaluations) {
-  Stream stream(context.seed, kPilot, 0);
+std::vector<Level> pilot(const Target& target, const AisOptions& options, const Context& context,
+                         std::uint64_t purpose, long& evaluations) {
+  Stream stream(context.seed, kPilot + purpose, 0);
   Chains chains = start(target, options.pilot_chains, stream);
   evaluations += options.pilot_chains;
-  if (!std::isfinite(chains.ll.maxCoeff())) throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
+  if (!std::isfinite(chains.ll.maxCoeff()))
+    throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
   std::vector<Level> levels;
   double beta = 0.0, step = 0.8;
   while (beta < 1.0) {
     if (context.poll) context.poll();
-    if (static_cast<int>(levels.size()) >= options.max_temperatures) throw std::runtime_error("ais: too many temperatures");
+    if (static_cast<int>(levels.size()) >= options.max_temperatures)
+      throw std::runtime_error("ais: too many temperatures");
     const double next = next_beta(chains, beta, options.ess_drop);
     chains.log_w += chains.ll * (next - beta);
     beta = next;
@@ -142,11 +149,12 @@ struct Group {
   VectorXd acceptance, ess;
 };
 
-Group frozen_run(const Target& target, const std::vector<Level>& levels, const AisOptions& options, Stream stream) {
+Group frozen_run(const Target& target, const std::vector<Level>& levels, const AisOptions& options,
+                 Stream stream) {
   Group group;
   group.chains = start(target, options.chains, stream);
-  group.acceptance.resize(static_cast<Index>(levels.size()));
-  group.ess.resize(static_cast<Index>(levels.size()));
+  group.acceptance = VectorXd::Zero(static_cast<Index>(levels.size()));
+  group.ess = VectorXd::Zero(static_cast<Index>(levels.size()));
   double beta = 0.0;
   for (std::size_t k = 0; k < levels.size(); ++k) {
     group.chains.log_w += group.chains.ll * (levels[k].beta - beta);
@@ -162,7 +170,8 @@ Group frozen_run(const Target& target, const std::vector<Level>& levels, const A
       resample(group.chains, stream);
     }
     double accepted = 0.0;
-    for (int sweep = 0; sweep < options.sweeps; ++sweep) accepted += move(target, group.chains, levels[k], stream);
+    for (int sweep = 0; sweep < options.sweeps; ++sweep)
+      accepted += move(target, group.chains, levels[k], stream);
     group.acceptance[k] = accepted / options.sweeps;
   }
   group.log_evidence += log_mean_exp(group.chains.log_w);
@@ -177,7 +186,8 @@ VectorXd independent_estimates(const std::vector<Group>& groups, const AisOption
     return values;
   }
   VectorXd values(static_cast<Index>(groups.size()) * options.chains);
-  for (std::size_t g = 0; g < groups.size(); ++g) values.segment(g * options.chains, options.chains) = groups[g].chains.log_w;
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    values.segment(g * options.chains, options.chains) = groups[g].chains.log_w;
   return values;
 }
 
@@ -185,7 +195,8 @@ struct Spread {
   double se, lower, upper;
 };
 
-// Bootstrap of log mean exp; deviations are widened by sqrt(n / (n - 1)), the bias of a bootstrap of n values.
+// Bootstrap of log mean exp. Deviations are widened by sqrt(n / (n - 1)), the bias of a bootstrap of n
+// values, and the interval by Student's t against the normal.
 Spread bootstrap(const VectorXd& values, double estimate, Stream stream) {
   constexpr int kReplicates = 1000;
   const Index n = values.size();
@@ -196,11 +207,94 @@ Spread bootstrap(const VectorXd& values, double estimate, Stream stream) {
     replicate = log_mean_exp(sample);
   }
   std::sort(replicates.begin(), replicates.end());
-  const double widen = n > 1 ? std::sqrt(static_cast<double>(n) / static_cast<double>(n - 1)) : 1.0;
+  const double widen = std::sqrt(static_cast<double>(n) / static_cast<double>(n - 1));
+  const double infinity = std::numeric_limits<double>::infinity();
+  if (n < 2 || !std::isfinite(replicates.front())) return {infinity, -infinity, replicates[974]};
   const Eigen::Map<const VectorXd> all(replicates.data(), kReplicates);
   const double sd = std::sqrt((all.array() - all.mean()).square().sum() / (kReplicates - 1));
-  return {sd * widen, estimate + widen * (replicates[24] - estimate), estimate + widen * (replicates[974] - estimate)};
+  const boost::math::students_t student(static_cast<double>(n) - 1.0);
+  const double wider = widen * boost::math::quantile(student, 0.975) / 1.959964;
+  return {sd * widen, estimate + wider * (replicates[24] - estimate),
+          estimate + wider * (replicates[974] - estimate)};
 }
+
+// A pilot and the frozen run that follows it.
+struct AnnealedRun {
+  double log_evidence = 0.0, variance = 0.0;
+  Spread spread{};
+  MatrixXd x;
+  VectorXd ll, weights;
+  std::vector<Temperature> ladder;
+  long evaluations = 0;
+
+  double ess() const { return 1.0 / weights.squaredNorm(); }
+};
+
+AnnealedRun run_annealed(const Target& target, const AisOptions& options, const Context& context,
+                         std::uint64_t purpose) {
+  AnnealedRun run;
+  const std::vector<Level> levels = pilot(target, options, context, purpose, run.evaluations);
+  std::vector<Group> groups(options.groups);
+  parallel_for(options.groups, context, [&](int g) {
+    groups[g] = frozen_run(target, levels, options,
+                           Stream(context.seed, kFrozen + purpose, static_cast<std::uint64_t>(g)));
+  });
+  run.evaluations += static_cast<long>(options.groups) * options.chains *
+                     (1 + static_cast<long>(levels.size()) * options.sweeps);
+
+  const VectorXd estimates = independent_estimates(groups, options);
+  run.log_evidence = log_mean_exp(estimates);
+  if (!std::isfinite(run.log_evidence))
+    throw std::runtime_error("ais: every group of chains ended with likelihood zero");
+  run.spread = bootstrap(estimates, run.log_evidence, Stream(context.seed, kBootstrap + purpose, 0));
+  run.variance = (estimates.array() - estimates.mean()).square().sum() /
+                 std::max<double>(1.0, static_cast<double>(estimates.size()) - 1.0);
+
+  const Index n = options.chains;
+  run.x.resize(target.dimension(), n * options.groups);
+  run.ll.resize(n * options.groups);
+  VectorXd log_w(n * options.groups);
+  for (int g = 0; g < options.groups; ++g) {
+    run.x.middleCols(g * n, n) = groups[g].chains.x;
+    run.ll.segment(g * n, n) = groups[g].chains.ll;
+    const VectorXd& own = groups[g].chains.log_w;
+    const bool dead = !std::isfinite(groups[g].log_evidence);
+    log_w.segment(g * n, n).setConstant(-std::numeric_limits<double>::infinity());
+    if (!dead)
+      log_w.segment(g * n, n) =
+          own.array() + (options.resample ? groups[g].log_evidence - log_mean_exp(own) : 0.0);
+  }
+  run.weights = normalised_exp(log_w);
+  for (std::size_t k = 0; k < levels.size(); ++k) {
+    Temperature temperature{levels[k].beta, levels[k].step, 0.0, 0.0};
+    for (const auto& group : groups) {
+      temperature.acceptance += group.acceptance[k] / options.groups;
+      temperature.ess += group.ess[k] / options.groups;
+    }
+    run.ladder.push_back(temperature);
+  }
+  return run;
+}
+
+// The same posterior seen from a reference fitted to its draws: little is left to anneal.
+class BridgedTarget : public Target {
+ public:
+  BridgedTarget(const Target& target, const StudentTMixture& mixture) : target_(target), mixture_(mixture) {}
+
+  Index dimension() const override { return target_.dimension(); }
+  VectorXd draw_reference(Stream& stream) const override { return mixture_.draw(stream); }
+  double log_reference(const VectorXd& x) const override { return mixture_.log_density(x); }
+  VectorXd log_likelihood(const MatrixXd& x) const override {
+    VectorXd values = target_.log_likelihood(x);
+    for (Index i = 0; i < x.cols(); ++i)
+      values[i] += target_.log_reference(x.col(i)) - mixture_.log_density(x.col(i));
+    return values;
+  }
+
+ private:
+  const Target& target_;
+  const StudentTMixture& mixture_;
+};
 
 struct ImportanceSample {
   MatrixXd x;
@@ -211,7 +305,8 @@ struct ImportanceSample {
   VectorXd weights;
 };
 
-ImportanceSample importance_sample(const Target& target, const StudentTMixture& mixture, int n, const Context& context, Stream& stream) {
+ImportanceSample importance_sample(const Target& target, const StudentTMixture& mixture, int n,
+                                   const Context& context, Stream& stream) {
   ImportanceSample sample;
   sample.x.resize(target.dimension(), n);
   sample.ll.resize(n);
@@ -235,42 +330,69 @@ ImportanceSample importance_sample(const Target& target, const StudentTMixture& 
   return sample;
 }
 
-// Each round's mixture is fitted to the weighted draws of the round before, the first to the annealed draws; the last
-// round alone is the estimator. If it is the better one, its draws replace the annealed ones.
-void second_estimator(const Target& target, const AisOptions& options, const Context& context, AisResult& result) {
-  constexpr int kRounds = 5;
-  constexpr double kGood = 0.2;     // effective share of the draws at which refitting stops
-  constexpr double kUsable = 30.0;  // effective draws below which the estimate is not used
-  Stream stream(context.seed, kImportance, 0);
-  const int n = options.importance_draws;
-  ImportanceSample sample{result.draws, result.log_likelihood, 0.0, 0.0, 0.0, result.weights};
-  for (int round = 0; round < kRounds && (round < 2 || sample.ess < kGood * n); ++round) {
-    const auto mixture = StudentTMixture::fit(sample.x, sample.weights, options.max_components, kImportanceDof, stream);
-    sample = importance_sample(target, mixture, n, context, stream);
-    result.evaluations += n;
-    if (!std::isfinite(sample.log_evidence)) break;
-  }
-  result.importance = sample.log_evidence;
-  result.importance_se = sample.se;
-  result.importance_ess = sample.ess;
-  if (sample.se < result.annealed_se && sample.ess > kUsable) {
-    result.estimator = "importance";
-    result.log_evidence = sample.log_evidence;
-    result.standard_error = sample.se;
-    result.lower = sample.log_evidence - 1.96 * sample.se;
-    result.upper = sample.log_evidence + 1.96 * sample.se;
-    result.draws = std::move(sample.x);
-    result.weights = std::move(sample.weights);
-    result.log_likelihood = std::move(sample.ll);
-    result.ess = sample.ess;
-  }
+// Makes an estimator the one that the result reports.
+void report_estimator(AisResult& result, const std::string& name, double log_evidence, const Spread& spread,
+                      MatrixXd x, VectorXd ll, VectorXd weights) {
+  result.estimator = name;
+  result.log_evidence = log_evidence;
+  result.standard_error = spread.se;
+  result.lower = spread.lower;
+  result.upper = spread.upper;
+  result.draws = std::move(x);
+  result.log_likelihood = std::move(ll);
+  result.weights = std::move(weights);
+  result.ess = 1.0 / result.weights.squaredNorm();
 }
 
-// An unbiased estimate of Z with few chains is seldom too large (Markov: Z_hat > k Z with probability below 1 / k)
-// and easily too small. So the annealed estimate may lie below the importance sample by more than above it.
+// Importance sample from a mixture fitted to the annealed draws, then from mixtures fitted to its own
+// weighted draws; the last round alone is the estimator. Where no mixture comes close to the posterior, a
+// second annealed run goes the short way from the mixture to the posterior.
+void second_estimator(const Target& target, const AisOptions& options, const Context& context,
+                      AisResult& result) {
+  constexpr int kRounds = 4;
+  constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
+  constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
+  Stream stream(context.seed, kImportance, 0);
+  const int n = options.importance_draws;
+  const auto fit = [&](const MatrixXd& x, const VectorXd& w) {
+    return StudentTMixture::fit(x, w, options.max_components, kImportanceDof, stream);
+  };
+  const StudentTMixture first = fit(result.draws, result.weights);
+  ImportanceSample sample = importance_sample(target, first, n, context, stream);
+  result.evaluations += n;
+  for (int round = 1; round < kRounds && sample.ess > kUsable && (round < 2 || sample.ess < kGood * n);
+       ++round) {
+    sample = importance_sample(target, fit(sample.x, sample.weights), n, context, stream);
+    result.evaluations += n;
+  }
+  if (sample.ess >= kGood * n) {
+    result.second = sample.log_evidence;
+    result.second_se = sample.se;
+    result.second_ess = sample.ess;
+    const Spread spread{sample.se, sample.log_evidence - 1.96 * sample.se,
+                        sample.log_evidence + 1.96 * sample.se};
+    report_estimator(result, "importance", sample.log_evidence, spread, std::move(sample.x),
+                     std::move(sample.ll), std::move(sample.weights));
+    return;
+  }
+  AnnealedRun run = run_annealed(BridgedTarget(target, first), options, context, kBridged);
+  result.evaluations += run.evaluations;
+  result.second = run.log_evidence;
+  result.second_se = run.spread.se;
+  result.second_ess = run.ess();
+  // The likelihood of a draw, as seen from the target's own reference.
+  for (Index i = 0; i < run.ll.size(); ++i)
+    run.ll[i] += first.log_density(run.x.col(i)) - target.log_reference(run.x.col(i));
+  report_estimator(result, "bridged", run.log_evidence, run.spread, std::move(run.x), std::move(run.ll),
+                   std::move(run.weights));
+}
+
+// An unbiased estimate of Z with few chains is seldom too large (Markov: Z_hat > k Z with probability below 1
+// / k) and easily too small. So the annealed estimate may lie below the importance sample by more than above
+// it.
 bool estimators_agree(const AisResult& result) {
-  const double gap = result.annealed - result.importance;
-  const double error = std::hypot(result.annealed_se, result.importance_se);
+  const double gap = result.annealed - result.second;
+  const double error = std::hypot(result.annealed_se, result.second_se);
   return gap < 3.5 * error + 0.1 && gap > -(3.5 * error + 5.0);
 }
 
@@ -278,76 +400,46 @@ void judge(AisResult& result, const AisOptions& options) {
   double least = 1.0;
   for (const auto& level : result.ladder) least = std::min(least, level.acceptance);
   result.trusted = false;
-  if (least < 0.02) {
+  if (!(least >= 0.02)) {
     result.verdict = "not trusted: the chains hardly move at some temperature";
-  } else if (result.ess < 0.02 * static_cast<double>(result.draws.cols())) {
+  } else if (!(result.ess >= 0.02 * static_cast<double>(result.draws.cols()))) {
     result.verdict = "not trusted: a few chains carry all the weight";
-  } else if (result.standard_error > 1.0) {
+  } else if (!(result.standard_error <= 1.0)) {
     result.verdict = "not trusted: the standard error exceeds one nat";
   } else if (options.importance_draws > 0 && !estimators_agree(result)) {
     result.verdict = "not trusted: the two estimators of the evidence disagree";
   } else {
     result.trusted = true;
-    result.verdict = options.importance_draws > 0 ? "trusted: chains move, weights are even and two estimators agree"
-                                                  : "trusted: chains move and weights are even";
+    result.verdict = options.importance_draws > 0
+                         ? "trusted: chains move, weights are even and two estimators agree"
+                         : "trusted: chains move and weights are even";
   }
 }
 
 }  // namespace
 
 void AisOptions::check() const {
-  if (pilot_chains < 8 || groups < 2 || chains < 4) throw std::invalid_argument("ais: need pilot_chains >= 8, groups >= 2, chains >= 4");
+  if (pilot_chains < 8 || groups < 2 || chains < 4)
+    throw std::invalid_argument("ais: need pilot_chains >= 8, groups >= 2, chains >= 4");
   if (sweeps < 1) throw std::invalid_argument("ais: sweeps must be positive");
   if (!(ess_drop > 0 && ess_drop < 1)) throw std::invalid_argument("ais: ess_drop must lie in (0, 1)");
-  if (importance_draws < 0 || max_components < 1 || max_temperatures < 1) throw std::invalid_argument("ais: negative size");
+  if (importance_draws < 0 || max_components < 1 || max_temperatures < 1)
+    throw std::invalid_argument("ais: negative size");
 }
 
 AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context) {
   options.check();
   AisResult result;
-  const std::vector<Level> levels = pilot(target, options, context, result.evaluations);
-  std::vector<Group> groups(options.groups);
-  parallel_for(options.groups, context, [&](int g) {
-    groups[g] = frozen_run(target, levels, options, Stream(context.seed, kFrozen, static_cast<std::uint64_t>(g)));
-  });
-  result.evaluations += static_cast<long>(options.groups) * options.chains * (1 + static_cast<long>(levels.size()) * options.sweeps);
-
-  const VectorXd estimates = independent_estimates(groups, options);
-  result.annealed = log_mean_exp(estimates);
-  if (!std::isfinite(result.annealed)) throw std::runtime_error("ais: every group of chains ended with likelihood zero");
-  const Spread spread = bootstrap(estimates, result.annealed, Stream(context.seed, kBootstrap, 0));
-  result.annealed_se = spread.se;
-  result.log_evidence = result.annealed;
-  result.standard_error = spread.se;
-  result.lower = spread.lower;
-  result.upper = spread.upper;
-  result.estimator = "annealed";
-  result.log_weight_variance = (estimates.array() - estimates.mean()).square().sum() / std::max<double>(1.0, estimates.size() - 1.0);
-
-  const Index n = options.chains;
-  result.draws.resize(target.dimension(), n * options.groups);
-  result.log_likelihood.resize(n * options.groups);
-  VectorXd log_w(n * options.groups);
-  for (int g = 0; g < options.groups; ++g) {
-    result.draws.middleCols(g * n, n) = groups[g].chains.x;
-    result.log_likelihood.segment(g * n, n) = groups[g].chains.ll;
-    const VectorXd& own = groups[g].chains.log_w;
-    log_w.segment(g * n, n) = own.array() + (options.resample ? groups[g].log_evidence - log_mean_exp(own) : 0.0);
-  }
-  result.weights = normalised_exp(log_w);
-  result.ess = 1.0 / result.weights.squaredNorm();
-  for (std::size_t k = 0; k < levels.size(); ++k) {
-    Temperature temperature{levels[k].beta, levels[k].step, 0.0, 0.0};
-    for (const auto& group : groups) {
-      temperature.acceptance += group.acceptance[k] / options.groups;
-      temperature.ess += group.ess[k] / options.groups;
-    }
-    result.ladder.push_back(temperature);
-  }
-  result.importance = result.importance_se = std::numeric_limits<double>::quiet_NaN();
-  if (options.importance_draws > 0) {
-    second_estimator(target, options, context, result);
-  }
+  AnnealedRun run = run_annealed(target, options, context, 0);
+  result.evaluations = run.evaluations;
+  result.annealed = run.log_evidence;
+  result.annealed_se = run.spread.se;
+  result.log_weight_variance = run.variance;
+  result.ladder = std::move(run.ladder);
+  report_estimator(result, "annealed", run.log_evidence, run.spread, std::move(run.x), std::move(run.ll),
+                   std::move(run.weights));
+  result.second = result.second_se = std::numeric_limits<double>::quiet_NaN();
+  if (options.importance_draws > 0) second_estimator(target, options, context, result);
   judge(result, options);
   return result;
 }

@@ -9,14 +9,15 @@
 namespace amiss {
 
 struct AisOptions {
-  int pilot_chains = 64;        ///< chains of the pilot that adapts ladder and proposals
-  int groups = 8;               ///< independent groups of chains of the run that gives the estimate
-  int chains = 32;              ///< chains in a group
-  int sweeps = 3;               ///< moves of every chain at every temperature
-  double ess_drop = 0.7;        ///< the pilot's next temperature leaves this conditional effective size per chain
-  bool resample = true;         ///< resample a group when its effective size falls below half; false: plain AIS
-  int importance_draws = 1000;  ///< draws of the second estimator, from a fitted Student-t mixture; 0 leaves it out
-  int max_components = 3;       ///< of that mixture
+  int pilot_chains = 64;  ///< chains of the pilot that adapts ladder and proposals
+  int groups = 8;         ///< independent groups of chains of the run that gives the estimate
+  int chains = 32;        ///< chains in a group
+  int sweeps = 3;         ///< moves of every chain at every temperature
+  double ess_drop = 0.7;  ///< the pilot's next temperature leaves this conditional effective size per chain
+  bool resample = true;   ///< resample a group when its effective size falls below half; false: plain AIS
+  int importance_draws =
+      1000;  ///< draws of the second estimator, from a fitted Student-t mixture; 0 leaves it out
+  int max_components = 3;  ///< of that mixture
   int max_temperatures = 400;
   void check() const;
 };
@@ -31,32 +32,34 @@ struct Temperature {
 
 /// Normalising constant and draws of a posterior.
 struct AisResult {
-  double log_evidence = 0.0;        ///< of the estimator with the smaller standard error
+  double log_evidence = 0.0;        ///< of the estimator reported
   double standard_error = 0.0;      ///< of log_evidence
   double lower = 0.0, upper = 0.0;  ///< 95 % interval of log_evidence
-  std::string estimator;            ///< "annealed" or "importance"
+  std::string estimator;            ///< "annealed", "importance" or "bridged"
 
-  double annealed = 0.0, annealed_se = 0.0;      ///< frozen annealed run; interval by bootstrap over groups
-  double importance = 0.0, importance_se = 0.0;  ///< Student-t mixture; NaN if left out
-  double importance_ess = 0.0;                   ///< effective size of the importance draws
-  double ess = 0.0;                              ///< effective size of the draws below
-  double log_weight_variance = 0.0;              ///< of the groups' log evidences
+  double annealed = 0.0, annealed_se = 0.0;  ///< frozen annealed run; interval by bootstrap over groups
+  double second = 0.0, second_se = 0.0;      ///< importance sample, or bridged run; NaN if left out
+  double second_ess = 0.0;                   ///< effective size of its draws
+  double ess = 0.0;                          ///< effective size of the draws below
+  double log_weight_variance = 0.0;          ///< of the groups' log evidences
 
-  Eigen::MatrixXd draws;     ///< dimension x draws of the chosen estimator, in the target's coordinates
-  Eigen::VectorXd weights;   ///< of the draws, sum 1
+  Eigen::MatrixXd draws;           ///< dimension x draws of the chosen estimator, in the target's coordinates
+  Eigen::VectorXd weights;         ///< of the draws, sum 1
   Eigen::VectorXd log_likelihood;  ///< of the draws
   std::vector<Temperature> ladder;
-  long evaluations = 0;      ///< of the likelihood, all stages
+  long evaluations = 0;  ///< of the likelihood, all stages
   bool trusted = false;
-  std::string verdict;       ///< why it can or cannot be trusted, one sentence
+  std::string verdict;  ///< why it can or cannot be trusted, one sentence
 };
 
 /// Annealed importance sampling (Neal 2001) of reference x likelihood. A pilot (an adaptive sequential Monte
-/// Carlo sampler; Del Moral, Doucet and Jasra 2006) finds the ladder of temperatures and, at each, a Student-t
-/// proposal and a step length. Both are then frozen, and fresh independent groups of chains are run, so that each
-/// group's estimate of the evidence is unbiased. The chains move by preconditioned Crank-Nicolson steps that are
-/// reversible in the fitted Student t, corrected by Metropolis and Hastings. An importance sample from a Student-t
-/// mixture fitted to the draws is the second estimator.
+/// Carlo sampler; Del Moral, Doucet and Jasra 2006) finds the ladder of temperatures and, at each, a
+/// Student-t proposal and a step length. Both are then frozen, and fresh independent groups of chains are
+/// run, so that each group's estimate of the evidence is unbiased. The chains move by preconditioned
+/// Crank-Nicolson steps that are reversible in the fitted Student t, corrected by Metropolis and Hastings. An
+/// importance sample from a Student-t mixture fitted to the draws is the second estimator; where no mixture
+/// comes close, an annealed run from the mixture to the posterior ("bridged") is. The estimator of smaller
+/// standard error is reported, and both are compared.
 AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context);
 
 }  // namespace amiss

@@ -41,10 +41,12 @@ struct GaussianMixture {
 
 double log_gaussian(const VectorXd& x, const VectorXd& mean, const MatrixXd& root) {
   const VectorXd z = root.triangularView<Eigen::Lower>().solve(x - mean);
-  return -0.5 * z.squaredNorm() - root.diagonal().array().log().sum() - 0.5 * static_cast<double>(x.size()) * std::log(2 * kPi);
+  return -0.5 * z.squaredNorm() - root.diagonal().array().log().sum() -
+         0.5 * static_cast<double>(x.size()) * std::log(2 * kPi);
 }
 
-GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights, int components, Stream& stream) {
+GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights, int components,
+                                     Stream& stream) {
   const Index n = x.cols(), d = x.rows();
   const double points = 1.0 / weights.squaredNorm();
   const VectorXd mean = x * weights;
@@ -52,8 +54,8 @@ GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights,
   const MatrixXd root = shrunk_root(covariance, points);
 
   GaussianMixture mixture;
-  // Starting centres far from one another: each next one is drawn with probability proportional to the squared
-  // distance (in the common scale) from the nearest so far.
+  // Starting centres far from one another: each next one is drawn with probability proportional to the
+  // squared distance (in the common scale) from the nearest so far.
   const MatrixXd white = root.triangularView<Eigen::Lower>().solve(x.colwise() - mean);
   VectorXd nearest = VectorXd::Constant(n, std::numeric_limits<double>::infinity());
   Index chosen = 0;
@@ -77,7 +79,8 @@ GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights,
     for (Index i = 0; i < n; ++i) {
       VectorXd log_part(components);
       for (int k = 0; k < components; ++k) {
-        log_part[k] = std::log(mixture.weights[k]) + log_gaussian(x.col(i), mixture.means[k], mixture.roots[k]);
+        log_part[k] =
+            std::log(mixture.weights[k]) + log_gaussian(x.col(i), mixture.means[k], mixture.roots[k]);
       }
       const double log_density = log_sum_exp(log_part);
       responsibility.row(i) = (log_part.array() - log_density).exp().transpose() * weights[i];
@@ -88,7 +91,8 @@ GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights,
     if (components == 1) break;
     for (int k = 0; k < components; ++k) {
       const double mass = responsibility.col(k).sum();
-      if (mass * points < static_cast<double>(d) + 2.0) return {};  // a component too small to have a covariance
+      if (mass * points < static_cast<double>(d) + 2.0)
+        return {};  // a component too small to have a covariance
       const VectorXd share = responsibility.col(k) / mass;
       mixture.weights[k] = mass;
       mixture.means[k] = x * share;
@@ -116,26 +120,31 @@ StudentT StudentT::fit(const MatrixXd& x, const VectorXd& weights, double dof) {
   return StudentT(mean, shrunk_root(weighted_covariance(x, weights, mean), points), dof);
 }
 
-VectorXd StudentT::whiten(const VectorXd& x) const { return root_.triangularView<Eigen::Lower>().solve(x - location_); }
+VectorXd StudentT::whiten(const VectorXd& x) const {
+  return root_.triangularView<Eigen::Lower>().solve(x - location_);
+}
 
 double StudentT::log_density(const VectorXd& x) const {
-  return log_constant_ - 0.5 * (dof_ + static_cast<double>(x.size())) * std::log1p(whiten(x).squaredNorm() / dof_);
+  return log_constant_ -
+         0.5 * (dof_ + static_cast<double>(x.size())) * std::log1p(whiten(x).squaredNorm() / dof_);
 }
 
 VectorXd StudentT::draw(Stream& stream) const {
   const double w = 0.5 * dof_ / stream.gamma(0.5 * dof_);
-  return location_ + root_.triangularView<Eigen::Lower>() * VectorXd(std::sqrt(w) * stream.normals(location_.size()));
+  return location_ +
+         root_.triangularView<Eigen::Lower>() * VectorXd(std::sqrt(w) * stream.normals(location_.size()));
 }
 
 VectorXd StudentT::step(const VectorXd& x, double s, Stream& stream) const {
   const VectorXd d = whiten(x);
-  const double w = 0.5 * (dof_ + d.squaredNorm()) / stream.gamma(0.5 * (dof_ + static_cast<double>(d.size())));
+  const double w =
+      0.5 * (dof_ + d.squaredNorm()) / stream.gamma(0.5 * (dof_ + static_cast<double>(d.size())));
   const VectorXd moved = std::sqrt(1.0 - s * s) * d + s * std::sqrt(w) * stream.normals(d.size());
   return location_ + root_.triangularView<Eigen::Lower>() * moved;
 }
 
-StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights, int max_components, double dof,
-                                     Stream& stream) {
+StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights, int max_components,
+                                     double dof, Stream& stream) {
   GaussianMixture best;
   for (int k = 1; k <= max_components; ++k) {
     GaussianMixture candidate = fit_gaussian_mixture(x, weights, k, stream);
@@ -143,13 +152,15 @@ StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights,
   }
   StudentTMixture mixture;
   mixture.weights_ = best.weights;
-  for (std::size_t k = 0; k < best.means.size(); ++k) mixture.components_.emplace_back(best.means[k], best.roots[k], dof);
+  for (std::size_t k = 0; k < best.means.size(); ++k)
+    mixture.components_.emplace_back(best.means[k], best.roots[k], dof);
   return mixture;
 }
 
 double StudentTMixture::log_density(const VectorXd& x) const {
   VectorXd log_part(static_cast<Index>(components_.size()));
-  for (std::size_t k = 0; k < components_.size(); ++k) log_part[k] = std::log(weights_[k]) + components_[k].log_density(x);
+  for (std::size_t k = 0; k < components_.size(); ++k)
+    log_part[k] = std::log(weights_[k]) + components_[k].log_density(x);
   return log_sum_exp(log_part);
 }
 

@@ -35,10 +35,10 @@ class StudentT {
 /// Mixture of Student t's; for importance sampling of posteriors with more than one mode.
 class StudentTMixture {
  public:
-  /// Gaussian mixtures of 1 ... max_components components are fitted by expectation-maximisation; the one with
-  /// the least BIC gives locations and scales.
-  static StudentTMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components, double dof,
-                             Stream& stream);
+  /// Gaussian mixtures of 1 ... max_components components are fitted by expectation-maximisation; the one
+  /// with the least BIC gives locations and scales.
+  static StudentTMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components,
+                             double dof, Stream& stream);
 
   double log_density(const Eigen::VectorXd& x) const;
   Eigen::VectorXd draw(Stream& stream) const;

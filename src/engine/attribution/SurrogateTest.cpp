@@ -32,8 +32,8 @@ VectorXd variances(const VectorXd& x, int dropped) {
 }
 
 // Largest likelihood over sigma^2 and all t_s but that of the dropped condition (-1: none).
-Fit best_fit(const HistoryModel& model, const WhitenedData& data, int dropped, const VectorXd& start, double log_scale,
-             const SurrogateOptions& options) {
+Fit best_fit(const HistoryModel& model, const WhitenedData& data, int dropped, const VectorXd& start,
+             double log_scale, const SurrogateOptions& options) {
   const Objective objective = [&](const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
     VectorXd slope;
     const double value = model.log_likelihood(data, x[0], variances(x, dropped), &slope);
@@ -48,7 +48,8 @@ Fit best_fit(const HistoryModel& model, const WhitenedData& data, int dropped, c
 }
 
 // Loss of log-likelihood by dropping each condition, for data seen under each of the error settings.
-VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>& settings, const SurrogateOptions& options) {
+VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>& settings,
+                     const SurrogateOptions& options) {
   const int conditions = model.conditions();
   std::vector<Fit> full;
   for (const auto& data : settings) {
@@ -66,7 +67,8 @@ VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>&
       const VectorXd& x = full[g].x;
       double value = model.log_likelihood(settings[g], x[0], variances(x, s));
       if (full[g].value - value > kNegligible) {
-        const double log_scale = std::log(settings[g].square / static_cast<double>(settings[g].residual_dimension));
+        const double log_scale =
+            std::log(settings[g].square / static_cast<double>(settings[g].residual_dimension));
         value = std::max(value, best_fit(model, settings[g], s, x, log_scale, options).value);
       }
       without = std::max(without, value);
@@ -84,11 +86,13 @@ MatrixXd shifted(const MatrixXd& x, Index lag) {
 }
 
 std::vector<Index> draw_lags(Index n, const SurrogateOptions& options, const Context& context) {
-  const Index smallest = std::max<Index>(1, static_cast<Index>(options.smallest_shift * static_cast<double>(n)));
+  const Index smallest =
+      std::max<Index>(1, static_cast<Index>(options.smallest_shift * static_cast<double>(n)));
   std::vector<Index> lags(static_cast<std::size_t>(std::max<Index>(1, n - 2 * smallest + 1)));
   std::iota(lags.begin(), lags.end(), smallest);
   Stream stream(context.seed, kShifts, 0);
-  for (std::size_t i = lags.size() - 1; i > 0; --i) std::swap(lags[i], lags[stream.index(static_cast<int>(i) + 1)]);
+  for (std::size_t i = lags.size() - 1; i > 0; --i)
+    std::swap(lags[i], lags[stream.index(static_cast<int>(i) + 1)]);
   if (static_cast<int>(lags.size()) > options.surrogates) lags.resize(options.surrogates);
   return lags;
 }
@@ -97,7 +101,8 @@ std::vector<Index> draw_lags(Index n, const SurrogateOptions& options, const Con
 
 void SurrogateOptions::check() const {
   if (surrogates < 1) throw std::invalid_argument("surrogates: at least one is needed");
-  if (!(smallest_shift >= 0 && smallest_shift < 0.5)) throw std::invalid_argument("surrogates: smallest_shift must lie in [0, 0.5)");
+  if (!(smallest_shift >= 0 && smallest_shift < 0.5))
+    throw std::invalid_argument("surrogates: smallest_shift must lie in [0, 0.5)");
   if (error_settings.empty()) throw std::invalid_argument("surrogates: no error setting given");
 }
 
@@ -121,8 +126,8 @@ int null_setting(const HistoryModel& model) {
   const VectorXd none = VectorXd::Zero(model.conditions());
   for (int g = 0; g < model.settings(); ++g) {
     const WhitenedData& data = model.whitened(g);
-    const double value =
-        model.log_likelihood(data, std::log(data.square / static_cast<double>(data.residual_dimension)), none);
+    const double value = model.log_likelihood(
+        data, std::log(data.square / static_cast<double>(data.residual_dimension)), none);
     if (value > highest) {
       highest = value;
       best = g;
@@ -131,7 +136,8 @@ int null_setting(const HistoryModel& model) {
   return best;
 }
 
-SurrogateTest surrogate_test(const HistoryModel& model, const SurrogateOptions& options, const Context& context) {
+SurrogateTest surrogate_test(const HistoryModel& model, const SurrogateOptions& options,
+                             const Context& context) {
   options.check();
   const ErrorOptions& error = model.priors().error;
   std::vector<WhitenedData> settings;
@@ -146,12 +152,14 @@ SurrogateTest surrogate_test(const HistoryModel& model, const SurrogateOptions& 
     HistoryData data = model.data();
     data.responses = shifted(data.responses, lags[b]);
     std::vector<WhitenedData> own;
-    for (int g : options.error_settings) own.push_back(whiten(data, error.correlation_times, error.setting(g)));
+    for (int g : options.error_settings)
+      own.push_back(whiten(data, error.correlation_times, error.setting(g)));
     test.null_statistics.row(b) = drop_losses(model, own, options).transpose();
   });
   test.p_value.resize(model.conditions());
   for (int s = 0; s < model.conditions(); ++s) {
-    const double as_large = static_cast<double>((test.null_statistics.col(s).array() >= test.statistic[s]).count());
+    const double as_large =
+        static_cast<double>((test.null_statistics.col(s).array() >= test.statistic[s]).count());
     test.p_value[s] = (1.0 + as_large) / (1.0 + n);
   }
   test.adjusted = holm(test.p_value);

@@ -20,21 +20,23 @@ Basis make_basis(const Eigen::Ref<const Eigen::MatrixXd>& outputs, const BasisOp
   const Eigen::RowVectorXd means = outputs.colwise().mean();
   const Eigen::MatrixXd centred = outputs.rowwise() - means;
 
-  // The squared singular values are the eigenvalues of the M x M Gram matrix; what this loses, below 1e-8 of
+  // The squared singular values are the eigenvalues of the M x M Gram matrix; what this loses, below 1e-7 of
   // the largest singular value, lies far under any truncation rule.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(centred.transpose() * centred);
   const Eigen::VectorXd energy = gram.eigenvalues().reverse().cwiseMax(0.0);
   const double total = energy.sum();
   const double tiny = 1e-14 * energy[0];
-  if (!(total > 0) || !std::isfinite(total)) throw std::invalid_argument("basis: the runs do not vary over time");
+  if (!(total > 0) || !std::isfinite(total))
+    throw std::invalid_argument("basis: the runs do not vary over time");
 
-  const double allowed_ss = options.noise_sd > 0
-                                ? std::pow(options.noise_fraction * options.noise_sd, 2) * static_cast<double>(n * m)
-                                : total;
+  const double allowed_ss = options.noise_sd > 0 ? std::pow(options.noise_fraction * options.noise_sd, 2) *
+                                                       static_cast<double>(n * m)
+                                                 : total;
   const Eigen::Index limit = std::min<Eigen::Index>({options.max_vectors - 1, m - 1, n - 2});
   Eigen::Index kept = 0;
   double rest = total;
-  while (kept < limit && energy[kept] > tiny && (rest > (1 - options.explained) * total || rest > allowed_ss)) {
+  while (kept < limit && energy[kept] > tiny &&
+         (rest > (1 - options.explained) * total || rest > allowed_ss)) {
     rest -= energy[kept++];
   }
   rest = std::max(rest, 0.0);

@@ -15,16 +15,20 @@ namespace {
 
 constexpr double kLogTwoPi = 1.83787706640934548356;
 
-double log_standard_normal(const VectorXd& x) { return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size())); }
+double log_standard_normal(const VectorXd& x) {
+  return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));
+}
 
 }  // namespace
 
-CalibrationTarget::CalibrationTarget(const HistoryTarget& history, StudentTMixture reference, const Emulator& emulator)
+CalibrationTarget::CalibrationTarget(const HistoryTarget& history, StudentTMixture reference,
+                                     const Emulator& emulator)
     : history_(history), reference_(std::move(reference)), emulator_(emulator) {
   const HistoryModel& model = history.model();
   for (int g = 0; g < model.settings(); ++g) {
     const MatrixXd& root = model.whitened(g).root;
-    const MatrixXd inverse = root.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(root.rows(), root.cols()));
+    const MatrixXd inverse =
+        root.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(root.rows(), root.cols()));
     unit_covariance_.push_back(inverse * inverse.transpose());
   }
 }
@@ -40,10 +44,12 @@ VectorXd CalibrationTarget::draw_reference(Stream& stream) const {
 }
 
 double CalibrationTarget::log_reference(const VectorXd& x) const {
-  return reference_.log_density(x.head(history_.dimension())) + log_standard_normal(x.tail(emulator_.n_inputs()));
+  return reference_.log_density(x.head(history_.dimension())) +
+         log_standard_normal(x.tail(emulator_.n_inputs()));
 }
 
-double CalibrationTarget::log_density_inside(const HistoryParameters& point, const VectorXd& mean, const VectorXd& variance) const {
+double CalibrationTarget::log_density_inside(const HistoryParameters& point, const VectorXd& mean,
+                                             const VectorXd& variance) const {
   const WhitenedData& data = history_.model().whitened(point.setting);
   MatrixXd covariance = point.variance * unit_covariance_[point.setting];
   covariance.diagonal() += variance;

@@ -6,8 +6,8 @@
 
 namespace amiss {
 
-/// Joint posterior of the discrepancy, the error and the parameters, given the whole record. Coordinates: those of the
-/// history posterior, then one for each parameter, u = Phi(x).
+/// Joint posterior of the discrepancy, the error and the parameters, given the whole record. Coordinates:
+/// those of the history posterior, then one for each parameter, u = Phi(x).
 ///
 /// Under an error setting with W K = O R, the part of y inside the simulation space is seen as
 ///     estimate = R^-1 O' W y ~ N(w(z), sigma^2 (R'R)^-1),
@@ -15,8 +15,9 @@ namespace amiss {
 ///     p(y | z, ...) = p(outside part | ...) N(estimate; w'(z), S(z) + sigma^2 (R'R)^-1) / |R|.
 /// |R|^-1 is the Jacobian that makes this a density of y, whatever the basis (for white error |K'K|^-1/2).
 ///
-/// The reference is a Student-t mixture close to the history posterior, times the prior of the parameters, so that
-/// annealing only has to bring in what the inside part says. The normalising constant is the evidence of the model.
+/// The reference is a Student-t mixture close to the history posterior, times the prior of the parameters, so
+/// that annealing only has to bring in what the inside part says. The normalising constant is the evidence of
+/// the model.
 class CalibrationTarget : public Target {
  public:
   CalibrationTarget(const HistoryTarget& history, StudentTMixture reference, const Emulator& emulator);
@@ -28,10 +29,13 @@ class CalibrationTarget : public Target {
 
   /// Parameters in the unit cube, n x P.
   Eigen::MatrixXd unit(const Eigen::MatrixXd& x) const;
-  HistoryParameters history(const Eigen::VectorXd& x) const { return history_.parameters(x.head(history_.dimension())); }
+  HistoryParameters history(const Eigen::VectorXd& x) const {
+    return history_.parameters(x.head(history_.dimension()));
+  }
 
   /// Log density of y inside the simulation space, for coefficients with the given mean and variance.
-  double log_density_inside(const HistoryParameters& point, const Eigen::VectorXd& mean, const Eigen::VectorXd& variance) const;
+  double log_density_inside(const HistoryParameters& point, const Eigen::VectorXd& mean,
+                            const Eigen::VectorXd& variance) const;
 
  private:
   const HistoryTarget& history_;

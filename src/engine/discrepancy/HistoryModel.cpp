@@ -23,14 +23,21 @@ double clamp_unit(double u) { return std::min(std::max(u, 1e-12), 1.0 - 1e-12); 
 
 }  // namespace
 
-int HistoryData::conditions() const { return condition.empty() ? 0 : 1 + *std::max_element(condition.begin(), condition.end()); }
+int HistoryData::conditions() const {
+  return condition.empty() ? 0 : 1 + *std::max_element(condition.begin(), condition.end());
+}
 
 void HistoryData::check() const {
   axis.check();
   const Index n = y.size();
-  if (basis.rows() != n || responses.rows() != n || axis.size() != n) throw std::invalid_argument("history: lengths differ");
-  if (static_cast<Index>(condition.size()) != responses.cols()) throw std::invalid_argument("history: a condition is needed for each column");
-  if (basis.cols() >= n) throw std::invalid_argument("history: the basis spans the whole record, nothing is left outside it");
+  if (basis.rows() != n || responses.rows() != n || axis.size() != n)
+    throw std::invalid_argument("history: lengths differ");
+  if (static_cast<Index>(condition.size()) != responses.cols())
+    throw std::invalid_argument("history: a condition is needed for each column");
+  if (!condition.empty() && *std::min_element(condition.begin(), condition.end()) < 0)
+    throw std::invalid_argument("history: negative condition");
+  if (basis.cols() >= n)
+    throw std::invalid_argument("history: the basis spans the whole record, nothing is left outside it");
 }
 
 void HistoryPriors::check() const {
@@ -78,7 +85,8 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
   for (int s : data_.condition) columns_[s] += 1.0;
   centre_ = data_.responses.colwise().mean();
   data_.responses.rowwise() -= centre_;
-  scale_ = (data_.responses.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, data_.y.size()))).cwiseSqrt();
+  scale_ = (data_.responses.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, data_.y.size())))
+               .cwiseSqrt();
   for (Index j = 0; j < scale_.size(); ++j) {
     if (!(scale_[j] > 1e-12 * (1.0 + std::abs(centre_[j])))) scale_[j] = 1.0;  // constant: its column is zero
   }
@@ -89,14 +97,16 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
   });
 }
 
-double HistoryModel::log_likelihood(int setting, double log_variance, const VectorXd& t, VectorXd* gradient) const {
+double HistoryModel::log_likelihood(int setting, double log_variance, const VectorXd& t,
+                                    VectorXd* gradient) const {
   return log_likelihood(settings_[setting], log_variance, t, gradient);
 }
 
 // With D = diag(t_s / p_s), B = I + D^1/2 G D^1/2 / sigma^2 and b = D^1/2 g:
 //   log |H'AH| = (N - Q) log sigma^2 + log |B|,   quadratic form = (y'y - b' B^-1 b / sigma^2) / sigma^2.
 // With r = B^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(B^-1)_ss - p_s]; it holds at t_s = 0 too.
-double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_variance, const VectorXd& t, VectorXd* gradient) const {
+double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_variance, const VectorXd& t,
+                                    VectorXd* gradient) const {
   const double precision = std::exp(-log_variance);
   std::vector<Index> kept;
   for (std::size_t j = 0; j < data_.condition.size(); ++j) {
@@ -111,7 +121,8 @@ double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_var
   }
   MatrixXd matrix(p, p);
   for (Index j = 0; j < p; ++j) {
-    for (Index i = j; i < p; ++i) matrix(i, j) = precision * root[i] * root[j] * whitened.gram(kept[i], kept[j]);
+    for (Index i = j; i < p; ++i)
+      matrix(i, j) = precision * root[i] * root[j] * whitened.gram(kept[i], kept[j]);
     matrix(j, j) += 1.0;
   }
   const Eigen::LLT<MatrixXd, Eigen::Lower> factor(matrix);
@@ -131,12 +142,14 @@ double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_var
       (*gradient)[1 + data_.condition[kept[j]]] += 0.5 * (r[j] * r[j] + inverse_diagonal[j] - 1.0);
     }
     // sigma^2 |Sigma^-1 y|^2 = (quadratic form) - r'r: the residual sum of squares over sigma^2.
-    (*gradient)[0] = -0.5 * (n - static_cast<double>(p) + inverse_diagonal.sum() - (quadratic - r.squaredNorm()));
+    (*gradient)[0] =
+        -0.5 * (n - static_cast<double>(p) + inverse_diagonal.sum() - (quadratic - r.squaredNorm()));
   }
   return value;
 }
 
-VectorXd HistoryModel::coefficients(const WhitenedData& whitened, double log_variance, const VectorXd& t) const {
+VectorXd HistoryModel::coefficients(const WhitenedData& whitened, double log_variance,
+                                    const VectorXd& t) const {
   const double precision = std::exp(-log_variance);
   const Index p = static_cast<Index>(data_.condition.size());
   VectorXd root(p);
@@ -146,7 +159,8 @@ VectorXd HistoryModel::coefficients(const WhitenedData& whitened, double log_var
   return root.asDiagonal() * matrix.llt().solve(precision * root.cwiseProduct(whitened.cross));
 }
 
-HistoryTarget::HistoryTarget(const HistoryModel& model, std::vector<int> active) : model_(model), active_(std::move(active)) {}
+HistoryTarget::HistoryTarget(const HistoryModel& model, std::vector<int> active)
+    : model_(model), active_(std::move(active)) {}
 
 Index HistoryTarget::dimension() const {
   return 1 + model_.priors().error.correlation_times.size() + static_cast<Index>(active_.size());

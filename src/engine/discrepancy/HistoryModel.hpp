@@ -21,45 +21,50 @@ struct HistoryData {
 
 /// Priors of the history model.
 struct HistoryPriors {
-  double noise_sd = 1.0;       ///< stated standard deviation of the white noise
-  double noise_shape = 2.0;    ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
-  double amplitude = 1.0;      ///< scale of the half-Cauchy prior of sqrt(t_s)
-  ErrorOptions error;          ///< grid of error settings, all equally probable before the data
+  double noise_sd = 1.0;     ///< stated standard deviation of the white noise
+  double noise_shape = 2.0;  ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
+  double amplitude = 1.0;    ///< scale of the half-Cauchy prior of sqrt(t_s)
+  ErrorOptions error;        ///< grid of error settings, all equally probable before the data
 
   void check() const;
 };
 
-/// One error setting: everything that a likelihood needs, worked out once in a pass linear in N. With the whitener W of
-/// the setting, W K = O R (O orthonormal columns) and P = I - O O':
+/// One error setting: everything that a likelihood needs, worked out once in a pass linear in N. With the
+/// whitener W of the setting, W K = O R (O orthonormal columns) and P = I - O O':
 struct WhitenedData {
-  Eigen::MatrixXd gram;      ///< Phi' W' P W Phi, p x p
-  Eigen::VectorXd cross;     ///< Phi' W' P W y, p
-  double square = 0.0;       ///< y' W' P W y
-  double log_det = 0.0;      ///< log |W|
-  Eigen::MatrixXd root;      ///< R, Q x Q upper triangular
-  Eigen::VectorXd estimate;  ///< R^-1 O' W y: generalised least squares coefficients of y on K
+  Eigen::MatrixXd gram;                 ///< Phi' W' P W Phi, p x p
+  Eigen::VectorXd cross;                ///< Phi' W' P W y, p
+  double square = 0.0;                  ///< y' W' P W y
+  double log_det = 0.0;                 ///< log |W|
+  Eigen::MatrixXd root;                 ///< R, Q x Q upper triangular
+  Eigen::VectorXd estimate;             ///< R^-1 O' W y: generalised least squares coefficients of y on K
   Eigen::Index residual_dimension = 0;  ///< N - Q
 };
 
-WhitenedData whiten(const HistoryData& data, const Eigen::VectorXd& correlation_times, const Eigen::VectorXd& ratios);
+WhitenedData whiten(const HistoryData& data, const Eigen::VectorXd& correlation_times,
+                    const Eigen::VectorXd& ratios);
 
 /// Discrepancy driven by the history of the boundary conditions,
 ///     v ~ N(0, sum_s t_s Phi_s Phi_s' / p_s),  p_s columns of condition s,
-/// seen with an error of ErrorModel's kind, in the complement of the simulation space under the metric of that error. In
-/// whitened coordinates this is the paper's split: the part of y inside the simulation space is independent of the
-/// part outside, and the two densities multiply to the density of y, with |R|^-1 as Jacobian.
+/// seen with an error of ErrorModel's kind, in the complement of the simulation space under the metric of
+/// that error. In whitened coordinates this is the paper's split: the part of y inside the simulation space
+/// is independent of the part outside, and the two densities multiply to the density of y, with |R|^-1 as
+/// Jacobian.
 class HistoryModel {
  public:
   HistoryModel(HistoryData data, HistoryPriors priors, const Context& context);
 
-  /// log density of the part of y outside the simulation space, given the error setting, log sigma^2 and the t_s
-  /// of the conditions (t_s = 0 leaves one out). The gradient is with respect to (log sigma^2, log t_1 ... log t_S).
-  double log_likelihood(int setting, double log_variance, const Eigen::VectorXd& t, Eigen::VectorXd* gradient = nullptr) const;
+  /// log density of the part of y outside the simulation space, given the error setting, log sigma^2 and the
+  /// t_s of the conditions (t_s = 0 leaves one out). The gradient is with respect to (log sigma^2, log t_1
+  /// ... log t_S).
+  double log_likelihood(int setting, double log_variance, const Eigen::VectorXd& t,
+                        Eigen::VectorXd* gradient = nullptr) const;
   double log_likelihood(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t,
                         Eigen::VectorXd* gradient = nullptr) const;
 
   /// Posterior mean of the coefficients of the (scaled) filter columns.
-  Eigen::VectorXd coefficients(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t) const;
+  Eigen::VectorXd coefficients(const WhitenedData& whitened, double log_variance,
+                               const Eigen::VectorXd& t) const;
 
   const HistoryData& data() const { return data_; }
   const HistoryPriors& priors() const { return priors_; }
@@ -81,13 +86,13 @@ class HistoryModel {
 
 /// A point of the history posterior in natural terms.
 struct HistoryParameters {
-  int setting = 0;         ///< index of the error setting
-  double variance = 1.0;   ///< sigma^2
-  Eigen::VectorXd t;       ///< S; 0 where a condition is left out
+  int setting = 0;        ///< index of the error setting
+  double variance = 1.0;  ///< sigma^2
+  Eigen::VectorXd t;      ///< S; 0 where a condition is left out
 };
 
-/// Posterior of the history model with some of its conditions active. Coordinates: sigma, one per error component,
-/// one per active condition.
+/// Posterior of the history model with some of its conditions active. Coordinates: sigma, one per error
+/// component, one per active condition.
 class HistoryTarget : public Target {
  public:
   HistoryTarget(const HistoryModel& model, std::vector<int> active);

@@ -15,9 +15,11 @@ using Eigen::VectorXd;
 
 Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients)
     : inputs_(inputs), coefficients_(coefficients), centre_(coefficients.colwise().mean()) {
-  if (inputs.rows() != coefficients.rows()) throw std::invalid_argument("emulator: inputs and coefficients differ in rows");
+  if (inputs.rows() != coefficients.rows())
+    throw std::invalid_argument("emulator: inputs and coefficients differ in rows");
   const MatrixXd centred = coefficients.rowwise() - centre_;
-  scale_ = (centred.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, inputs.rows() - 1))).cwiseSqrt();
+  scale_ = (centred.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, inputs.rows() - 1)))
+               .cwiseSqrt();
   for (Index q = 0; q < scale_.size(); ++q) {
     if (!(scale_[q] > 0)) scale_[q] = 1.0;  // a coefficient that never changes is predicted by its mean
   }
@@ -30,15 +32,18 @@ Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.co
   }
 }
 
-Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options, const Context& context) {
+Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
+                         const Context& context) {
   Emulator emulator(inputs, basis.coefficients);
   const double runs = static_cast<double>(inputs.rows());
   const double shape = 2.0 + 0.5 * runs * static_cast<double>(basis.vectors.rows() - basis.size());
-  const double rate = std::sqrt(std::numeric_limits<double>::epsilon()) * basis.singular_values[0] + 0.5 * basis.discarded_ss;
+  const double rate =
+      std::sqrt(std::numeric_limits<double>::epsilon()) * basis.singular_values[0] + 0.5 * basis.discarded_ss;
   std::vector<std::optional<GaussianProcess>> fitted(static_cast<std::size_t>(basis.size()));
   parallel_for(static_cast<int>(basis.size()), context, [&](int q) {
     const double norm = basis.vectors.col(q).squaredNorm() * emulator.scale_[q] * emulator.scale_[q];
-    const VectorXd values = (emulator.coefficients_.col(q).array() - emulator.centre_[q]) / emulator.scale_[q];
+    const VectorXd values =
+        (emulator.coefficients_.col(q).array() - emulator.centre_[q]) / emulator.scale_[q];
     fitted[q] = GaussianProcess::fit(inputs, values, {shape, rate / norm}, options);
   });
   for (auto& process : fitted) emulator.processes_.push_back(std::move(*process));

@@ -20,8 +20,8 @@ class Emulator {
   explicit Emulator(const EmulatorState& state);
 
   /// Trains all Q processes; work is shared over the threads of the context. The prior of lambda_q is
-  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2, with a = 2 and b = sqrt(machine
-  /// epsilon) times the largest singular value.
+  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2, with a = 2 and b =
+  /// sqrt(machine epsilon) times the largest singular value.
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context);
 

@@ -19,10 +19,12 @@ constexpr double kJitter = 1e-10;  // of the amplitude: keeps the Cholesky facto
 
 // beta^(4 d^2) = exp(-theta d^2) with theta = -4 log(beta) = 4 log(1 + exp(-logit beta)).
 VectorXd decay_rates(const VectorXd& logit_beta) {
-  return logit_beta.unaryExpr([](double b) { return b > 0 ? 4 * std::log1p(std::exp(-b)) : 4 * (std::log1p(std::exp(b)) - b); });
+  return logit_beta.unaryExpr(
+      [](double b) { return b > 0 ? 4 * std::log1p(std::exp(-b)) : 4 * (std::log1p(std::exp(b)) - b); });
 }
 
-// prod_p beta_p^(4 (a_ip - b_jp)^2) for inputs already scaled by sqrt(theta_p): one matrix product and one exp.
+// prod_p beta_p^(4 (a_ip - b_jp)^2) for inputs already scaled by sqrt(theta_p): one matrix product and one
+// exp.
 MatrixXd correlation(const MatrixXd& a, const MatrixXd& b) {
   MatrixXd r = 2.0 * a * b.transpose();
   r.colwise() -= a.rowwise().squaredNorm();
@@ -55,7 +57,8 @@ Box search_box(Eigen::Index n_inputs, const GammaPrior& prior) {
 }  // namespace
 
 void EmulatorOptions::check() const {
-  if (starts < 1 || searches < 1 || searches > starts) throw std::invalid_argument("emulator: need 1 <= searches <= starts");
+  if (starts < 1 || searches < 1 || searches > starts)
+    throw std::invalid_argument("emulator: need 1 <= searches <= starts");
   if (max_evaluations < 1) throw std::invalid_argument("emulator: max_evaluations must be positive");
 }
 
@@ -69,12 +72,14 @@ GaussianProcessParameters GaussianProcessParameters::unpack(const VectorXd& x) {
   return {x[0], x[1], x[2], x.tail(x.size() - 3)};
 }
 
-GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values, const GaussianProcessParameters& parameters)
+GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values,
+                                 const GaussianProcessParameters& parameters)
     : scaled_inputs_(inputs * decay_rates(parameters.logit_beta).cwiseSqrt().asDiagonal()),
       values_(values),
       parameters_(parameters) {
   const Eigen::LLT<MatrixXd> factor(covariance(scaled_inputs_, parameters_));
-  if (factor.info() != Eigen::Success) throw std::runtime_error("emulator: covariance is not positive definite");
+  if (factor.info() != Eigen::Success)
+    throw std::runtime_error("emulator: covariance is not positive definite");
   root_inverse_ = MatrixXd::Identity(values.size(), values.size());
   factor.matrixL().solveInPlace(root_inverse_);
   inverse_.noalias() = root_inverse_.transpose() * root_inverse_;
@@ -109,7 +114,8 @@ double GaussianProcess::log_density(const MatrixXd& inputs, const VectorXd& valu
     const VectorXd row_sums = sensitivity.rowwise().sum();
     const MatrixXd product = sensitivity * inputs;
     for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
-      const double squared = 2.0 * (inputs.col(j).cwiseAbs2().dot(row_sums) - inputs.col(j).dot(product.col(j)));
+      const double squared =
+          2.0 * (inputs.col(j).cwiseAbs2().dot(row_sums) - inputs.col(j).dot(product.col(j)));
       // d theta / d logit(beta) = -4 (1 - beta).
       gradient[3 + j] = 0.5 * squared * 4.0 / (1.0 + std::exp(p.logit_beta[j]));
     }
@@ -121,17 +127,20 @@ GaussianProcess GaussianProcess::fit(const MatrixXd& inputs, const VectorXd& val
                                      const EmulatorOptions& options) {
   options.check();
   const Box box = search_box(inputs.cols(), prior);
-  const double log_lambda = prior.shape > 1 ? std::log((prior.shape - 1) / prior.rate) : (prior.shape > 0 ? 10.0 : 40.0);
+  const double log_lambda =
+      prior.shape > 1 ? std::log((prior.shape - 1) / prior.rate) : (prior.shape > 0 ? 10.0 : 40.0);
   // Starting points from nearly linear to rough responses.
   std::vector<Maximum> candidates;
   for (int s = 0; s < options.starts; ++s) {
     const double logit_beta = 3.5 - 5.0 * s / std::max(1, options.starts - 1);
-    GaussianProcessParameters p{s == 0 ? 3.0 : 1.0, -9.0, std::min(std::max(log_lambda, box.lower[2]), box.upper[2]),
+    GaussianProcessParameters p{s == 0 ? 3.0 : 1.0, -9.0,
+                                std::min(std::max(log_lambda, box.lower[2]), box.upper[2]),
                                 VectorXd::Constant(inputs.cols(), logit_beta)};
     VectorXd none(0);
     candidates.push_back({p.pack(), log_density(inputs, values, prior, p.pack(), none), 1, false});
   }
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Maximum& a, const Maximum& b) { return a.value > b.value; });
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Maximum& a, const Maximum& b) { return a.value > b.value; });
   const Objective objective = [&](const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
     return log_density(inputs, values, prior, x, gradient);
   };
@@ -150,7 +159,8 @@ GaussianProcess GaussianProcess::fit(const MatrixXd& inputs, const VectorXd& val
   return process;
 }
 
-void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean, Eigen::Ref<VectorXd> variance) const {
+void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
+                              Eigen::Ref<VectorXd> variance) const {
   const MatrixXd scaled = points * decay_rates(parameters_.logit_beta).cwiseSqrt().asDiagonal();
   const double amplitude = std::exp(parameters_.log_amplitude);
   const MatrixXd cross = amplitude * correlation(scaled_inputs_, scaled);  // M x n

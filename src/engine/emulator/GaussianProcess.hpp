@@ -10,9 +10,9 @@ struct GammaPrior {
 };
 
 struct EmulatorOptions {
-  int starts = 3;              ///< starting points screened; the search runs from the best of them
-  int searches = 1;            ///< how many of them are searched
-  int max_evaluations = 120;   ///< per search
+  int starts = 3;             ///< starting points screened; the search runs from the best of them
+  int searches = 1;           ///< how many of them are searched
+  int max_evaluations = 120;  ///< per search
 
   void check() const;
 };
@@ -40,15 +40,17 @@ class GaussianProcess {
                   const GaussianProcessParameters& parameters);
 
   /// Mode of the joint density (3) of values and hyper-parameters, by gradient search.
-  static GaussianProcess fit(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values, const GammaPrior& prior,
-                             const EmulatorOptions& options);
+  static GaussianProcess fit(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
+                             const GammaPrior& prior, const EmulatorOptions& options);
 
   /// Logarithm of the joint density (3), up to a constant, and its gradient in pack()'s coordinates.
-  static double log_density(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values, const GammaPrior& prior,
-                            const Eigen::VectorXd& packed, Eigen::Ref<Eigen::VectorXd> gradient);
+  static double log_density(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
+                            const GammaPrior& prior, const Eigen::VectorXd& packed,
+                            Eigen::Ref<Eigen::VectorXd> gradient);
 
   /// Mean and variance of the smooth part at points (n x P).
-  void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean, Eigen::Ref<Eigen::VectorXd> variance) const;
+  void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean,
+               Eigen::Ref<Eigen::VectorXd> variance) const;
 
   /// Leave-one-out prediction of each value, closed form (Rasmussen and Williams 2006, equation 5.12).
   void leave_one_out(Eigen::VectorXd& mean, Eigen::VectorXd& variance) const;
@@ -61,9 +63,9 @@ class GaussianProcess {
   Eigen::MatrixXd scaled_inputs_;  // M x P: input p times sqrt(-4 log beta_p)
   Eigen::VectorXd values_;
   GaussianProcessParameters parameters_;
-  Eigen::MatrixXd inverse_;        // of the covariance
-  Eigen::MatrixXd root_inverse_;   // inverse of its Cholesky factor
-  Eigen::VectorXd weights_;        // inverse times values
+  Eigen::MatrixXd inverse_;       // of the covariance
+  Eigen::MatrixXd root_inverse_;  // inverse of its Cholesky factor
+  Eigen::VectorXd weights_;       // inverse times values
 };
 
 }  // namespace amiss

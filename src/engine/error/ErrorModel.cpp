@@ -9,6 +9,8 @@ void TimeAxis::check() const {
   if (static_cast<std::size_t>(time.size()) != new_segment.size()) {
     throw std::invalid_argument("TimeAxis: time and new_segment differ in length");
   }
+  if (time.size() > 0 && !new_segment[0])
+    throw std::invalid_argument("TimeAxis: the first value must start a segment");
   for (Eigen::Index i = 1; i < time.size(); ++i) {
     if (!new_segment[i] && !(time[i] > time[i - 1])) {
       throw std::invalid_argument("TimeAxis: time does not increase at value " + std::to_string(i + 1));
@@ -30,12 +32,15 @@ Eigen::VectorXd ErrorOptions::setting(int g) const {
 }
 
 void ErrorOptions::check() const {
-  if ((correlation_times.array() <= 0).any()) throw std::invalid_argument("error: correlation times must be positive");
+  if ((correlation_times.array() <= 0).any())
+    throw std::invalid_argument("error: correlation times must be positive");
   if ((ratios.array() < 0).any()) throw std::invalid_argument("error: variance ratios must not be negative");
-  if (correlation_times.size() > 0 && ratios.size() == 0) throw std::invalid_argument("error: no variance ratios given");
+  if (correlation_times.size() > 0 && ratios.size() == 0)
+    throw std::invalid_argument("error: no variance ratios given");
 }
 
-Whitener::Whitener(const TimeAxis& axis, const Eigen::VectorXd& correlation_times, const Eigen::VectorXd& ratios)
+Whitener::Whitener(const TimeAxis& axis, const Eigen::VectorXd& correlation_times,
+                   const Eigen::VectorXd& ratios)
     : new_segment_(axis.new_segment),
       decay_(Eigen::MatrixXd::Zero(ratios.size(), axis.size())),
       gain_(ratios.size(), axis.size()),

@@ -12,7 +12,9 @@ inline double log_sum_exp(const Eigen::VectorXd& x) {
   return largest + std::log((x.array() - largest).exp().sum());
 }
 
-inline double log_mean_exp(const Eigen::VectorXd& x) { return log_sum_exp(x) - std::log(static_cast<double>(x.size())); }
+inline double log_mean_exp(const Eigen::VectorXd& x) {
+  return log_sum_exp(x) - std::log(static_cast<double>(x.size()));
+}
 
 /// exp(x) scaled to sum 1.
 inline Eigen::VectorXd normalised_exp(const Eigen::VectorXd& x) { return (x.array() - log_sum_exp(x)).exp(); }

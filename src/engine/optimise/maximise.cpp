@@ -40,6 +40,8 @@ double call(unsigned n, const double* x, double* gradient, void* data) {
 
 Maximum maximise(const Objective& objective, const Eigen::VectorXd& start, const Eigen::VectorXd& lower,
                  const Eigen::VectorXd& upper, double tolerance, int max_evaluations) {
+  if ((lower.array() > upper.array()).any())
+    throw std::invalid_argument("maximise: a lower bound exceeds its upper bound");
   Search search{&objective, {start, -std::numeric_limits<double>::infinity(), 0, false}, nullptr};
   const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> optimiser(
       nlopt_create(NLOPT_LD_LBFGS, static_cast<unsigned>(start.size())), nlopt_destroy);
@@ -52,7 +54,8 @@ Maximum maximise(const Objective& objective, const Eigen::VectorXd& start, const
   nlopt_set_maxeval(optimiser.get(), max_evaluations);
   Eigen::VectorXd x = start.cwiseMax(lower).cwiseMin(upper);
   double value = 0.0;
-  // NLopt also reports failure when rounding stops the line search close to the optimum: the best point stands.
+  // NLopt also reports failure when rounding stops the line search close to the optimum: the best point
+  // stands.
   const nlopt_result status = nlopt_optimize(optimiser.get(), x.data(), &value);
   if (search.failure) std::rethrow_exception(search.failure);
   search.best.converged = status != NLOPT_MAXEVAL_REACHED;

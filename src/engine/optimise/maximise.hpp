@@ -10,10 +10,10 @@ namespace amiss {
 using Objective = std::function<double(const Eigen::VectorXd& x, Eigen::Ref<Eigen::VectorXd> gradient)>;
 
 struct Maximum {
-  Eigen::VectorXd x;      ///< the best point seen
+  Eigen::VectorXd x;  ///< the best point seen
   double value = 0.0;
   int evaluations = 0;
-  bool converged = false; ///< false if the limit on evaluations ended the search
+  bool converged = false;  ///< false if the limit on evaluations ended the search
 };
 
 /// Local maximum by NLopt's limited-memory BFGS within box constraints; deterministic.
