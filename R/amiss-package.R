@@ -9,6 +9,7 @@
 #' @importFrom Rcpp evalCpp
 #' @importFrom rlang %||% .data
 #' @importFrom generics tidy glance augment
+#' @importFrom ggplot2 autoplot
 #' @keywords internal
 "_PACKAGE"
 
@@ -47,8 +48,11 @@ engine_context <- function(seed, threads) list(seed = seed, threads = threads)
 
 # The engine's own exceptions become the package's conditions.
 call_engine <- function(expression, call = rlang::caller_env()) {
-  tryCatch(expression, `Rcpp::exception` = function(e) {
+  tryCatch(expression, `C++Error` = function(e) {
     numerical <- inherits(e, "std::runtime_error")
     (if (numerical) abort_numerical else abort_input)("The computation stopped: {conditionMessage(e)}.", call = call)
   })
 }
+
+#' @export
+ggplot2::autoplot

@@ -1,7 +1,7 @@
 ais_control <- list(pilot_chains = 128, groups = 8, chains = 32, sweeps = 4, ess_drop = 0.7, resample = TRUE,
                     importance_draws = 1000, max_components = 3)
 
-calibration_control <- list(confidence = NULL, amplitude = NULL, time_constants = NULL, error_times = NULL,
+calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, time_constants = NULL, error_times = NULL,
                             error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, ais = list())
 
 #' Calibrate a simulator on measurements
@@ -14,8 +14,8 @@ calibration_control <- list(confidence = NULL, amplitude = NULL, time_constants 
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].
 #' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
-#'   `amplitude` (scale of the half-Cauchy prior of each condition's share of the discrepancy, in the target's unit;
-#'   default the noise), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
+#'   `inclusion` (prior probability that a condition drives the discrepancy at all, 0.2), `amplitude` (scale of the
+#'   half-Cauchy prior of the discrepancy's standard deviation if it does, in the target's unit; default the noise), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
 #'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept
 #'   for the discrepancy over time), and `ais`, a list for the sampler (`pilot_chains`, `groups`, `chains`, `sweeps`,
 #'   `ess_drop`, `resample`, `importance_draws`, `max_components`).
@@ -36,7 +36,7 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
   control <- fill_calibration_control(control, measurements, length(rows))
   data <- history_data(emulator, measurements, rows, control)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
-                 amplitude = control$amplitude, correlation_times = control$error_times, ratios = control$error_ratios)
+                 inclusion = control$inclusion, amplitude = control$amplitude, correlation_times = control$error_times, ratios = control$error_ratios)
 
   result <- call_engine(calibrate_(data, priors, emulator$processes, control$ais, engine_context(seed, threads)))
   history <- result$history
@@ -65,6 +65,7 @@ fill_calibration_control <- function(control, measurements, n, call = rlang::cal
   if (is.null(control$error_times)) control[["error_times"]] <- c(2, 8) * step
   check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
+  check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1), "control$inclusion", call = call)
   check_input(checkmate::check_number(control$amplitude, lower = 1e-12), "control$amplitude", call = call)
   check_input(checkmate::check_numeric(control$time_constants, lower = 0, min.len = 1, any.missing = FALSE), "control$time_constants", call = call)
   check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, any.missing = FALSE, max.len = 3), "control$error_times", call = call)

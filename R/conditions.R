@@ -2,11 +2,18 @@
 # interpolated in the caller's frame.
 
 abort_input <- function(message, call = rlang::caller_env(), .envir = parent.frame()) {
-  cli::cli_abort(message, class = c("amiss_error_input", "amiss_error"), call = call, .envir = .envir)
+  cli::cli_abort(message, class = c("amiss_error_input", "amiss_error"), call = short_call(call), .envir = .envir)
 }
 
 abort_numerical <- function(message, call = rlang::caller_env(), .envir = parent.frame()) {
-  cli::cli_abort(message, class = c("amiss_error_numerical", "amiss_error"), call = call, .envir = .envir)
+  cli::cli_abort(message, class = c("amiss_error_numerical", "amiss_error"), call = short_call(call), .envir = .envir)
+}
+
+# The call as name(): without its arguments, which do.call() would print in full.
+short_call <- function(call) {
+  if (is.environment(call)) call <- rlang::frame_call(call)
+  name <- if (is.call(call)) rlang::call_name(call)
+  if (is.null(name)) NULL else rlang::call2(name)
 }
 
 warn_input <- function(message, .envir = parent.frame()) {

@@ -110,8 +110,7 @@ require_numeric <- function(data, columns, call = rlang::caller_env()) {
 read_time <- function(values, name, call = rlang::caller_env()) {
   if (is.factor(values)) values <- as.character(values)
   if (is.character(values)) {
-    parsed <- as.POSIXct(sub("T", " ", values, fixed = TRUE), tz = "UTC", optional = TRUE,
-                         tryFormats = c("%Y-%m-%d %H:%M:%OS", "%Y-%m-%d %H:%M", "%Y-%m-%d"))
+    parsed <- read_time_text(values)
     bad <- which(is.na(parsed))
     if (length(bad)) {
       abort_input(c("Time column {.val {name}} cannot be read: row {bad[1]} holds {.val {values[bad[1]]}}.",
@@ -136,6 +135,15 @@ read_time <- function(values, name, call = rlang::caller_env()) {
                   i = "Sort the rows by time."), call = call)
   }
   hours
+}
+
+# Text as time in UTC, or as hours if it is all numbers; NA where it is neither.
+read_time_text <- function(values) {
+  hours <- suppressWarnings(as.numeric(values))
+  if (!anyNA(hours)) return(hours)
+  formats <- c("%Y-%m-%d %H:%M:%OS", "%Y-%m-%d %H:%M", "%Y-%m-%d")
+  tries <- lapply(formats, function(f) as.POSIXct(strptime(sub("T", " ", values, fixed = TRUE), f, tz = "UTC")))
+  tries[[which.min(vapply(tries, function(t) sum(is.na(t)), 1L))]]
 }
 
 check_regular <- function(hours, step, segment, name, call = rlang::caller_env()) {

@@ -40,23 +40,23 @@ plot.amiss_calibration <- function(x, ...) draw(figure_parameters(list("the mode
 plot.amiss_measurements <- function(x, ...) draw(figure_measurements(x))
 
 #' @rdname figures
-#' @exportS3Method ggplot2::autoplot
+#' @export
 autoplot.amiss_upgrade <- function(object, which = "fit", ...) upgrade_figure(object, which)
 
 #' @rdname figures
-#' @exportS3Method ggplot2::autoplot
+#' @export
 autoplot.amiss_attribution <- function(object, ...) figure_attribution(list("the model" = object))
 
 #' @rdname figures
-#' @exportS3Method ggplot2::autoplot
+#' @export
 autoplot.amiss_discrepancy <- function(object, ...) figure_discrepancy(list("the model" = object))
 
 #' @rdname figures
-#' @exportS3Method ggplot2::autoplot
+#' @export
 autoplot.amiss_calibration <- function(object, ...) figure_parameters(list("the model" = object))
 
 #' @rdname figures
-#' @exportS3Method ggplot2::autoplot
+#' @export
 autoplot.amiss_measurements <- function(object, ...) figure_measurements(object)
 
 draw <- function(figure) {
@@ -125,7 +125,7 @@ figure_theme <- function() {
 
 figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {
   wrap <- function(text, width) if (!is.null(text)) paste(strwrap(text, width), collapse = "\n")
-  ggplot2::labs(title = wrap(title, 66), subtitle = wrap(subtitle, 84), x = x, y = y)
+  ggplot2::labs(title = wrap(title, 72), subtitle = wrap(subtitle, 92), x = x, y = y)
 }
 
 stage_scales <- function() {
@@ -134,8 +134,9 @@ stage_scales <- function() {
 
 # Reads 2 and 500 on one axis, either side of zero.
 signed_log_axis <- function(name, values, extra = NULL) {
-  steps <- c(1, 2, 10, 100, 1000, 10000)
-  breaks <- sort(unique(c(-steps[-2], 0, steps[-2], extra)))
+  steps <- c(1, 3, 10, 30, 100, 300, 1000, 3000, 10000)
+  if (!is.null(extra)) steps <- c(steps[abs(log(steps / extra)) > 0.6], extra)
+  breaks <- sort(c(-steps, 0, steps))
   reach <- range(values, 0, na.rm = TRUE)
   ggplot2::scale_x_continuous(name, trans = "pseudo_log", breaks = breaks[breaks >= reach[1] - 1 & breaks <= reach[2] + 1],
                               expand = ggplot2::expansion(mult = c(0.04, 0.16)))
@@ -181,6 +182,10 @@ clock <- function(time) {
 }
 
 time_label <- function(time) if (is.numeric(time)) "time [h]"
+
+time_axis <- function(time) {
+  if (!is.numeric(time)) ggplot2::scale_x_datetime(breaks = function(limits) pretty(limits, 6), date_labels = "%d %b")
+}
 
 # Middle of the clock hour in which an interval lies that ends at `time`.
 hour_of_day <- function(time, step_h) {
@@ -230,10 +235,10 @@ fit_title <- function(upgrade) {
 figure_fit <- function(upgrade) {
   m <- upgrade$measurements
   table <- stage_table(upgrade_stages(upgrade), prediction_rows)
-  panels <- c(axis_label(m$target, level_unit(m$unit, table$observed)), axis_label("measured \u2212 simulated", m$unit))
+  panels <- c(axis_label(m$target, level_unit(m$unit, table$observed)), axis_label("error", m$unit))
   in_panel <- function(i, table) cbind(table, panel = factor(panels[i], panels))
   measured <- table[table$stage == levels(table$stage)[1], ]
-  ggplot2::ggplot(table, ggplot2::aes(.data$time)) +
+  figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time)) +
     ggplot2::geom_hline(ggplot2::aes(yintercept = 0), in_panel(2, data.frame(zero = 0)), colour = "grey40") +
     ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$stage, group = paste(.data$stage, .data$part)),
                          in_panel(1, table), alpha = 0.18) +
@@ -244,9 +249,9 @@ figure_fit <- function(upgrade) {
                        in_panel(2, table), linewidth = 0.7) +
     ggplot2::facet_grid(panel ~ use, scales = "free", space = "free_x", switch = "y") +
     stage_scales() +
-    figure_titles(fit_title(upgrade), "Black: measured. Coloured: simulated, with the band that should hold 95 % of the measurements.",
+    figure_titles(fit_title(upgrade), "Above, black: measured; coloured: simulated, with the band that should hold 95 % of the measurements. Below: error = measured \u2212 simulated.",
                   x = time_label(table$time)) +
-    figure_theme() -> figure
+    time_axis(table$time) + figure_theme()
   with_height(figure, 6.4)
 }
 
@@ -261,7 +266,7 @@ figure_attribution <- function(attributions) {
   table <- stage_table(attributions, function(a) a$table)
   strength <- tapply(table$log10_bf_dropped, table$boundary, max)
   table$boundary <- factor(table$boundary, names(sort(strength)))
-  table$label <- ifelse(table$significant, paste0("  ", percent(pmax(table$share, 0)), " of it"), "")
+  table$label <- ifelse(table$significant, paste0("   ", percent(pmax(table$share, 0)), " of it"), "")
   table$y <- as.integer(table$boundary) + if (length(attributions) > 1) ifelse(table$stage == "before", 0.18, -0.18) else 0
   axis <- signed_log_axis("evidence lost when it is ignored (log10 Bayes factor)", table$log10_bf_dropped)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$log10_bf_dropped, .data$y, colour = .data$stage)) +
@@ -301,7 +306,7 @@ figure_candidates <- function(upgrade) {
   decisive <- upgrade$control$decisive
   table <- candidate_table(upgrade)
   adopted <- c("no change", table$mechanism[table$adopted])
-  table$panel <- factor(ifelse(table$step == 1, "added to the base model", paste("then also with", adopted[table$step])))
+  table$panel <- factor(ifelse(table$step == 1, "added to the base model", paste("added after", adopted[table$step])))
   table$panel <- factor(table$panel, unique(table$panel[order(table$step)]))
   table$row <- paste(formatC(rank(table$log10_bf), width = 4, flag = "0"), table$mechanism)
   table$state <- factor(ifelse(table$adopted, "adopted", ifelse(table$trusted, "tried", "tried, estimate rough")), c("adopted", "tried", "tried, estimate rough"))
@@ -311,15 +316,16 @@ figure_candidates <- function(upgrade) {
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
     ggplot2::geom_vline(xintercept = decisive, linetype = "dashed", colour = "grey20") +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.1, show.legend = FALSE) +
-    ggplot2::geom_point(size = 3.6, fill = "white", stroke = 1.2) +
-    ggplot2::geom_text(ggplot2::aes(x = pmax(.data$upper95, .data$log10_bf), label = paste0("  ", signed(.data$log10_bf))), hjust = 0, size = 4.4, show.legend = FALSE) +
+    ggplot2::geom_point(ggplot2::aes(size = .data$state), fill = "white", stroke = 1.2) +
+    ggplot2::scale_size_manual(values = c("adopted" = 6, "tried" = 3.4, "tried, estimate rough" = 3.4), drop = FALSE) +
+    ggplot2::geom_text(ggplot2::aes(x = pmax(.data$upper95, .data$log10_bf), label = paste0("   ", signed(.data$log10_bf))), hjust = 0, size = 4.4, show.legend = FALSE) +
     ggplot2::scale_colour_manual(values = c("adopted" = stage_colours[["after"]], "tried" = grey, "tried, estimate rough" = grey), drop = FALSE) +
     ggplot2::scale_shape_manual(values = c("adopted" = 18, "tried" = 19, "tried, estimate rough" = 21), drop = FALSE) +
     ggplot2::scale_y_discrete(labels = function(x) sub("^[0-9.]+ ", "", x)) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y") +
     axis +
     figure_titles(candidates_title(table, decisive),
-                  sprintf("Right of the dashed line (%s: %s to 1) a mechanism is adopted, the best one first. Each unit is a factor of ten. Lines: 95 %% intervals.", decisive, format(10^decisive, big.mark = ",")),
+                  sprintf("Right of the dashed line (odds of %s to 1) a mechanism may be adopted, the best one first. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals.", format(10^decisive, big.mark = ",")),
                   y = NULL) +
     figure_theme()
   with_height(figure, 2.4 + 0.31 * nrow(table) + 0.5 * nlevels(table$panel))
@@ -359,6 +365,7 @@ figure_parameters <- function(fits) {
     ggplot2::geom_point(ggplot2::aes(.data$median, shape = "at the edge of its prior"), edge, colour = "black", size = 6, stroke = 1.1) +
     ggplot2::scale_shape_manual(values = c("at the edge of its prior" = 1)) +
     ggplot2::scale_x_continuous(n.breaks = 4, labels = short_axis) +
+    ggplot2::coord_cartesian(clip = "off") +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free", labeller = ggplot2::label_wrap_gen(38)) +
     stage_scales() +
     figure_titles(parameters_title(table), "Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95 % intervals.") +
@@ -399,7 +406,7 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
     stage_scales() +
     figure_titles(discrepancy_title(table), paste0("Grey: measured \u2212 simulated. Coloured: the part that no parameter can reach and that answers to boundary conditions, with 95 % band.",
                                                    if (!is.null(leading)) paste0(" Below: ", leading$name, ", which leads.")), x = time_label(table$time)) +
-    figure_theme() + ggplot2::theme(legend.position = "none")
+    time_axis(table$time) + figure_theme() + ggplot2::theme(legend.position = "none")
   with_height(figure, 1.8 + 1.9 * length(panels))
 }
 
@@ -419,22 +426,22 @@ response_title <- function(binned, name) {
   else paste("The error depends on", name, "about as much after the change as before")
 }
 
-# Mean error in classes of the leading boundary condition.
+# Mean error in classes of the leading boundary condition; classes of fewer than five steps are left out.
 figure_response <- function(upgrade, classes = 10) {
   leading <- leading_condition(upgrade)
   m <- upgrade$measurements
   table <- stage_table(upgrade_stages(upgrade), prediction_rows)
   table$value <- leading$value[match(table$time, clock(leading$time))]
-  limits <- unique(stats::quantile(table$value, seq(0, 1, length.out = classes + 1)))
-  table$class <- if (length(limits) > 2) cut(table$value, limits, include.lowest = TRUE) else factor(table$value)
+  table$class <- cut(table$value, classes)
   binned <- stats::aggregate(cbind(residual, value) ~ class + stage, table, mean)
+  binned <- binned[stats::aggregate(residual ~ class + stage, table, length)$residual >= 5, ]
   figure <- ggplot2::ggplot(binned, ggplot2::aes(.data$value, .data$residual, colour = .data$stage)) +
     ggplot2::geom_point(data = table, alpha = 0.18, size = 1.4, shape = 16) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
     ggplot2::geom_line(linewidth = 1.2) +
     ggplot2::geom_point(size = 3.6) +
     stage_scales() +
-    figure_titles(response_title(binned, leading$name), paste("Small points: every time step. Large points: means of classes of", leading$name, "of equal size."),
+    figure_titles(response_title(binned, leading$name), paste0("Small points: every time step. Large points: means over classes of ", leading$name, "."),
                   x = leading$name, y = axis_label("measured \u2212 simulated", m$unit)) +
     figure_theme()
   with_height(figure, 5)
@@ -474,11 +481,13 @@ figure_gain <- function(upgrade) {
   dodge <- ggplot2::position_dodge(width = 0.8)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$use, .data$value, fill = .data$stage)) +
     ggplot2::geom_col(position = dodge, width = 0.74) +
-    ggplot2::geom_text(ggplot2::aes(label = .data$label), position = dodge, vjust = -0.35, size = 5) +
+    ggplot2::geom_text(ggplot2::aes(label = .data$label, vjust = ifelse(.data$score == "coverage95", 3, -0.35),
+                                    colour = ifelse(.data$score == "coverage95", "white", "black")), position = dodge, size = 4.3) +
+    ggplot2::scale_colour_identity() +
     ggplot2::geom_hline(ggplot2::aes(yintercept = .data$value), target, linetype = "dashed", colour = "grey20") +
-    ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", labeller = ggplot2::label_wrap_gen(22)) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", labeller = ggplot2::label_wrap_gen(25)) +
     ggplot2::scale_y_continuous(expand = ggplot2::expansion(mult = c(0, 0.14))) +
-    stage_scales() +
+    ggplot2::scale_fill_manual(values = stage_colours) +
     figure_titles(gain_title(upgrade), "Lower is better for the two errors; the third should come near 95.") +
     figure_theme() +
     ggplot2::theme(panel.grid.major.x = ggplot2::element_blank(), strip.text = ggplot2::element_text(vjust = 1))
@@ -530,6 +539,6 @@ figure_measurements <- function(measurements) {
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y") +
     ggplot2::scale_colour_manual(values = stats::setNames(c("#999999", "#0072B2", "#009E73", "#CCCCCC"), uses)) +
     figure_titles(title, "The target above, the boundary conditions below it.", x = time_label(table$time)) +
-    figure_theme()
+    time_axis(table$time) + figure_theme()
   with_height(figure, 1.6 + 1.15 * length(panels))
 }

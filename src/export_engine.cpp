@@ -82,6 +82,7 @@ HistoryModel make_history_model(const Rcpp::List& data, const Rcpp::List& priors
   HistoryPriors prior;
   prior.noise_sd = priors["noise_sd"];
   prior.noise_shape = priors["noise_shape"];
+  prior.inclusion = priors["inclusion"];
   prior.amplitude = priors["amplitude"];
   prior.error.correlation_times = Rcpp::as<VectorXd>(priors["correlation_times"]);
   prior.error.ratios = Rcpp::as<VectorXd>(priors["ratios"]);

@@ -43,6 +43,8 @@ void HistoryData::check() const {
 void HistoryPriors::check() const {
   if (!(noise_sd > 0)) throw std::invalid_argument("history: noise_sd must be positive");
   if (!(noise_shape > 0)) throw std::invalid_argument("history: noise_shape must be positive");
+  if (!(inclusion > 0 && inclusion <= 1))
+    throw std::invalid_argument("history: inclusion must lie in (0, 1]");
   if (!(amplitude > 0)) throw std::invalid_argument("history: amplitude must be positive");
   error.check();
 }
@@ -180,8 +182,11 @@ HistoryParameters HistoryTarget::parameters(const VectorXd& x) const {
   }
   point.t = VectorXd::Zero(model_.conditions());
   for (std::size_t a = 0; a < active_.size(); ++a) {
-    const double u = clamp_unit(normal_cdf(x[1 + components + static_cast<Index>(a)]));
-    point.t[active_[a]] = std::pow(priors.amplitude * std::tan(kHalfPi * u), 2);
+    // The lower part of the unit interval is the spike at zero; the likelihood is continuous where the slab
+    // begins.
+    const double u =
+        (normal_cdf(x[1 + components + static_cast<Index>(a)]) - (1.0 - priors.inclusion)) / priors.inclusion;
+    if (u > 0) point.t[active_[a]] = std::pow(priors.amplitude * std::tan(kHalfPi * clamp_unit(u)), 2);
   }
   return point;
 }

@@ -23,7 +23,8 @@ struct HistoryData {
 struct HistoryPriors {
   double noise_sd = 1.0;     ///< stated standard deviation of the white noise
   double noise_shape = 2.0;  ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
-  double amplitude = 1.0;    ///< scale of the half-Cauchy prior of sqrt(t_s)
+  double inclusion = 0.2;    ///< probability that a condition drives the discrepancy at all; else t_s = 0
+  double amplitude = 1.0;    ///< scale of the half-Cauchy prior of sqrt(t_s), if it does
   ErrorOptions error;        ///< grid of error settings, all equally probable before the data
 
   void check() const;

@@ -1,0 +1,276 @@
+#' Diagnosis in words
+#'
+#' What is wrong, how sure that is, what would change, what it brings and what remains, as plain sentences and tables;
+#' [report()] sets it out.
+#'
+#' @param object An upgrade ([upgrade_model()]).
+#' @param x The summary.
+#' @param ... Not used.
+#' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`), `tag`, `headline`; the
+#'   sentences `note`, `sure`, `change`, `gain` and `remains`; and the tables `scores`, `changes`, `candidates`,
+#'   `parameters`, `attribution` and `method`.
+#' @export
+summary.amiss_upgrade <- function(object, ...) {
+  verdict <- diagnosis_verdict(object)
+  last <- object$models[[length(object$models)]]
+  structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
+              list(note = size_note(object), sure = sure_sentences(object), change = change_sentences(object),
+                   gain = gain_sentences(object), remains = remaining_sentences(object), scores = scores_table(object),
+                   changes = changes_table(object), candidates = candidates_words(object),
+                   parameters = parameters_words(last$fit), attribution = last$attribution$table, method = method_table(object),
+                   stopped_because = object$stopped_because, seed = object$seed)), class = "summary.amiss_upgrade")
+}
+
+#' @rdname summary.amiss_upgrade
+#' @export
+print.summary.amiss_upgrade <- function(x, ...) {
+  cli::cli_text("{.strong {x$title}}: {x$tag}")
+  cli::cli_text("{x$headline}")
+  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain, "What remains" = x$remains)
+  for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
+  cli::cli_bullets(c(">" = "next: {.fun report}"))
+  invisible(x)
+}
+
+# The first step's trials, best first, and the probability that is left to no change.
+first_trials <- function(upgrade) {
+  table <- upgrade$candidates[upgrade$candidates$from == upgrade$models[[1]]$name, ]
+  table[order(-table$log10_bf), ]
+}
+
+last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$attribution$table
+
+significant_conditions <- function(table) table$boundary[table$significant]
+
+# A cause is named outright when it holds at least 95 % of the probability among all that was tried, when its estimate
+# is sound or decisive even at its lower end, and when data held out do not speak against it.
+diagnosis_verdict <- function(upgrade) {
+  cause <- upgrade$named_cause
+  if (is.null(cause)) {
+    answers <- significant_conditions(last_attribution(upgrade))
+    if (length(answers)) {
+      return(list(verdict = "unexplained", tag = "Unexplained",
+                  headline = sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.", listed(answers))))
+    }
+    return(list(verdict = "nothing", tag = "Nothing decisive",
+                headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition."))
+  }
+  doubts <- cause_doubts(upgrade)
+  if (!length(doubts)) return(list(verdict = "named", tag = "Cause named", headline = cause$sentence))
+  list(verdict = "likely", tag = paste("Likely cause, but", listed(doubts)), headline = paste("Most likely:", cause$sentence))
+}
+
+cause_doubts <- function(upgrade) {
+  best <- first_trials(upgrade)[1, ]
+  rough <- !(best$trusted && upgrade$models[[1]]$fit$trust$trusted)
+  c(if (best$probability < 0.95) "others are possible",
+    if (rough && best$lower95 < upgrade$control$decisive) "the estimate is rough",
+    if (!improves_held_out(upgrade)) "not confirmed by held-out data")
+}
+
+# FALSE where data were held out and the change does not lower their error by at least 3 %.
+improves_held_out <- function(upgrade) {
+  held <- score_of(upgrade, "validate", "rmse")
+  length(held) < 2 || anyNA(held) || held[2] <= 0.97 * held[1]
+}
+
+# Odds of 10^x to 1, written out while they can be read.
+odds <- function(x) {
+  written <- function(v) if (v < 4) format(signif(10^v, 2), big.mark = ",", scientific = FALSE) else paste0("10^", round(v))
+  if (x >= 0) paste(written(x), "to 1 in favour") else paste(written(-x), "to 1 against")
+}
+
+evidence_sentence <- function(row) {
+  sprintf("The evidence for %s is %s: odds of %s (95 %% interval: log10 from %s to %s).", row$mechanism, row$word, odds(row$log10_bf), signed(row$lower95), signed(row$upper95))
+}
+
+sure_sentences <- function(upgrade) {
+  if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
+  trials <- first_trials(upgrade)
+  best <- trials[1, ]
+  needed <- sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval above zero.", sub(" in favour", "", odds(upgrade$control$decisive)))
+  c(evidence_sentence(best), if (is.null(upgrade$named_cause)) needed, probability_sentence(trials), trust_sentence(upgrade, best))
+}
+
+probability_sentence <- function(trials) {
+  all <- stats::setNames(c(trials$probability, max(0, 1 - sum(trials$probability))), c(trials$mechanism, "no change"))
+  all <- sort(all, decreasing = TRUE)
+  near <- all[-1][all[-1] >= 0.01]
+  told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
+  paste0("Of ", nrow(trials), if (nrow(trials) == 1) " mechanism" else " mechanisms", " tried and \"no change\", all equally likely beforehand, ",
+         names(all)[1], " holds ", percent(unname(all[1])), " of the probability",
+         if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
+}
+
+# Whether the numbers behind the first decision can be trusted, in words; if not, whether the decision hangs on it.
+trust_sentence <- function(upgrade, best) {
+  base <- upgrade$models[[1]]$fit$trust
+  if (base$trusted && best$trusted) return("The numbers behind this can be trusted: the sampler passed its own checks.")
+  who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
+  why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
+  sprintf("The numbers are rough for %s%s: read the odds as an order of size. %s", listed(who), why,
+          if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
+          else "The decision may hang on it: more runs or chains would settle it.")
+}
+
+# How large the matter is, beside the noise and on data held out.
+size_note <- function(upgrade) {
+  m <- upgrade$measurements
+  seen <- score_of(upgrade, "calibrate", "rmse")
+  held <- score_of(upgrade, "validate", "rmse")
+  unit <- pretty_unit(m$unit)
+  noise <- sprintf("the stated measurement noise is %s %s", short(m$noise_sd), unit)
+  if (length(seen) < 2) return(sprintf("The model's typical error is %s %s; %s.", short(seen), unit, noise))
+  if (!improves_held_out(upgrade)) {
+    return(sprintf("The change does not improve predictions of data the model has not seen (typical error %s %s before, %s after; %s). Take it as a hint, not as a repair.",
+                   short(held[1]), unit, short(held[2]), noise))
+  }
+  if (anyNA(held)) sprintf("With the change the typical error %s; %s.", change_words(seen[1], seen[2], m$unit), noise)
+  else sprintf("With the change the typical error on data the model has not seen %s; %s.", change_words(held[1], held[2], m$unit), noise)
+}
+
+adopted_models <- function(upgrade) upgrade$models[-1]
+
+change_sentences <- function(upgrade) {
+  adopted <- adopted_models(upgrade)
+  if (!length(adopted)) return("Nothing: the base model stays as it is.")
+  trials <- upgrade$candidates
+  vapply(adopted, function(model) {
+    row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
+    entry <- upgrade$catalogue[[model$mechanism]]
+    sprintf("%s, driven by %s: %s Evidence %s, odds of %s.", model$mechanism, listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf))
+  }, "")
+}
+
+# The parameters that each adopted mechanism brought, as the last model sees them.
+changes_table <- function(upgrade) {
+  models <- upgrade$models
+  last <- parameters_words(models[[length(models)]]$fit)
+  rows <- lapply(seq_along(models)[-1], function(k) {
+    new <- setdiff(names(models[[k]]$fit$emulator$parameters), names(models[[k - 1]]$fit$emulator$parameters))
+    own <- last[last$name %in% new, ]
+    if (nrow(own)) cbind(mechanism = models[[k]]$mechanism, own)
+  })
+  do.call(rbind, rows)
+}
+
+gain_sentences <- function(upgrade) {
+  unit <- upgrade$measurements$unit
+  seen <- score_of(upgrade, "calibrate", "rmse")
+  held <- score_of(upgrade, "validate", "rmse")
+  inside <- score_of(upgrade, if (anyNA(held)) "calibrate" else "validate", "coverage95")
+  inside <- round(100 * inside[length(inside)])
+  told <- function(v) if (length(v) < 2) paste("is", short(v), pretty_unit(unit)) else change_words(v[1], v[2], unit)
+  c(paste0("The typical error (RMSE) ", told(seen), " in calibration", if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
+    if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
+    sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside, if (anyNA(held)) "calibration" else "held-out",
+            if (inside < 88) ": the band is too narrow" else if (inside == 100) ": the band is rather wide" else ""))
+}
+
+remaining_sentences <- function(upgrade) {
+  answers <- significant_conditions(last_attribution(upgrade))
+  rows <- parameter_rows(upgrade$models[[length(upgrade$models)]]$fit)
+  edge <- rows$label[rows$at_edge]
+  c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers)) else "The remaining error answers to no boundary condition.",
+    if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that they make up for something else.", listed(edge))
+    else "No parameter is at the edge of its range.",
+    sprintf("The search stopped because %s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because)))
+}
+
+scores_table <- function(upgrade) {
+  table <- gain_table(upgrade)
+  values <- stats::xtabs(seq_len(nrow(table)) ~ paste(table$panel, table$use, sep = ", ") + table$stage)
+  keys <- unique(paste(table$panel, table$use, sep = ", "))
+  columns <- lapply(levels(table$stage), function(s) as.character(table$label[values[keys, s]]))
+  cbind(score = keys, as.data.frame(stats::setNames(columns, levels(table$stage)), optional = TRUE))
+}
+
+candidates_words <- function(upgrade) {
+  if (is.null(upgrade$candidates)) return(NULL)
+  table <- candidate_table(upgrade)
+  table <- table[order(table$step, -table$log10_bf), ]
+  drives <- vapply(table$mechanism, function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
+  data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives, "log10 Bayes factor" = signed(table$log10_bf),
+             "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)), evidence = table$word,
+             probability = percent(table$probability), estimate = ifelse(table$trusted, "sound", "rough"),
+             decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
+}
+
+parameters_words <- function(fit) {
+  rows <- parameter_rows(fit)
+  data.frame(name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit), median = short(rows$median, 3),
+             "95 % interval" = paste(short(rows$lower95, 3), "to", short(rows$upper95, 3)),
+             "range thought possible" = paste(short(rows$prior_lower, 3), "to", short(rows$prior_upper, 3)),
+             note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
+}
+
+# What each adopted model was computed with.
+method_table <- function(upgrade) {
+  value <- function(model) {
+    fit <- model$fit
+    unit <- pretty_unit(fit$measurements$unit)
+    c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
+      paste(short(fit$measurements$noise_sd), unit), paste(short(fit$emulator$basis$discarded_rms), unit),
+      paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ", signed(fit$interval[2] / log(10)), ")"),
+      fit$trust$verdict)
+  }
+  columns <- lapply(upgrade$models, value)
+  names(columns) <- vapply(upgrade$models, `[[`, "", "name")
+  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M", "stated measurement noise",
+                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)", "sampler"),
+        as.data.frame(columns, optional = TRUE))
+}
+
+#' Write the report of an upgrade
+#'
+#' A self-contained HTML file: first the diagnosis in plain words, then the figures and tables behind it. The R
+#' Markdown template is also offered by RStudio (*Diagnosis of a simulation*).
+#'
+#' @param upgrade An upgrade ([upgrade_model()]).
+#' @param file Name of the HTML file; its folder must exist. The file appears only when it is complete.
+#' @param quiet No messages of R Markdown.
+#' @return `file`, invisibly.
+#' @seealso [summary.amiss_upgrade()] for the words alone, [figures] for the figures alone.
+#' @export
+report <- function(upgrade, file, quiet = TRUE) {
+  check_input(checkmate::check_class(upgrade, "amiss_upgrade"), "upgrade", "It is made by {.fun upgrade_model}.")
+  check_report_file(file)
+  check_report_tools()
+  work <- tempfile("amiss-report-")
+  dir.create(work)
+  on.exit(unlink(work, recursive = TRUE))
+  template <- system.file("rmarkdown", "templates", "diagnosis", "skeleton", "skeleton.Rmd", package = "amiss", mustWork = TRUE)
+  source <- file.path(work, "report.Rmd")
+  file.copy(template, source)
+  made <- rmarkdown::render(source, output_file = "report.html", output_dir = work, intermediates_dir = work, params = list(upgrade = upgrade),
+                            envir = new.env(parent = globalenv()), quiet = quiet)
+  move_into_place(made, file)
+  invisible(file)
+}
+
+check_report_file <- function(file, call = rlang::caller_env()) {
+  check_input(checkmate::check_string(file, min.chars = 1), "file", call = call)
+  folder <- dirname(file)
+  if (!dir.exists(folder)) {
+    abort_input(c("The folder {.file {folder}} of {.arg file} = {.file {file}} does not exist.", i = "Make it with {.fun dir.create}, or choose another."), call = call)
+  }
+  if (dir.exists(file)) abort_input(c("{.arg file} = {.file {file}} is a folder.", i = "Give the name of the HTML file in it."), call = call)
+  if (file.access(folder, 2) != 0) abort_input("The folder {.file {folder}} cannot be written.", call = call)
+}
+
+check_report_tools <- function(call = rlang::caller_env()) {
+  if (!requireNamespace("rmarkdown", quietly = TRUE)) {
+    abort_input(c("A report needs the R package {.pkg rmarkdown}, which is not installed.", i = "Run {.code install.packages(\"rmarkdown\")}."), call = call)
+  }
+  if (!rmarkdown::pandoc_available("2.0")) {
+    abort_input(c("A report needs pandoc 2.0 or later, which was not found.",
+                  i = "Install it (Debian: {.code apt-get install pandoc}; others: {.url https://pandoc.org/installing.html}), or work in RStudio, which brings it."), call = call)
+  }
+}
+
+# Copied beside its destination and renamed: a reader never meets half a file.
+move_into_place <- function(made, file, call = rlang::caller_env()) {
+  part <- tempfile(".amiss-report-", tmpdir = dirname(file))
+  on.exit(unlink(part))
+  if (!file.copy(made, part) || !file.rename(part, file)) abort_input("The report could not be written to {.file {file}}.", call = call)
+}

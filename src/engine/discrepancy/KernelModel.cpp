@@ -1,0 +1,244 @@
+#include "engine/discrepancy/KernelModel.hpp"
+
+#include <algorithm>
+#include <boost/math/special_functions/beta.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "engine/random/transform.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kLogTwoPi = 1.83787706640934548356;
+constexpr double kSmallestTail = 1e-15;  // of Phi; keeps logarithms finite
+constexpr double kLargestRatio = 1e10;   // of discrepancy to noise variance
+constexpr std::uint64_t kFictitious = 64;
+constexpr Index kBlock = 96;  // columns of the covariance built at once
+
+double tail(double x) { return std::max(normal_cdf(x), kSmallestTail); }
+
+// log(p) given both p and 1 - p.
+double log_of(double p, double complement) { return p < 0.5 ? std::log(p) : std::log1p(-complement); }
+
+// Columns of a condition are shifted and divided by the condition's largest range.
+MatrixXd scale_to_unit(const MatrixXd& x, const std::vector<int>& condition) {
+  const Eigen::RowVectorXd range = x.colwise().maxCoeff() - x.colwise().minCoeff();
+  std::vector<double> width(condition.size(), 0.0);
+  for (std::size_t j = 0; j < condition.size(); ++j) {
+    double& own = width[static_cast<std::size_t>(condition[j])];
+    own = std::max(own, range[static_cast<Index>(j)]);
+  }
+  MatrixXd scaled = x.rowwise() - x.colwise().mean();
+  for (std::size_t j = 0; j < condition.size(); ++j) {
+    const double own = width[static_cast<std::size_t>(condition[j])];
+    if (own > 0) scaled.col(static_cast<Index>(j)) /= own;  // else constant: distances are zero
+  }
+  return scaled;
+}
+
+}  // namespace
+
+void BetaPrior::check() const {
+  if (!(a > 0) || !(b > 0) || !std::isfinite(a) || !std::isfinite(b))
+    throw std::invalid_argument("kernel: both shapes of a beta prior must be positive");
+}
+
+double BetaPrior::Quantile::log() const { return log_of(value, complement); }
+
+BetaPrior::Quantile BetaPrior::quantile(double x) const {
+  const double lower = tail(x), upper = tail(-x);
+  Quantile q;
+  if (a == 1.0) {
+    const double log_complement = log_of(upper, lower) / b;
+    q.complement = std::exp(log_complement);
+    q.value = -std::expm1(log_complement);
+  } else if (b == 1.0) {
+    const double log_value = log_of(lower, upper) / a;
+    q.value = std::exp(log_value);
+    q.complement = -std::expm1(log_value);
+  } else if (lower < upper) {
+    q.value = boost::math::ibeta_inv(a, b, lower, &q.complement);
+  } else {
+    q.value = boost::math::ibetac_inv(a, b, upper, &q.complement);
+  }
+  const double least = std::numeric_limits<double>::min();
+  q.value = std::max(q.value, least);
+  q.complement = std::max(q.complement, least);
+  return q;
+}
+
+void NoisePrior::check() const {
+  if (!(sd > 0) || !std::isfinite(sd)) throw std::invalid_argument("noise: sd must be positive");
+  if (!(shape > 0) || !std::isfinite(shape)) throw std::invalid_argument("noise: shape must be positive");
+}
+
+double NoisePrior::precision(double x) const {
+  const double lower = tail(x), upper = tail(-x);
+  const double scaled =
+      lower < upper ? boost::math::gamma_p_inv(shape, lower) : boost::math::gamma_q_inv(shape, upper);
+  return std::max(scaled, std::numeric_limits<double>::min()) / (shape * sd * sd);
+}
+
+void KernelPriors::check() const {
+  alpha.check();
+  t2.check();
+  noise.check();
+}
+
+int KernelData::count() const {
+  return condition.empty() ? 0 : 1 + *std::max_element(condition.begin(), condition.end());
+}
+
+void KernelData::check() const {
+  const Index n = y.size();
+  if (basis.rows() != n || conditions.rows() != n || fictitious.size() != n)
+    throw std::invalid_argument("kernel: lengths differ");
+  if (static_cast<Index>(condition.size()) != conditions.cols())
+    throw std::invalid_argument("kernel: a condition is needed for each column");
+  const int s = count();
+  for (int i = 0; i < s; ++i) {
+    if (std::find(condition.begin(), condition.end(), i) == condition.end())
+      throw std::invalid_argument("kernel: conditions must be numbered 0 ... S-1");
+  }
+  if (!condition.empty() && *std::min_element(condition.begin(), condition.end()) < 0)
+    throw std::invalid_argument("kernel: negative condition");
+  if (basis.cols() >= n)
+    throw std::invalid_argument("kernel: the basis spans the whole record, nothing is left outside it");
+  if (!y.allFinite() || !basis.allFinite() || !conditions.allFinite() || !fictitious.allFinite())
+    throw std::invalid_argument("kernel: every value must be finite");
+}
+
+VectorXd fictitious_condition(Index n, std::uint64_t seed) { return Stream(seed, kFictitious, 0).normals(n); }
+
+KernelModel::KernelModel(KernelData data, KernelPriors priors) : priors_(priors), conditions_(data.count()) {
+  data.check();
+  priors_.check();
+  const Index n = data.y.size(), q = data.basis.cols();
+  condition_ = data.condition;
+  condition_.push_back(conditions_);
+  MatrixXd all(n, data.conditions.cols() + 1);
+  all << data.conditions, data.fictitious;
+  columns_ = scale_to_unit(all, condition_);
+  squares_ = columns_.cwiseAbs2();
+
+  // Columns scaled to unit norm first, so that their very different sizes do not cost accuracy.
+  data.basis.array().rowwise() /= data.basis.colwise().norm().array();
+  const Eigen::HouseholderQR<MatrixXd> qr(data.basis);
+  if (q > 0 && !(qr.matrixQR().diagonal().cwiseAbs().minCoeff() > 1e-10))
+    throw std::invalid_argument("kernel: the columns of the basis are linearly dependent");
+  orthonormal_ = qr.householderQ() * MatrixXd::Identity(n, q);
+  outside_ = data.y - orthonormal_ * (orthonormal_.transpose() * data.y);
+  outside_ -= orthonormal_ * (orthonormal_.transpose() * outside_);
+}
+
+// With B = lambda* A = LL' and W = L^-1 [O, Hv]: O'B^-1 O = RR' and the coordinates of the projection.
+struct KernelModel::Factor {
+  MatrixXd b;        // B, then L in its lower triangle
+  MatrixXd half;     // N x (Q+1): L^-1 [O, Hv]
+  MatrixXd root;     // Q x Q: R, lower
+  VectorXd project;  // Q: R^-1 O'B^-1 Hv
+  double log_det = 0.0;
+  double quadratic = 0.0;  // of B
+};
+
+bool KernelModel::factorise(const KernelParameters& p, Factor& work) const {
+  const double ratio = p.amplitude * p.lambda;
+  if (!(ratio <= kLargestRatio)) return false;
+  const Index n = size(), q = orthonormal_.cols(), c = columns_.cols();
+  VectorXd decay(c);
+  for (Index j = 0; j < c; ++j) decay[j] = p.decay[condition_[static_cast<std::size_t>(j)]];
+
+  // log(ratio) - sum_s decay_s (x_is - x_js)^2 = left_i'right_j, one product; only the lower triangle is
+  // made.
+  MatrixXd left(n, c + 2), right(n, c + 2);
+  left.leftCols(c) = columns_ * (2.0 * decay).asDiagonal();
+  left.col(c) = -(squares_ * decay);
+  left.col(c + 1).setOnes();
+  right.leftCols(c) = columns_;
+  right.col(c).setOnes();
+  right.col(c + 1) = left.col(c).array() + std::log(ratio);
+  work.b.resize(n, n);
+  for (Index j = 0; j < n; j += kBlock) {
+    const Index width = std::min(kBlock, n - j);
+    auto block = work.b.block(j, j, n - j, width);
+    block.noalias() = left.bottomRows(n - j) * right.middleRows(j, width).transpose();
+    block.array() = block.array().exp();
+  }
+  work.b.diagonal().setConstant(1.0 + ratio);
+
+  const Eigen::LLT<Eigen::Ref<MatrixXd>, Eigen::Lower> factor(work.b);
+  if (factor.info() != Eigen::Success) return false;
+  work.half.resize(n, q + 1);
+  work.half << orthonormal_, outside_;
+  factor.matrixL().solveInPlace(work.half);
+  const MatrixXd gram = work.half.leftCols(q).transpose() * work.half.leftCols(q);
+  const Eigen::LLT<MatrixXd, Eigen::Lower> small(gram);
+  if (q > 0 && small.info() != Eigen::Success) return false;
+  work.root = small.matrixL();
+  work.project = work.half.leftCols(q).transpose() * work.half.col(q);
+  if (q > 0) small.matrixL().solveInPlace(work.project);
+  work.log_det = 2.0 * (work.b.diagonal().array().log().sum() + work.root.diagonal().array().log().sum());
+  work.quadratic = work.half.col(q).squaredNorm() - work.project.squaredNorm();
+  return true;
+}
+
+double KernelModel::log_likelihood(const KernelParameters& parameters) const {
+  return log_likelihood(std::vector<KernelParameters>{parameters})[0];
+}
+
+// |H'AH| = lambda*^-(N-Q) |H'BH|.
+VectorXd KernelModel::log_likelihood(const std::vector<KernelParameters>& points) const {
+  const double n = static_cast<double>(size() - orthonormal_.cols());
+  VectorXd values(static_cast<Index>(points.size()));
+  Factor work;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double lambda = points[i].lambda;
+    values[static_cast<Index>(i)] =
+        factorise(points[i], work)
+            ? -0.5 * (n * (kLogTwoPi - std::log(lambda)) + work.log_det + lambda * work.quadratic)
+            : -std::numeric_limits<double>::infinity();
+  }
+  return values;
+}
+
+// H'zeta H (H'AH)^-1 v = v - (H'BH)^-1 v, and H (H'BH)^-1 v = B^-1 (Hv - O beta), beta = (O'B^-1 O)^-1 O'B^-1
+// Hv.
+VectorXd KernelModel::discrepancy(const KernelParameters& parameters) const {
+  Factor work;
+  if (!factorise(parameters, work))
+    throw std::runtime_error("kernel: covariance of the discrepancy is not positive definite");
+  const Index q = orthonormal_.cols();
+  const VectorXd beta = work.root.transpose().triangularView<Eigen::Upper>().solve(work.project);
+  VectorXd rest = work.half.col(q) - work.half.leftCols(q) * beta;
+  work.b.triangularView<Eigen::Lower>().transpose().solveInPlace(rest);
+  return outside_ - rest;
+}
+
+KernelParameters KernelTarget::parameters(const VectorXd& x) const {
+  const KernelPriors& priors = model_.priors();
+  const Index s = model_.conditions() + 1;
+  KernelParameters p;
+  p.decay.resize(s);
+  for (Index i = 0; i < s; ++i) p.decay[i] = -4.0 * priors.alpha.quantile(x[i]).log();
+  const BetaPrior::Quantile t2 = priors.t2.quantile(x[s]);
+  p.amplitude = t2.complement / t2.value;
+  p.lambda = priors.noise.precision(x[s + 1]);
+  return p;
+}
+
+VectorXd KernelTarget::log_likelihood(const MatrixXd& x) const {
+  std::vector<KernelParameters> points;
+  points.reserve(static_cast<std::size_t>(x.cols()));
+  for (Index i = 0; i < x.cols(); ++i) points.push_back(parameters(x.col(i)));
+  return model_.log_likelihood(points);
+}
+
+}  // namespace amiss

@@ -1,0 +1,52 @@
+test_that("calibration finds the parameters and says so", {
+  fit <- linear_fit()
+  table <- tidy(fit)
+  expect_true(all(table$lower95 < c(20, 0.4) & table$upper95 > c(20, 0.4)))
+  expect_true(fit$trust$trusted)
+  expect_equal(sd(residuals(fit)), 0.1, tolerance = 0.15)  # of 240 values: standard error 5 %
+})
+
+test_that("same seed, one or two threads: same bits", {
+  m <- linear_measurements()
+  expect_identical(linear_fit(m, threads = 1)[c("values", "log_evidence")], linear_fit(m, threads = 2)[c("values", "log_evidence")])
+})
+
+test_that("validation rows are never touched by calibration", {
+  data <- linear_data()
+  use <- list(calibrate = data$hour <= 160, validate = data$hour > 160)
+  m <- do.call(linear_measurements, c(list(data), use))
+  data$Ti[use$validate] <- 1e3 * rnorm(80)
+  spoilt <- do.call(linear_measurements, c(list(data), use))
+  a <- linear_fit(m)
+  b <- linear_fit(spoilt)
+  expect_identical(b$values, a$values)
+  expect_identical(b$log_evidence, a$log_evidence)
+  expect_identical(attribute_discrepancy(b, list(surrogates = 19), seed = 1)$table, attribute_discrepancy(a, list(surrogates = 19), seed = 1)$table)
+})
+
+test_that("the evidence does not depend on the unit of time or of a boundary condition, and transforms with the target's", {
+  data <- linear_data()
+  a <- linear_fit(linear_measurements(data))
+  other <- data
+  other$Gv <- other$Gv / 1000
+  expect_equal(linear_fit(linear_measurements(other))$log_evidence, a$log_evidence, tolerance = 1e-6)
+})
+
+test_that("options are checked", {
+  m <- linear_measurements()
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
+  expect_error(calibrate(emulator, m, list(chains = 3)), "unknown option", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1), "chains >= 4", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(confidence = 3)), "confidence", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, threads = 0), "threads", class = "amiss_error_input")
+  shorter <- linear_measurements(linear_data()[1:100, ])
+  expect_error(calibrate(emulator, shorter), "240 steps.*100", class = "amiss_error_input")
+})
+
+test_that("a Bayes factor needs one record", {
+  a <- linear_fit()
+  b <- linear_fit(linear_measurements(linear_data(seed = 12)))
+  expect_error(bayes_factor(a, b), "different records", class = "amiss_error_input")
+  expect_equal(bayes_factor(a, a)$log10_bf, 0)
+  expect_equal(amiss:::evidence_word(c(-1, 0.2, 0.7, 1.5, 3)), c("negative", "weak", "substantial", "strong", "decisive"))
+})

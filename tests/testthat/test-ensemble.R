@@ -1,0 +1,41 @@
+test_that("runs made elsewhere give the same as runs made here", {
+  m <- linear_measurements()
+  here <- simulate_design(linear_simulator(), m, runs = 30, seed = 3)
+  there <- ensemble(here$values, here$outputs, linear_simulator()$parameters)
+  expect_equal(there$unit, here$unit, tolerance = 1e-12)
+  a <- calibrate(train_emulator(here, m), m, quick_ais, seed = 1)
+  b <- calibrate(train_emulator(there, m), m, quick_ais, seed = 1)
+  expect_equal(b$log_evidence, a$log_evidence, tolerance = 1e-6)
+  expect_error(predict(b), "made elsewhere", class = "amiss_error_input")
+})
+
+test_that("bad runs are refused or left out with a word", {
+  m <- linear_measurements()
+  make <- function(f) function_simulator(f, free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
+  expect_error(simulate_design(make(function(v, d) 1:3), m, 20), "returned 3 values", class = "amiss_error_input")
+  sometimes <- make(function(v, d) if (v[["offset"]] > 25) rep(NaN, nrow(d)) else v[["offset"]] + v[["gain"]] * d[, "Te"])
+  expect_warning(e <- simulate_design(sometimes, m, 40, seed = 1), "not finite.*left out", class = "amiss_warning_input")
+  expect_equal(ncol(e$outputs) + e$failed, 40)
+  expect_error(simulate_design(make(function(v, d) rep(NaN, nrow(d))), m, 20), "40|20 runs hold values", class = "amiss_error_input")
+  expect_error(simulate_design(linear_simulator(), m, runs = 3), "too few", class = "amiss_error_input")
+  expect_error(simulate_design("a model", m), "no simulator", class = "amiss_error_input")
+  wrong <- function_simulator(function(v, d) d[, 1], free("a", uniform(0, 1)), boundary = "humidity")
+  expect_error(simulate_design(wrong, m), "humidity.*do not have", class = "amiss_error_input")
+  e <- simulate_design(linear_simulator(), m, runs = 30, seed = 3)
+  expect_error(ensemble(e$values, e$outputs[, -1]), "needs its run", class = "amiss_error_input")
+  expect_error(ensemble(e$values, e$outputs, list(free("offset", uniform(100, 200)), free("gain", uniform(0, 1)))),
+               "No run lies where the prior", class = "amiss_error_input")
+})
+
+test_that("the design follows its seed and leaves R's generator alone", {
+  m <- linear_measurements()
+  set.seed(1)
+  before <- .Random.seed
+  a <- simulate_design(linear_simulator(), m, 20, seed = 5)
+  expect_identical(.Random.seed, before)
+  expect_identical(simulate_design(linear_simulator(), m, 20, seed = 5)$values, a$values)
+  set.seed(2)
+  b <- simulate_design(linear_simulator(), m, 20)
+  set.seed(2)
+  expect_identical(simulate_design(linear_simulator(), m, 20)$values, b$values)
+})

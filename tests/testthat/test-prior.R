@@ -1,0 +1,23 @@
+test_that("quantile and distribution function are inverse, truncated or not", {
+  u <- c(0.001, 0.2, 0.5, 0.9, 0.999)
+  for (prior in list(uniform(2, 5), normal(1, 2), normal(1, 2, lower = 0), lognormal(0, 0.5, upper = 2),
+                     beta_prior(2, 3, 1, 4), triangular(0, 1, 5), triangular(0, 0, 1))) {
+    expect_equal(amiss:::prior_cdf(prior, amiss:::prior_quantile(prior, u)), u, tolerance = 1e-8)
+    expect_true(all(diff(amiss:::prior_quantile(prior, u)) > 0))
+  }
+})
+
+test_that("a truncated normal agrees with its closed form", {
+  prior <- normal(0, 1, lower = 0.5, upper = 2)
+  expect_equal(amiss:::prior_cdf(prior, 1), (pnorm(1) - pnorm(0.5)) / (pnorm(2) - pnorm(0.5)))
+})
+
+test_that("impossible priors are refused", {
+  expect_error(uniform(2, 1), "lower < upper", class = "amiss_error_input")
+  expect_error(uniform(1, 1), "lower < upper", class = "amiss_error_input")
+  expect_error(uniform(0, Inf), "finite limits", class = "amiss_error_input")
+  expect_error(normal(0, -1), class = "amiss_error_input")
+  expect_error(normal(0, 1, lower = 50), "no mass", class = "amiss_error_input")
+  expect_error(triangular(0, 6, 5), "mode", class = "amiss_error_input")
+  expect_error(free("a", 3), "prior", class = "amiss_error_input")
+})
