@@ -128,9 +128,7 @@ figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {
   ggplot2::labs(title = wrap(title, 72), subtitle = wrap(subtitle, 92), x = x, y = y)
 }
 
-stage_scales <- function() {
-  list(ggplot2::scale_colour_manual(values = stage_colours, aesthetics = c("colour", "fill")))
-}
+stage_scales <- function() ggplot2::scale_colour_manual(values = stage_colours, aesthetics = c("colour", "fill"))
 
 # Reads 2 and 500 on one axis, either side of zero.
 signed_log_axis <- function(name, values, extra = NULL) {
@@ -149,9 +147,10 @@ axis_label <- function(name, unit) ifelse(nzchar(unit), paste0(name, " [", prett
 # Temperatures whose differences are in K are themselves recorded in degrees Celsius, unless they are far above.
 level_unit <- function(unit, values) if (identical(unit, "K") && max(values, na.rm = TRUE) < 150) "\u00b0C" else unit
 
-# Two significant digits, never in powers of ten unless very far from one.
+# A few significant digits, not in powers of ten unless very far from one.
 short <- function(x, digits = 2) {
-  text <- ifelse(abs(x) >= 1e5 | (abs(x) < 1e-4 & x != 0), format_each(signif(x, digits)), formatC(x, digits = digits, format = "fg", flag = "#"))
+  far <- abs(x) >= 1e7 | (abs(x) < 1e-4 & x != 0)
+  text <- ifelse(far, format_each(signif(x, digits)), formatC(signif(x, digits), digits = digits, format = "fg", flag = "#", big.mark = ","))
   ifelse(is.na(x), "\u2013", sub("\\.$", "", text))
 }
 
@@ -240,16 +239,16 @@ figure_fit <- function(upgrade) {
   measured <- table[table$stage == levels(table$stage)[1], ]
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time)) +
     ggplot2::geom_hline(ggplot2::aes(yintercept = 0), in_panel(2, data.frame(zero = 0)), colour = "grey40") +
-    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$stage, group = paste(.data$stage, .data$part)),
+    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$stage, group = interaction(.data$stage, .data$part)),
                          in_panel(1, table), alpha = 0.18) +
     ggplot2::geom_line(ggplot2::aes(y = .data$observed, group = .data$part), in_panel(1, measured), colour = "grey15", linewidth = 1.5) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$stage, group = paste(.data$stage, .data$part)),
+    ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$stage, group = interaction(.data$stage, .data$part)),
                        in_panel(1, table), linewidth = 0.7) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$residual, colour = .data$stage, group = paste(.data$stage, .data$part)),
+    ggplot2::geom_line(ggplot2::aes(y = .data$residual, colour = .data$stage, group = interaction(.data$stage, .data$part)),
                        in_panel(2, table), linewidth = 0.7) +
     ggplot2::facet_grid(panel ~ use, scales = "free", space = "free_x", switch = "y") +
     stage_scales() +
-    figure_titles(fit_title(upgrade), "Above, black: measured; coloured: simulated, with the band that should hold 95 % of the measurements. Below: error = measured \u2212 simulated.",
+    figure_titles(fit_title(upgrade), "Above, black: measured; coloured: simulated, with the band that should hold 95 % of the measurements. Below: error = measured - simulated.",
                   x = time_label(table$time)) +
     time_axis(table$time) + figure_theme()
   with_height(figure, 6.4)
@@ -331,7 +330,7 @@ figure_candidates <- function(upgrade) {
   with_height(figure, 2.4 + 0.31 * nrow(table) + 0.5 * nlevels(table$panel))
 }
 
-signed <- function(x) sub("^-", "\u2212", ifelse(abs(x) < 9.95, sprintf("%+.1f", x), sprintf("%+.0f", x)))
+signed <- function(x) ifelse(abs(x) < 9.95, sprintf("%+.1f", x), sprintf("%+.0f", x))
 
 # Parameters of a calibration with their priors; `at_edge` where the median lies in the outer 5 % of the prior.
 parameter_rows <- function(fit) {
@@ -404,7 +403,7 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
     leading_layer(leading, table, panels) +
     ggplot2::facet_grid(panel ~ ., scales = "free_y", switch = "y") +
     stage_scales() +
-    figure_titles(discrepancy_title(table), paste0("Grey: measured \u2212 simulated. Coloured: the part that no parameter can reach and that answers to boundary conditions, with 95 % band.",
+    figure_titles(discrepancy_title(table), paste0("Grey: measured - simulated. Coloured: the part that no parameter can reach and that answers to boundary conditions, with 95 % band.",
                                                    if (!is.null(leading)) paste0(" Below: ", leading$name, ", which leads.")), x = time_label(table$time)) +
     time_axis(table$time) + figure_theme() + ggplot2::theme(legend.position = "none")
   with_height(figure, 1.8 + 1.9 * length(panels))
@@ -442,7 +441,7 @@ figure_response <- function(upgrade, classes = 10) {
     ggplot2::geom_point(size = 3.6) +
     stage_scales() +
     figure_titles(response_title(binned, leading$name), paste0("Small points: every time step. Large points: means over classes of ", leading$name, "."),
-                  x = leading$name, y = axis_label("measured \u2212 simulated", m$unit)) +
+                  x = leading$name, y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 5)
 }
@@ -519,7 +518,7 @@ figure_mean_day <- function(upgrade) {
     ggplot2::facet_wrap(ggplot2::vars(.data$use)) +
     stage_scales() +
     figure_titles(mean_day_title(binned, m$unit), "Lines: mean of all days. Bands: eight days of ten.", x = "hour of day",
-                  y = axis_label("measured \u2212 simulated", m$unit)) +
+                  y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 4.6)
 }

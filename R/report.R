@@ -74,14 +74,17 @@ improves_held_out <- function(upgrade) {
   length(held) < 2 || anyNA(held) || held[2] <= 0.97 * held[1]
 }
 
-# Odds of 10^x to 1, written out while they can be read.
-odds <- function(x) {
-  written <- function(v) if (v < 4) format(signif(10^v, 2), big.mark = ",", scientific = FALSE) else paste0("10^", round(v))
-  if (x >= 0) paste(written(x), "to 1 in favour") else paste(written(-x), "to 1 against")
-}
+# 10^x written out while it can be read.
+power_of_ten <- function(x) ifelse(x < 4.5, format_each_comma(signif(10^x, 2)), paste0("10^", round(x)))
+
+format_each_comma <- function(x) vapply(x, format, "", big.mark = ",", scientific = FALSE)
+
+odds <- function(x) paste(power_of_ten(abs(x)), if (x >= 0) "to 1 in favour" else "to 1 against")
 
 evidence_sentence <- function(row) {
-  sprintf("The evidence for %s is %s: odds of %s (95 %% interval: log10 from %s to %s).", row$mechanism, row$word, odds(row$log10_bf), signed(row$lower95), signed(row$upper95))
+  interval <- c(row$lower95, row$upper95)
+  told <- if (interval[1] >= 0) paste(power_of_ten(interval), collapse = " to ") else paste("log10 of the odds from", paste(signed(interval), collapse = " to "))
+  sprintf("The evidence for %s is %s: odds of %s (95 %% interval: %s).", row$mechanism, row$word, odds(row$log10_bf), told)
 }
 
 sure_sentences <- function(upgrade) {

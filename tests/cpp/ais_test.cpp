@@ -60,7 +60,7 @@ TEST(SampleAis, EvidenceOfLinearGaussianModels) {
     EXPECT_TRUE(result.trusted) << result.verdict;
     expect_evidence(result, model.log_evidence());
     EXPECT_LT(std::abs(result.annealed - model.log_evidence()), 4 * result.annealed_se + 0.05) << d;
-    EXPECT_LT(std::abs(result.importance - model.log_evidence()), 4 * result.importance_se + 0.02) << d;
+    EXPECT_LT(std::abs(result.second - model.log_evidence()), 4 * result.second_se + 0.02) << d;
   }
 }
 
@@ -125,7 +125,10 @@ TEST(SampleAis, LadderRisesToOneAndFlatLikelihoodNeedsOneStep) {
     EXPECT_GT(level.ess, 0.2);
   }
   EXPECT_EQ(beta, 1.0);
-  const AisResult flat = sample_ais(FunctionTarget(3, [](const VectorXd&) { return -2.5; }), {}, seeded(7));
+  AisOptions annealed_only;
+  annealed_only.importance_draws = 0;
+  const AisResult flat =
+      sample_ais(FunctionTarget(3, [](const VectorXd&) { return -2.5; }), annealed_only, seeded(7));
   EXPECT_EQ(flat.ladder.size(), 1u);
   EXPECT_NEAR(flat.annealed, -2.5, 1e-12);
   EXPECT_NEAR(flat.ess, static_cast<double>(flat.weights.size()), 1e-6);
@@ -139,7 +142,7 @@ TEST(SampleAis, PlainAisWithoutResamplingIsRightOnAnEasyTarget) {
   options.importance_draws = 0;
   const AisResult result = sample_ais(model.target(), options, seeded(8));
   EXPECT_EQ(result.estimator, "annealed");
-  EXPECT_TRUE(std::isnan(result.importance));
+  EXPECT_TRUE(std::isnan(result.second));
   expect_evidence(result, model.log_evidence(), 0.3);
   EXPECT_GT(result.weights.maxCoeff(), result.weights.minCoeff());
   EXPECT_LT((result.draws * result.weights - model.mean()).cwiseAbs().maxCoeff(), 0.3);
@@ -281,15 +284,12 @@ TEST(AisOptions, RefusesImpossibleValues) {
   for (auto spoil :
        {+[](AisOptions& o) { o.groups = 1; }, +[](AisOptions& o) { o.chains = 3; },
         +[](AisOptions& o) { o.sweeps = 0; }, +[](AisOptions& o) { o.ess_drop = 1.0; },
-        +[](AisOptions& o) { o.importance_draws = -1; }, +[](AisOptions& o) { o.max_components = 0; }}) {
+        +[](AisOptions& o) { o.importance_draws = -1; }, +[](AisOptions& o) { o.importance_draws = 1; },
+        +[](AisOptions& o) { o.max_components = 0; }}) {
     AisOptions options;
     spoil(options);
     EXPECT_THROW(sample_ais(flat, options, Context()), std::invalid_argument);
   }
-  AisOptions one_importance_draw;  // its standard error is 0 / 0
-  one_importance_draw.importance_draws = 1;
-  const AisResult result = sample_ais(flat, one_importance_draw, Context());
-  EXPECT_FALSE(std::isnan(result.standard_error));
 }
 
 // -- Student t

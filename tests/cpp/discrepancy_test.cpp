@@ -240,6 +240,9 @@ TEST(HistoryModel, RefusesDataThatDoNotFit) {
   HistoryPriors priors = make_priors();
   priors.noise_sd = 0.0;
   EXPECT_THROW(HistoryModel(make_data(), priors, Context()), std::invalid_argument);
+  priors = make_priors();
+  priors.inclusion = 0.0;
+  EXPECT_THROW(HistoryModel(make_data(), priors, Context()), std::invalid_argument);
 }
 
 TEST(HistoryTarget, CoordinatesMapToThePriorsQuantiles) {
@@ -252,14 +255,18 @@ TEST(HistoryTarget, CoordinatesMapToThePriorsQuantiles) {
       priors.noise_shape, 1 / (priors.noise_shape * priors.noise_sd * priors.noise_sd));
   const boost::math::cauchy cauchy(0.0, priors.amplitude);
   const boost::math::normal normal;
-  for (double u : {0.03, 0.5, 0.9}) {
+  for (double u : {0.03, 0.5, 0.9, 0.99}) {
     const HistoryParameters point = target.parameters(VectorXd::Constant(5, quantile(normal, u)));
     EXPECT_NEAR(cdf(precision, 1.0 / point.variance), u, 1e-9);
-    for (int s : {0, 2}) EXPECT_NEAR(2 * cdf(cauchy, std::sqrt(point.t[s])) - 1, u, 1e-9) << s;
+    // With probability 1 - inclusion t = 0; else the half-Cauchy distribution.
+    const double in_slab = (u - (1 - priors.inclusion)) / priors.inclusion;
+    for (int s : {0, 2})
+      EXPECT_NEAR(2 * cdf(cauchy, std::sqrt(point.t[s])) - 1, std::max(0.0, in_slab), 1e-9) << s;
     EXPECT_EQ(point.t[1], 0.0);
   }
-  const HistoryParameters median = target.parameters(VectorXd::Zero(5));
-  EXPECT_NEAR(median.t[0], priors.amplitude * priors.amplitude, 1e-12);
+  // The likelihood is continuous where the slab begins: t rises from zero.
+  const double edge = quantile(normal, 1 - priors.inclusion);
+  EXPECT_LT(target.parameters(VectorXd::Constant(5, edge + 1e-6)).t[0], 1e-8);
 }
 
 TEST(HistoryTarget, ErrorComponentsChooseTheirOwnRatio) {

@@ -423,8 +423,10 @@ void AisOptions::check() const {
     throw std::invalid_argument("ais: need pilot_chains >= 8, groups >= 2, chains >= 4");
   if (sweeps < 1) throw std::invalid_argument("ais: sweeps must be positive");
   if (!(ess_drop > 0 && ess_drop < 1)) throw std::invalid_argument("ais: ess_drop must lie in (0, 1)");
-  if (importance_draws < 0 || max_components < 1 || max_temperatures < 1)
-    throw std::invalid_argument("ais: negative size");
+  if (importance_draws != 0 && importance_draws < 50) {
+    throw std::invalid_argument("ais: importance_draws must be 0 (none) or at least 50");
+  }
+  if (max_components < 1 || max_temperatures < 1) throw std::invalid_argument("ais: negative size");
 }
 
 AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context) {

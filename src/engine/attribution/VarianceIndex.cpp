@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kTrace = 1e-10;  // of the noise: what the low rank may leave out
+constexpr double kTrace = 1e-8;  // of the noise: what the low rank may leave out
 
 // L of exp(-|x_i - x_j|^2) ~ LL' by pivoted Cholesky, until the trace left is below `tolerance`.
 MatrixXd pivoted_root(const MatrixXd& x, double tolerance) {
@@ -27,7 +27,7 @@ MatrixXd pivoted_root(const MatrixXd& x, double tolerance) {
   while (r < n) {
     Index pivot = 0;
     const double largest = left.maxCoeff(&pivot);
-    if (left.sum() <= tolerance || largest <= 1e-15) break;
+    if (left.sum() <= tolerance || largest <= 1e-14) break;
     if (r == root.cols()) root.conservativeResize(n, std::min(n, 2 * r));
     const VectorXd squares = (x.rowwise() - x.row(pivot)).rowwise().squaredNorm();
     VectorXd column = (-squares).array().exp();

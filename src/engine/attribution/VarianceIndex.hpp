@@ -25,7 +25,7 @@ Interval highest_density_interval(const Eigen::VectorXd& values, const Eigen::Ve
 /// need not add up.
 ///
 /// A covariance of one condition is smooth in one or two numbers, so of low rank r: zeta_s = amplitude * LL'
-/// by pivoted Cholesky, to a trace of 1e-10 of the noise; cost N r^2.
+/// by pivoted Cholesky, to a trace of 1e-8 of the noise; cost N r^2.
 Eigen::VectorXd variance_shares(const KernelModel& model, const KernelParameters& parameters);
 
 /// The paper's attribution: R~2_s = R2_s - R2_0 over the draws of posterior (6).

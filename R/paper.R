@@ -1,0 +1,141 @@
+paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1), t2 = c(1, 1), fictitious_seed = NULL,
+                      probability = 0.95, ais = list())
+
+#' Calibrate a simulator as in the paper
+#'
+#' The method of Monari (2022) as it stands, beside the package's own ([calibrate()], [attribute_discrepancy()]): the
+#' parameters from the measurement's coefficients on the basis (equation 5), the discrepancy as a Gaussian process over
+#' the boundary conditions of the same time step (equation 6), both by annealed importance sampling, and the variance
+#' index of each condition. It knows neither the history of the conditions nor autocorrelated errors.
+#'
+#' *Evidence.* The product of the normalising constants of (5) and (6), with the Jacobian `|K'K|^(-1/2)`, is a density
+#' of the calibration record, so that models with different bases may be compared. The precision `lambda*` of the noise
+#' is one quantity, but is drawn once for each basis vector and once for the discrepancy, as in the paper: the product
+#' is the evidence of a model with as many independent noises. `shared_lambda` draws it once for all basis vectors;
+#' [calibrate()] draws it once.
+#'
+#' *Variance index.* `R2_s` is the variance of the discrepancy predicted from condition s alone over the variance of
+#' the discrepancy; `R2_0` that of a fictitious condition, white noise; `difference` = `R2_s - R2_0`. A condition is
+#' significant if 0 lies outside the highest-density interval of the difference. An interval below 0 means that it
+#' explains less than white noise does; its rank shows that.
+#'
+#' The prior of the discrepancy's variance, `(1 - t2) / t2` with `t2` uniform, has its median at 1 in the target's unit
+#' squared: unlike [calibrate()]'s, the evidence depends on that unit beyond the change of density.
+#'
+#' The cost of a likelihood grows with N^3: this is for records of up to about 1000 steps.
+#'
+#' @inheritParams calibrate
+#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
+#'   `shared_lambda` (one noise precision for all basis vectors; `FALSE`), `alpha` and `t2` (the two shapes of their
+#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `fictitious_seed` (of the white noise; default the seed), `probability` of
+#'   the highest-density intervals (0.95), and `ais`, a list for the sampler as in [calibrate()].
+#' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of the parameters),
+#'   `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of equations 5 and 6 and the total),
+#'   `hyperparameters` (draws of `alpha`, the fictitious condition last, `t2`, `lambda` and their weights), `lambda`
+#'   (draws of the precisions of equation 5), `index` (ranked table), `share` (draws of `R2`), `trust`, and `inside` and
+#'   `outside`, all that the sampler said of (5) and (6). `tidy()` gives the table of the index, `coef()` the medians of
+#'   the parameters.
+#' @examples
+#' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
+#' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)
+#' house <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, house, runs = 12, seed = 1)
+#' calibrate_paper(train_emulator(runs, house), house, seed = 1,
+#'                 control = list(ais = list(pilot_chains = 48, groups = 4)))
+#' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models with
+#'   high-dimensional outputs and boundary conditions.
+#' @export
+calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
+  check_input(checkmate::check_class(emulator, "amiss_emulator"), "emulator")
+  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  seed <- pick_seed(seed)
+  threads <- check_threads(threads)
+  rows <- used_rows(measurements, "calibrate")
+  if (nrow(emulator$basis$vectors) != length(rows)) {
+    abort_input(c("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have {length(rows)} calibration rows.",
+                  i = "Train it on runs at exactly these rows."))
+  }
+  control <- fill_paper_control(control, length(rows), seed)
+  data <- paper_data(emulator, measurements, rows, control)
+  priors <- list(alpha = control$alpha, t2 = control$t2, noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence)
+  result <- call_engine(calibrate_paper_(data, priors, emulator$processes, control, engine_context(seed, threads)))
+  inside <- result$inside
+  outside <- result$outside
+  evidence <- paper_evidence(inside, outside)
+  conditions <- measurements$conditions
+  hyperparameters <- c(outside$hyperparameters, list(weights = outside$weights))
+  colnames(hyperparameters$alpha) <- c(conditions, "(fictitious)")
+  colnames(result$index$share) <- c(conditions, "(fictitious)")
+  structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
+                 seed = seed, rows = rows, priors = priors, values = unit_to_values(inside$unit, emulator$parameters),
+                 weights = inside$weights, lambda = inside$lambda, hyperparameters = hyperparameters,
+                 evidence = evidence, log_evidence = evidence$log_evidence[3], standard_error = evidence$standard_error[3],
+                 interval = c(evidence$lower95[3], evidence$upper95[3]), log_jacobian = result$log_jacobian,
+                 trust = trust(outside, inside), index = index_table(result$index, conditions), share = result$index$share,
+                 inside = inside, outside = outside), class = "amiss_paper_calibration")
+}
+
+fill_paper_control <- function(control, n, seed, call = rlang::caller_env()) {
+  control <- merge_control(paper_control, control, call = call)
+  control$ais <- merge_control(ais_control, control$ais, "control$ais", call = call)
+  if (is.null(control$confidence)) control["confidence"] <- 2 / n
+  if (is.null(control$fictitious_seed)) control["fictitious_seed"] <- seed
+  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",
+              "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
+  check_input(checkmate::check_flag(control$shared_lambda), "control$shared_lambda", call = call)
+  for (prior in c("alpha", "t2")) {
+    check_input(checkmate::check_numeric(control[[prior]], lower = 1e-6, finite = TRUE, len = 2, any.missing = FALSE), paste0("control$", prior),
+                "Give the two shapes of a beta distribution.", call = call)
+  }
+  check_input(checkmate::check_number(control$fictitious_seed, lower = 0, upper = 2^53), "control$fictitious_seed", call = call)
+  check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999), "control$probability", call = call)
+  control
+}
+
+paper_data <- function(emulator, measurements, rows, control) {
+  list(y = measurements$y[rows], basis = emulator$basis$vectors, conditions = measurements$boundary[rows, , drop = FALSE],
+       condition = measurements$condition - 1L, fictitious_seed = control$fictitious_seed)
+}
+
+# The two runs are independent: their errors add as squares, each side of the interval on its own.
+paper_evidence <- function(inside, outside) {
+  value <- c(inside$log_evidence, outside$log_evidence)
+  error <- c(inside$standard_error, outside$standard_error)
+  interval <- rbind(inside$interval, outside$interval)
+  lower <- c(interval[, 1], sum(value) - sqrt(sum((value - interval[, 1])^2)))
+  upper <- c(interval[, 2], sum(value) + sqrt(sum((interval[, 2] - value)^2)))
+  data.frame(part = c("parameters (5)", "discrepancy (6)", "total"), log_evidence = c(value, sum(value)),
+             standard_error = c(error, sqrt(sum(error^2))), lower95 = lower, upper95 = upper,
+             trusted = c(inside$trusted, outside$trusted, inside$trusted && outside$trusted))
+}
+
+index_table <- function(index, conditions) {
+  table <- data.frame(boundary = conditions, difference = index$median, mean = index$mean, lower95 = index$lower,
+                      upper95 = index$upper, significant = as.logical(index$significant), rank = as.integer(index$rank))
+  table <- table[order(table$rank), ]
+  rownames(table) <- NULL
+  table
+}
+
+#' @export
+print.amiss_paper_calibration <- function(x, ...) {
+  ten <- log(10)
+  cli::cli_text("{.strong Calibration as in the paper} on {length(x$rows)} rows of {.val {x$measurements$name}}")
+  cli::cli_text("log10 evidence {round(x$log_evidence / ten, 2)} [{round(x$interval[1] / ten, 2)}, {round(x$interval[2] / ten, 2)}] = {round(x$evidence$log_evidence[1] / ten, 2)} (5) + {round(x$evidence$log_evidence[2] / ten, 2)} (6), {x$trust$verdict}")
+  print(parameter_table(x), digits = 3, row.names = FALSE)
+  cli::cli_text("variance index of the boundary conditions over that of white noise")
+  print(x$index, digits = 3, row.names = FALSE)
+  cli::cli_bullets(c(">" = "next: {.fun calibrate} and {.fun attribute_discrepancy}, which know the history of the conditions"))
+  invisible(x)
+}
+
+#' @export
+coef.amiss_paper_calibration <- function(object, ...) coef.amiss_calibration(object, ...)
+
+#' @export
+logLik.amiss_paper_calibration <- function(object, ...) logLik.amiss_calibration(object, ...)
+
+#' @export
+tidy.amiss_paper_calibration <- function(x, ...) x$index

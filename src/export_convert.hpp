@@ -1,0 +1,63 @@
+// Conversions that several export files share. Include after RcppEigen.h.
+#pragma once
+#include <RcppEigen.h>
+
+#include "engine/ais/Sampler.hpp"
+#include "engine/emulator/Emulator.hpp"
+
+namespace amiss::convert {
+
+inline Context context(const Rcpp::List& list) {
+  Context out;
+  out.seed = static_cast<std::uint64_t>(Rcpp::as<double>(list["seed"]));
+  out.threads = Rcpp::as<int>(list["threads"]);
+  out.poll = [] { Rcpp::checkUserInterrupt(); };
+  return out;
+}
+
+inline AisOptions ais_options(const Rcpp::List& control) {
+  AisOptions options;
+  options.pilot_chains = control["pilot_chains"];
+  options.groups = control["groups"];
+  options.chains = control["chains"];
+  options.sweeps = control["sweeps"];
+  options.ess_drop = control["ess_drop"];
+  options.resample = control["resample"];
+  options.importance_draws = control["importance_draws"];
+  options.max_components = control["max_components"];
+  return options;
+}
+
+inline EmulatorState emulator_state(const Rcpp::List& emulator) {
+  return {Rcpp::as<Eigen::MatrixXd>(emulator["inputs"]), Rcpp::as<Eigen::MatrixXd>(emulator["coefficients"]),
+          Rcpp::as<Eigen::MatrixXd>(emulator["hyperparameters"])};
+}
+
+inline Rcpp::List ais_list(const AisResult& result) {
+  const std::size_t levels = result.ladder.size();
+  Rcpp::NumericVector beta(levels), step(levels), acceptance(levels), ess(levels);
+  for (std::size_t k = 0; k < levels; ++k) {
+    beta[k] = result.ladder[k].beta;
+    step[k] = result.ladder[k].step;
+    acceptance[k] = result.ladder[k].acceptance;
+    ess[k] = result.ladder[k].ess;
+  }
+  using Rcpp::_;
+  Rcpp::List out =
+      Rcpp::List::create(_["log_evidence"] = result.log_evidence, _["standard_error"] = result.standard_error,
+                         _["interval"] = Rcpp::NumericVector::create(result.lower, result.upper),
+                         _["estimator"] = result.estimator,
+                         _["annealed"] = Rcpp::NumericVector::create(result.annealed, result.annealed_se),
+                         _["second"] = Rcpp::NumericVector::create(result.second, result.second_se),
+                         _["second_ess"] = result.second_ess, _["ess"] = result.ess,
+                         _["log_weight_variance"] = result.log_weight_variance,
+                         _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step,
+                                                               _["acceptance"] = acceptance, _["ess"] = ess),
+                         _["evaluations"] = static_cast<double>(result.evaluations),
+                         _["trusted"] = result.trusted, _["verdict"] = result.verdict);
+  out["weights"] = result.weights;
+  out["log_likelihood"] = result.log_likelihood;
+  return out;
+}
+
+}  // namespace amiss::convert

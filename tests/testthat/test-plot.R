@@ -1,0 +1,67 @@
+layers_of <- function(figure) vapply(figure$layers, function(layer) class(layer$geom)[1], "")
+
+test_that("every figure of an upgrade draws, whatever is missing from it", {
+  grDevices::pdf(NULL)
+  withr::defer(grDevices::dev.off())
+  full <- small_upgrade()
+  for (upgrade in list(full, base_only(full), without_held_out(full), without_held_out(base_only(full)))) {
+    for (which in figure_names) {
+      figure <- ggplot2::autoplot(upgrade, which)
+      expect_true(ggplot2::is.ggplot(figure))
+      expect_gt(figure_height(figure), 1)
+      expect_error(ggplot2::ggplot_build(figure), NA)
+    }
+  }
+})
+
+test_that("figures show what they are for", {
+  upgrade <- small_upgrade()
+  fit <- ggplot2::autoplot(upgrade, "fit")
+  expect_identical(nrow(fit$data), 2L * nrow(upgrade$models[[1]]$prediction))
+  expect_true("GeomRibbon" %in% layers_of(fit))
+  expect_match(fit$labels$title, "typical error falls from")
+  expect_identical(levels(fit$data$stage), c("before", "after"))
+
+  candidates <- ggplot2::autoplot(upgrade, "candidates")
+  expect_identical(as.character(candidates$data$mechanism[candidates$data$adopted]), "sun")
+  expect_true(all(c("GeomVline", "GeomLinerange", "GeomPoint") %in% layers_of(candidates)))
+
+  expect_setequal(ggplot2::autoplot(upgrade, "parameters")$data$name, c("offset", "gain", "sun_gain"))
+  expect_setequal(ggplot2::autoplot(upgrade, "attribution")$data$boundary, c("Te", "Gv"))
+  expect_setequal(ggplot2::autoplot(upgrade, "gain")$data$score, c("rmse", "crps", "coverage95"))
+  expect_lte(max(ggplot2::autoplot(upgrade, "mean_day")$data$hour), 24)
+})
+
+test_that("stages have figures of their own", {
+  grDevices::pdf(NULL)
+  withr::defer(grDevices::dev.off())
+  upgrade <- small_upgrade()
+  model <- upgrade$models[[1]]
+  for (x in list(upgrade, model$fit, model$attribution, discrepancy(model$fit), upgrade$measurements)) {
+    expect_true(ggplot2::is.ggplot(withVisible(plot(x))$value))
+    expect_false(withVisible(plot(x))$visible)
+  }
+  expect_error(plot(upgrade, "nonsense"), class = "amiss_error_input")
+})
+
+test_that("figures are saved, one PNG each", {
+  folder <- withr::local_tempdir()
+  paths <- save_figures(small_upgrade(), folder, dpi = 40)
+  expect_setequal(basename(paths), paste0(c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day"), ".png"))
+  expect_true(all(file.size(paths) > 1000))
+})
+
+test_that("numbers are short and readable", {
+  expect_identical(short(c(1.108, 0.1656, 0.0801, 10.4, 1.6e6)), c("1.1", "0.17", "0.080", "10", "1,600,000"))
+  expect_identical(change_words(1.11, 0.166, "K"), "falls from 1.1 to 0.17 K")
+  expect_identical(change_words(0.1, 0.1001, ""), "stays at 0.10")
+  expect_identical(level_unit("K", c(20, 30)), "\u00b0C")
+  expect_identical(level_unit("K", c(290, 300)), "K")
+  expect_identical(hour_of_day(c(1, 24, 25), 1), c(0.5, 23.5, 0.5))
+})
+
+test_that("a circular condition is shown in degrees", {
+  table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Wd = (1:48 * 15) %% 360)
+  m <- measurements(table, time = "hour", target = "Ti", boundary = ~ circular(Wd), noise_sd = 0.1, warmup = 6)
+  expect_equal(condition_values(m, "Wd"), table$Wd)
+})
