@@ -29,6 +29,14 @@ attribute_ <- function(data, priors, error_settings, control, context_list) {
     .Call(`_amiss_attribute_`, data, priors, error_settings, control, context_list)
 }
 
+calibrate_paper_ <- function(data, priors, emulator_list, control, context_list) {
+    .Call(`_amiss_calibrate_paper_`, data, priors, emulator_list, control, context_list)
+}
+
+paper_discrepancy_ <- function(data, priors, draws) {
+    .Call(`_amiss_paper_discrepancy_`, data, priors, draws)
+}
+
 zone_simulate_ <- function(zones, drivers, step_s, hold, control, threads) {
     .Call(`_amiss_zone_simulate_`, zones, drivers, step_s, hold, control, threads)
 }

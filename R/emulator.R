@@ -2,7 +2,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 
 #' Train the emulator of an ensemble
 #'
-#' The runs are put on a basis ([singular vectors][algorithm] of the centred runs and a vector of ones) and each
+#' The runs are put on a basis (singular vectors of the centred runs and a vector of ones) and each
 #' coefficient gets a Gaussian process over the parameters.
 #'
 #' @param ensemble An ensemble: [simulate_design()] or [ensemble()].

@@ -132,13 +132,14 @@ result_list <- function(upgrade) {
          crps_validation = model$scores$validate[["crps"]], parameters = table_rows(parameter_table(fit)),
          attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")]))
   }
-  candidate_list <- function(row) {
+  candidate_list <- function(i) {
+    row <- upgrade$candidates[i, ]
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
-         probability = row$probability, trusted = row$trusted)
+         probability = row$probability, trusted = row$trusted, parameters = table_rows(row$parameters[[1]]))
   }
   cause <- upgrade$named_cause
   if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
   list(schema = 1L, study = upgrade$study %||% upgrade$measurements$name, seed = upgrade$seed, wall_s = upgrade$wall_s,
-       models = lapply(upgrade$models, model_list), candidates = lapply(table_rows(upgrade$candidates), candidate_list),
+       models = lapply(upgrade$models, model_list), candidates = lapply(seq_len(NROW(upgrade$candidates)), candidate_list),
        named_cause = cause, gain = upgrade$gain, stopped_because = upgrade$stopped_because)
 }

@@ -101,6 +101,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
     say("  {name}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
     fits[[name]] <- fit
     rows[[name]] <- data.frame(from = current$name, mechanism = name, bf, trusted = fit$trust$trusted)
+    rows[[name]]$parameters <- list(added_parameters(fit, current$fit))
   }
   table <- do.call(rbind, rows)
   rownames(table) <- NULL
@@ -109,6 +110,12 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))
   table$probability <- probability[-1]
   list(fits = fits, table = table)
+}
+
+# Estimates of the parameters that a mechanism brought with it.
+added_parameters <- function(fit, parent) {
+  table <- parameter_table(fit)
+  table[!table$name %in% names(parent$emulator$parameters), ]
 }
 
 stop_reason <- function(table, attribution, decisive) {

@@ -106,6 +106,34 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// calibrate_paper_
+Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& control, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_calibrate_paper_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
+    rcpp_result_gen = Rcpp::wrap(calibrate_paper_(data, priors, emulator_list, control, context_list));
+    return rcpp_result_gen;
+END_RCPP
+}
+// paper_discrepancy_
+Eigen::MatrixXd paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws);
+RcppExport SEXP _amiss_paper_discrepancy_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type draws(drawsSEXP);
+    rcpp_result_gen = Rcpp::wrap(paper_discrepancy_(data, priors, draws));
+    return rcpp_result_gen;
+END_RCPP
+}
 // zone_simulate_
 Rcpp::NumericMatrix zone_simulate_(Rcpp::List zones, Rcpp::NumericMatrix drivers, double step_s, Rcpp::NumericVector hold, Rcpp::List control, int threads);
 RcppExport SEXP _amiss_zone_simulate_(SEXP zonesSEXP, SEXP driversSEXP, SEXP step_sSEXP, SEXP holdSEXP, SEXP controlSEXP, SEXP threadsSEXP) {
@@ -146,6 +174,8 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
     {"_amiss_history_coefficients_", (DL_FUNC) &_amiss_history_coefficients_, 3},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
+    {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
+    {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},
     {"_amiss_zone_simulate_", (DL_FUNC) &_amiss_zone_simulate_, 6},
     {"_amiss_zone_balance_", (DL_FUNC) &_amiss_zone_balance_, 5},
     {NULL, NULL, 0}

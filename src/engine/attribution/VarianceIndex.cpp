@@ -71,10 +71,8 @@ Interval highest_density_interval(const VectorXd& values, const VectorXd& weight
     throw std::invalid_argument("interval: weights must not be negative, nor all zero");
   std::vector<double> v, w;
   for (Index i : sorted_order(values)) {
-    if (weights[i] > 0) {
-      v.push_back(values[i]);
-      w.push_back(weights[i] / total);
-    }
+    v.push_back(values[i]);
+    w.push_back(weights[i] / total);
   }
   const double needed = probability - 1e-12;  // rounding of the sum
   Interval best{v.front(), v.back()};

@@ -11,7 +11,7 @@ struct Interval {
 };
 
 /// Shortest interval between two draws that holds at least `probability` of the weight.
-/// @param weights Not negative, any sum above zero; draws of weight zero are left out.
+/// @param weights Not negative, any sum above zero.
 Interval highest_density_interval(const Eigen::VectorXd& values, const Eigen::VectorXd& weights,
                                   double probability);
 
