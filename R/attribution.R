@@ -1,5 +1,5 @@
 attribution_control <- list(surrogates = 199, smallest_shift = 0.05, level = 0.05, least_log10_bf = 0.5,
-                            ais = list(pilot_chains = 48, groups = 4, importance_draws = 600))
+                            ais = list(pilot_chains = 128, groups = 4))
 
 #' Which boundary conditions drive the discrepancy
 #'

@@ -1,4 +1,4 @@
-ais_control <- list(pilot_chains = 128, groups = 8, chains = 32, sweeps = 4, ess_drop = 0.7, resample = TRUE,
+ais_control <- list(pilot_chains = 256, groups = 8, chains = 32, sweeps = 3, ess_drop = 0.7, resample = TRUE,
                     importance_draws = 1000, max_components = 3)
 
 calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, time_constants = NULL, error_times = NULL,

@@ -33,7 +33,7 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
   hours <- read_time(data[[time]], time)
   step <- stats::median(diff(hours))
   segment <- cumsum(c(TRUE, diff(hours) > 1.5 * step))
-  check_regular(hours, step, segment, time)
+  check_regular(hours, step, time)
 
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
   require_numeric(data, c(target, terms$name))
@@ -50,6 +50,7 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
     abort_input(c("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and validate{?s/}; the first is row {which(calibrate & validate)[1]}.",
                   i = "Validation rows must not be seen by the calibration."))
   }
+  tell_gaps(hours, segment, ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none")))
   into_segment <- hours - stats::ave(hours, segment, FUN = min) + step
   warm <- into_segment <= warmup + 1e-9
   use <- ifelse(warm, "warmup", ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none")))
@@ -146,18 +147,28 @@ read_time_text <- function(values) {
   tries[[which.min(vapply(tries, function(t) sum(is.na(t)), 1L))]]
 }
 
-check_regular <- function(hours, step, segment, name, call = rlang::caller_env()) {
-  within <- diff(segment) == 0
-  off <- which(within & abs(diff(hours) - step) > 0.01 * step)
+check_regular <- function(hours, step, name, call = rlang::caller_env()) {
+  steps <- diff(hours)
+  off <- which(steps <= 1.5 * step & abs(steps - step) > 0.01 * step)
   if (length(off)) {
-    abort_input(c("Time column {.val {name}} has unequal steps: {signif(diff(hours)[off[1]], 4)} h after row {off[1]}, while the usual step is {signif(step, 4)} h.",
+    abort_input(c("Time column {.val {name}} has unequal steps: {signif(steps[off[1]], 4)} h after row {off[1]}, while the usual step is {signif(step, 4)} h.",
                   i = "Interpolate or average the record to equal steps; whole gaps may stay."), call = call)
   }
-  gaps <- which(!within)
-  if (length(gaps)) {
-    cli::cli_inform(c(i = "The record has {length(gaps)} gap{?s} (the first of {round(diff(hours)[gaps[1]], 1)} h after row {gaps[1]}); each part is simulated on its own."),
-                    class = "amiss_message_gap")
+}
+
+# A gap between two uses of the record is as it should be; one within a use may be a loss of data.
+tell_gaps <- function(hours, segment, used_for) {
+  gaps <- which(diff(segment) != 0)
+  inside <- gaps[used_for[gaps] == used_for[gaps + 1]]
+  tell <- function(rows, say) {
+    if (!length(rows)) return(invisible())
+    say(c("The record has {length(rows)} gap{?s} {where}: the first is of {round(diff(hours)[rows[1]], 1)} h after row {rows[1]}.",
+          i = "Each part is simulated on its own, with its own warm-up."))
   }
+  where <- "within the rows of one use"
+  tell(inside, function(text) warn_input(text, .envir = parent.frame()))
+  where <- "between calibration and validation"
+  tell(setdiff(gaps, inside), function(text) cli::cli_inform(text, class = "amiss_message_gap", .envir = parent.frame()))
 }
 
 require_complete <- function(drivers, analysed, hours, time, call = rlang::caller_env()) {

@@ -1,7 +1,6 @@
 // Conversions between R and the engine: convert, call, convert. Nothing is computed here.
-#include <RcppEigen.h>
+#include "export_convert.hpp"
 
-#include "engine/ais/Sampler.hpp"
 #include "engine/attribution/SurrogateTest.hpp"
 #include "engine/basis/Basis.hpp"
 #include "engine/calibration/Calibration.hpp"
@@ -16,60 +15,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-Context make_context(const Rcpp::List& context) {
-  Context out;
-  out.seed = static_cast<std::uint64_t>(Rcpp::as<double>(context["seed"]));
-  out.threads = Rcpp::as<int>(context["threads"]);
-  out.poll = [] { Rcpp::checkUserInterrupt(); };
-  return out;
-}
-
 TimeAxis make_axis(const VectorXd& time, const std::vector<bool>& new_segment) { return {time, new_segment}; }
-
-AisOptions make_ais_options(const Rcpp::List& control) {
-  AisOptions options;
-  options.pilot_chains = control["pilot_chains"];
-  options.groups = control["groups"];
-  options.chains = control["chains"];
-  options.sweeps = control["sweeps"];
-  options.ess_drop = control["ess_drop"];
-  options.resample = control["resample"];
-  options.importance_draws = control["importance_draws"];
-  options.max_components = control["max_components"];
-  return options;
-}
-
-Rcpp::List list_ais(const AisResult& result) {
-  const std::size_t levels = result.ladder.size();
-  Rcpp::NumericVector beta(levels), step(levels), acceptance(levels), ess(levels);
-  for (std::size_t k = 0; k < levels; ++k) {
-    beta[k] = result.ladder[k].beta;
-    step[k] = result.ladder[k].step;
-    acceptance[k] = result.ladder[k].acceptance;
-    ess[k] = result.ladder[k].ess;
-  }
-  using Rcpp::_;
-  Rcpp::List out =
-      Rcpp::List::create(_["log_evidence"] = result.log_evidence, _["standard_error"] = result.standard_error,
-                         _["interval"] = Rcpp::NumericVector::create(result.lower, result.upper),
-                         _["estimator"] = result.estimator,
-                         _["annealed"] = Rcpp::NumericVector::create(result.annealed, result.annealed_se),
-                         _["second"] = Rcpp::NumericVector::create(result.second, result.second_se),
-                         _["second_ess"] = result.second_ess, _["ess"] = result.ess,
-                         _["log_weight_variance"] = result.log_weight_variance,
-                         _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step,
-                                                               _["acceptance"] = acceptance, _["ess"] = ess),
-                         _["evaluations"] = static_cast<double>(result.evaluations),
-                         _["trusted"] = result.trusted, _["verdict"] = result.verdict);
-  out["weights"] = result.weights;
-  out["log_likelihood"] = result.log_likelihood;
-  return out;
-}
-
-EmulatorState make_emulator_state(const Rcpp::List& emulator) {
-  return {Rcpp::as<MatrixXd>(emulator["inputs"]), Rcpp::as<MatrixXd>(emulator["coefficients"]),
-          Rcpp::as<MatrixXd>(emulator["hyperparameters"])};
-}
 
 HistoryModel make_history_model(const Rcpp::List& data, const Rcpp::List& priors, const Context& context) {
   HistoryData history;
@@ -141,7 +87,7 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
   options.starts = control["starts"];
   options.searches = control["searches"];
   options.max_evaluations = control["max_evaluations"];
-  const Emulator emulator = Emulator::train(inputs, basis, options, make_context(context));
+  const Emulator emulator = Emulator::train(inputs, basis, options, convert::context(context));
   MatrixXd mean, variance;
   emulator.leave_one_out(mean, variance);
   const EmulatorState state = emulator.state();
@@ -154,7 +100,7 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
 // [[Rcpp::export]]
 Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& points) {
   MatrixXd mean, variance;
-  Emulator(make_emulator_state(emulator)).predict(points, mean, variance);
+  Emulator(convert::emulator_state(emulator)).predict(points, mean, variance);
   return Rcpp::List::create(Rcpp::_["mean"] = mean, Rcpp::_["variance"] = variance);
 }
 
@@ -170,8 +116,8 @@ Eigen::MatrixXd filter_bank_(const Eigen::Map<Eigen::MatrixXd> x, const Eigen::V
 // [[Rcpp::export]]
 Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
                       const Rcpp::List& control, const Rcpp::List& context_list) {
-  const Context context = make_context(context_list);
-  const AisOptions options = make_ais_options(control);
+  const Context context = convert::context(context_list);
+  const AisOptions options = convert::ais_options(control);
   const HistoryModel model = make_history_model(data, priors, context);
   const HistoryTarget history(model, all_conditions(model));
   const AisResult outside = sample_ais(history, options, context);
@@ -179,13 +125,13 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   Context second = context;
   second.seed = context.seed + 1;
   Stream stream(context.seed, 0, 0);
-  const Emulator emulator(make_emulator_state(emulator_list));
+  const Emulator emulator(convert::emulator_state(emulator_list));
   const CalibrationTarget target(
       history, StudentTMixture::fit(outside.draws, outside.weights, options.max_components, 8.0, stream),
       emulator);
   const AisResult joint = sample_ais(target, options, second);
 
-  Rcpp::List outside_list = list_ais(outside), joint_list = list_ais(joint);
+  Rcpp::List outside_list = convert::ais_list(outside), joint_list = convert::ais_list(joint);
   add_history_draws(
       outside_list, outside, [&](const VectorXd& x) { return history.parameters(x); }, model);
   add_history_draws(
@@ -220,9 +166,9 @@ Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& 
 Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors,
                       const Rcpp::IntegerVector& error_settings, const Rcpp::List& control,
                       const Rcpp::List& context_list) {
-  const Context context = make_context(context_list);
+  const Context context = convert::context(context_list);
   const HistoryModel model = make_history_model(data, priors, context);
-  const AisOptions options = make_ais_options(control["ais"]);
+  const AisOptions options = convert::ais_options(control["ais"]);
   const int conditions = model.conditions();
   std::vector<AisResult> dropped(static_cast<std::size_t>(conditions));
   Context inner = context;  // conditions share the threads; each has its own seed

@@ -35,12 +35,14 @@ test_that("a constant boundary condition is left out with a warning", {
   expect_error(linear_measurements(data, boundary = ~Ws), "No boundary condition varies", class = "amiss_error_input") |> suppressWarnings()
 })
 
-test_that("a gap makes two segments, each with its own warm-up", {
+test_that("a gap makes two segments, each with its own warm-up, and is told", {
   data <- linear_data()[-(100:130), ]
-  expect_message(m <- linear_measurements(data, warmup = 10), "1 gap", class = "amiss_message_gap")
+  expect_warning(m <- linear_measurements(data, warmup = 10), "1 gap within.*row 99", class = "amiss_warning_input")
   expect_equal(unique(m$segment), c(1, 2))
   expect_equal(sum(m$use == "warmup"), 20)
-  expect_equal(amiss:::segment_starts(m, amiss:::used_rows(m, "calibrate")) |> which(), c(1, 90))
+  expect_equal(which(amiss:::segment_starts(m, amiss:::used_rows(m, "calibrate"))), c(1, 90))
+  expect_message(linear_measurements(data, calibrate = data$hour < 115, validate = data$hour > 115), "1 gap between",
+                 class = "amiss_message_gap")
 })
 
 test_that("averages are means of whole blocks with their standard errors", {

@@ -9,12 +9,12 @@
 namespace amiss {
 
 struct AisOptions {
-  int pilot_chains = 64;  ///< chains of the pilot that adapts ladder and proposals
-  int groups = 8;         ///< independent groups of chains of the run that gives the estimate
-  int chains = 32;        ///< chains in a group
-  int sweeps = 3;         ///< moves of every chain at every temperature
-  double ess_drop = 0.7;  ///< the pilot's next temperature leaves this conditional effective size per chain
-  bool resample = true;   ///< resample a group when its effective size falls below half; false: plain AIS
+  int pilot_chains = 256;  ///< chains of the pilot that adapts ladder and proposals
+  int groups = 8;          ///< independent groups of chains of the run that gives the estimate
+  int chains = 32;         ///< chains in a group
+  int sweeps = 3;          ///< moves of every chain at every temperature
+  double ess_drop = 0.7;   ///< the pilot's next temperature leaves this conditional effective size per chain
+  bool resample = true;    ///< resample a group when its effective size falls below half; false: plain AIS
   int importance_draws =
       1000;  ///< draws of the second estimator, from a fitted Student-t mixture; 0 leaves it out
   int max_components = 3;  ///< of that mixture

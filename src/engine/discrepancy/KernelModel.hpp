@@ -13,8 +13,8 @@ struct BetaPrior {
   double b = 1.0;
 
   void check() const;
-  /// The quantile q at u = Phi(x), in odds and logarithm so that neither end of (0, 1) loses digits. For a =
-  /// 1, 1 - q = (1 - u)^(1/b): most of Beta(1, 0.1) lies so close to 1 that q alone could not tell.
+  /// The quantile q at u = Phi(x), with 1 - q, so that neither end of (0, 1) loses digits. For a = 1,
+  /// 1 - q = (1 - u)^(1/b): half of Beta(1, 0.1) lies above 0.999, and q alone could not tell how close to 1.
   struct Quantile {
     double value = 0.0, complement = 0.0;  ///< q and 1 - q
     double log() const;                    ///< log q
