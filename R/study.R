@@ -15,7 +15,8 @@ study_fields <- list(
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It is
-#'   filled only when all is computed.
+#'   filled only when all is computed; until then its folder `stages` holds the finished models, and the same call goes on
+#'   from there if it was interrupted.
 #' @param seed Overrides the seed of the file.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
@@ -28,12 +29,16 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE)
   study <- read_study(path, quiet)
   if (!is.null(out)) check_out(out)
   seed <- pick_seed(seed %||% study$seed)
+  stages <- if (!is.null(out)) file.path(out, "stages")
   upgrade <- upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
-                           seed = seed, threads = threads, quiet = quiet)
+                           seed = seed, threads = threads, quiet = quiet, checkpoint = stages)
   upgrade$study <- study$study
   upgrade$title <- study$title
   upgrade$wall_s <- proc.time()[["elapsed"]] - started
-  if (!is.null(out)) write_study(upgrade, out, quiet)
+  if (!is.null(out)) {
+    write_study(upgrade, out, quiet)
+    unlink(stages, recursive = TRUE)
+  }
   invisible(upgrade)
 }
 

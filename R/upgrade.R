@@ -13,11 +13,14 @@ upgrade_control <- list(max_steps = 3, decisive = 2, level = 0.95, emulator = li
 #' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), and lists `emulator`, `calibration` and `attribution` for the stages.
 #' @param quiet No progress messages.
+#' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
+#'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
 #' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried, the
 #'   named cause, the gain, and why the loop stopped.
 #' @export
-upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1, quiet = FALSE) {
+upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1, quiet = FALSE,
+                          checkpoint = NULL) {
   check_simulator(simulator)
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
   check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
@@ -27,8 +30,9 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   say <- if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
 
   settings <- list(measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
+  settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   say("Calibrating the base model")
-  current <- measured_model(fit_model(simulator, settings), "base", NULL, NULL, settings)
+  current <- measured_model(fit_model(simulator, "base", settings), "base", NULL, NULL, settings)
   report_model(current, say)
   models <- list(current)
   candidates <- NULL
@@ -63,19 +67,45 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
 }
 
 # Every model of a study is drawn on the same design seed: differences between models are not the design's.
-fit_model <- function(simulator, settings) {
+fit_model <- function(simulator, name, settings) settings$keep(list("fit", name, plain(simulator)), {
   control <- settings$control
   ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
   emulator <- train_emulator(ensemble, settings$measurements, control$emulator, threads = settings$threads)
   calibrate(emulator, settings$measurements, control$calibration, seed = settings$seed, threads = settings$threads)
+})
+
+# A function that returns a value kept under a key, or evaluates and keeps it. What is kept belongs to one set of
+# arguments only: its hash is part of the file's name.
+checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
+  if (is.null(folder)) return(function(name, value) value)
+  check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
+  if (!dir.exists(folder) && !dir.create(folder, recursive = TRUE, showWarnings = FALSE)) {
+    abort_input("The folder {.file {folder}} for {.arg checkpoint} cannot be made.", call = call)
+  }
+  key <- rlang::hash(list(plain(arguments), utils::packageVersion("amiss")))
+  function(name, value) {
+    file <- file.path(folder, paste0(rlang::hash(list(key, name)), ".rds"))
+    if (file.exists(file)) return(readRDS(file))
+    part <- tempfile("part-", folder)
+    saveRDS(value, part)
+    file.rename(part, file)
+    value
+  }
 }
 
-measured_model <- function(fit, name, parent, mechanism, settings) {
+# Functions as their text: the same in every session, which closures and their byte code are not.
+plain <- function(x) {
+  if (is.function(x)) return(deparse(x))
+  if (is.list(x)) return(lapply(unclass(x), plain))
+  x
+}
+
+measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(paste("measured", name), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)
   prediction <- predict(fit, seed = settings$seed, threads = settings$threads)
   list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
        prediction = prediction, scores = prediction_scores(prediction))
-}
+})
 
 report_model <- function(model, say) {
   first <- model$attribution$table[1, ]
@@ -96,7 +126,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   fits <- list()
   rows <- list()
   for (name in names(catalogue)) {
-    fit <- fit_model(extend(current$fit$emulator$simulator, catalogue[[name]]), settings)
+    fit <- fit_model(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings)
     bf <- bayes_factor(fit, current$fit)
     say("  {name}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
     fits[[name]] <- fit

@@ -40,6 +40,29 @@ test_that("a study writes its files with the agreed fields", {
   expect_identical(again$models[[2]]$fit$values, readRDS(file.path(out, "result.rds"))$models[[2]]$fit$values)
 })
 
+test_that("an interrupted loop goes on where it stopped, with the same result", {
+  folder <- withr::local_tempdir()
+  study <- read_study(write_study_file(folder))
+  loop <- function(catalogue, checkpoint = NULL) {
+    upgrade_model(study$model, study$measurements, catalogue, runs = 30, control = study$control, seed = 4, quiet = TRUE, checkpoint = checkpoint)
+  }
+  kept <- file.path(folder, "kept")
+  edits <- new.env()
+  edits$broken <- TRUE
+  fragile <- catalogue(mechanism("sun", boundary = "Gv", sentence = "Sun.", edit = function(model) {
+    if (edits$broken) stop("power cut")
+    study$catalogue$sun$edit(model)
+  }))
+  expect_error(loop(fragile, kept), "power cut", class = "amiss_error_input")
+  before <- list.files(kept)
+  expect_length(before, 2)
+  times <- file.mtime(file.path(kept, before))
+  edits$broken <- FALSE
+  resumed <- loop(fragile, kept)
+  expect_identical(file.mtime(file.path(kept, before)), times)
+  expect_identical(resumed$models[[2]]$fit$values, loop(study$catalogue)$models[[2]]$fit$values)
+})
+
 test_that("a bad study is refused and nothing is written", {
   folder <- withr::local_tempdir()
   out <- file.path(folder, "out")
