@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "engine/linalg/constants.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 
 namespace amiss {
@@ -13,8 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kPi = 3.14159265358979323846;
 
 MatrixXd weighted_covariance(const MatrixXd& x, const VectorXd& weights, const VectorXd& mean) {
   const MatrixXd centred = x.colwise() - mean;

@@ -1,5 +1,6 @@
 #pragma once
 #include "engine/linalg/Eigen.hpp"
+#include "engine/linalg/constants.hpp"
 #include "engine/random/Stream.hpp"
 
 namespace amiss {
@@ -17,8 +18,7 @@ class Target {
 
   virtual Eigen::VectorXd draw_reference(Stream& stream) const { return stream.normals(dimension()); }
   virtual double log_reference(const Eigen::VectorXd& x) const {
-    constexpr double kHalfLogTwoPi = 0.91893853320467274178;
-    return -0.5 * x.squaredNorm() - kHalfLogTwoPi * static_cast<double>(x.size());
+    return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));
   }
 };
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/linalg/constants.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -12,8 +13,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-
-constexpr double kLogTwoPi = 1.83787706640934548356;
 
 double log_standard_normal(const VectorXd& x) {
   return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));

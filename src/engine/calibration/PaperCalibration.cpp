@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "engine/linalg/constants.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -13,7 +14,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kLogTwoPi = 1.83787706640934548356;
 constexpr double kOrthogonal = 1e-6;  // largest cosine between two columns
 
 }  // namespace

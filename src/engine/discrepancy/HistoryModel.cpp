@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "engine/linalg/constants.hpp"
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/transform.hpp"
 
@@ -15,9 +16,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-
-constexpr double kHalfPi = 1.57079632679489661923;
-constexpr double kLogTwoPi = 1.83787706640934548356;
 
 double clamp_unit(double u) { return std::min(std::max(u, 1e-12), 1.0 - 1e-12); }
 
@@ -186,7 +184,7 @@ HistoryParameters HistoryTarget::parameters(const VectorXd& x) const {
     // begins.
     const double u =
         (normal_cdf(x[1 + components + static_cast<Index>(a)]) - (1.0 - priors.inclusion)) / priors.inclusion;
-    if (u > 0) point.t[active_[a]] = std::pow(priors.amplitude * std::tan(kHalfPi * clamp_unit(u)), 2);
+    if (u > 0) point.t[active_[a]] = std::pow(priors.amplitude * std::tan(0.5 * kPi * clamp_unit(u)), 2);
   }
   return point;
 }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "engine/linalg/constants.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -17,7 +18,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kLogTwoPi = 1.83787706640934548356;
 constexpr double kSmallestTail = 1e-15;  // of Phi; keeps logarithms finite
 constexpr double kLargestRatio = 1e10;   // of discrepancy to noise variance
 constexpr std::uint64_t kFictitious = 64;

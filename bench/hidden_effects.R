@@ -1,0 +1,45 @@
+#!/usr/bin/env Rscript
+# Hidden-effect benchmark: Rscript bench/hidden_effects.R --worlds N --seed S --out FILE [--workers N]
+# Worlds S, S+1, ... are drawn, scored and written as JSON. Each finished world is kept in FILE.worlds/, so that a
+# stopped run goes on where it was. Work goes through the user's future plan if --workers is not given.
+
+arguments <- commandArgs(trailingOnly = TRUE)
+option <- function(name, default = NULL) {
+  at <- match(paste0("--", name), arguments)
+  if (is.na(at)) return(default)
+  if (at == length(arguments)) stop("--", name, " needs a value", call. = FALSE)
+  arguments[at + 1]
+}
+worlds <- as.integer(option("worlds", "24"))
+first <- as.integer(option("seed", "1"))
+out <- option("out", "hidden_effects.json")
+workers <- option("workers")
+here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
+suppressPackageStartupMessages(library(amiss))
+
+keep <- paste0(out, ".worlds")
+dir.create(keep, showWarnings = FALSE, recursive = TRUE)
+one_world <- function(seed, here, keep) {
+  file <- file.path(keep, sprintf("%09d.rds", seed))
+  if (file.exists(file)) return(readRDS(file))
+  suppressPackageStartupMessages(library(amiss))
+  scope <- new.env(parent = globalenv())
+  for (part in c("worlds.R", "score.R")) sys.source(file.path(here, "hidden_effects", part), scope)
+  row <- tryCatch(scope$score_world(scope$draw_world(seed)), error = function(e) list(seed = seed, error = conditionMessage(e)))
+  part <- tempfile("part-", keep)
+  saveRDS(row, part)
+  file.rename(part, file)
+  message(sprintf("world %d: %s x%g, named %s", seed, row$kind, row$strength, row$mechanism))
+  row
+}
+
+if (!is.null(workers)) future::plan(future::multisession, workers = as.integer(workers))
+seeds <- first + seq_len(worlds) - 1L
+rows <- future.apply::future_lapply(seeds, one_world, here = normalizePath(here), keep = normalizePath(keep), future.seed = NULL, future.scheduling = Inf)
+scope <- new.env(parent = globalenv())
+for (part in c("worlds.R", "score.R")) sys.source(file.path(here, "hidden_effects", part), scope)
+failed <- Filter(function(r) !is.null(r$error), rows)
+rates <- scope$score_rates(Filter(function(r) is.null(r$error), rows))
+jsonlite::write_json(list(worlds = rows, failed = length(failed), rates = rates), out, auto_unbox = TRUE, na = "null", null = "null", digits = NA, pretty = TRUE)
+for (name in names(rates)) cat(sprintf("%-22s %5.1f %% of %d [%.0f, %.0f]\n", name, 100 * rates[[name]]$rate, rates[[name]]$n, 100 * rates[[name]]$lower95, 100 * rates[[name]]$upper95))
+if (length(failed)) cat(length(failed), "worlds failed:", failed[[1]]$error, "\n")

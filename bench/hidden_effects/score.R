@@ -1,0 +1,88 @@
+# One world scored: what the loop says, and what it should have said.
+
+fit_seed <- function(world) world$seed + 77L  # never the world's own
+
+score_world <- function(world, control = list(max_steps = 2), runs = 120, rivals = TRUE) {
+  started <- proc.time()[["elapsed"]]
+  upgrade <- amiss::upgrade_model(world$base, world$measurements, world$catalogue, runs = runs, control = control,
+                                  seed = fit_seed(world), threads = 1, quiet = TRUE)
+  wall <- proc.time()[["elapsed"]] - started
+  table <- upgrade$models[[1]]$attribution$table
+  condition <- if (any(table$significant)) table$boundary[table$significant][1] else NA
+  adopted <- vapply(upgrade$models[-1], `[[`, "", "mechanism")
+  row <- list(seed = world$seed, kind = world$kind, strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1,
+              days = world$days, true_boundary = unique(unlist(true_boundary[world$kinds], use.names = FALSE)),
+              true_mechanism = intersect(world$kinds, catalogue_kinds), condition = condition,
+              mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
+              unexplained = !is.na(condition) && !length(adopted),
+              log10_bf = if (length(adopted)) upgrade$named_cause$log10_bf else max(upgrade$candidates$log10_bf),
+              gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade), wall_s = wall)
+  if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world))
+  row
+}
+
+# Held-out error that the loop removes, as a share of what knowing the truth would remove.
+gain_share <- function(world, upgrade) {
+  if (!length(world$kinds)) return(NA)
+  m <- world$measurements
+  rows <- which(m$use == "validate")
+  averaged <- rowsum(world$clean, m$block) / m$per_step
+  truth <- sqrt(mean((m$y[rows] - averaged[rows])^2))
+  rmse <- upgrade$gain$rmse_validation
+  if (rmse[1] <= 1.02 * truth) return(NA)
+  (rmse[1] - rmse[2]) / (rmse[1] - truth)
+}
+
+parameter_covered <- function(world, upgrade) {
+  first <- if (length(upgrade$models) > 1) upgrade$models[[2]]$mechanism
+  if (is.null(first) || !first %in% world$kinds) return(NA)
+  last <- amiss::tidy(upgrade$models[[length(upgrade$models)]]$fit)
+  true <- world$effects[[first]]
+  own <- last[last$name == names(true)[1], ]
+  own$lower95 <= true[[1]] && true[[1]] <= own$upper95
+}
+
+# What is done today: the residuals of the calibrated base model held against each condition.
+rival_conditions <- function(fit, world) {
+  m <- fit$measurements
+  x <- m$boundary[fit$rows, , drop = FALSE]
+  names_of <- m$conditions[m$condition]
+  r <- residuals(fit)
+  strongest <- function(score) unname(names_of[which.max(score)])
+  ard <- amiss:::train_emulator_(apply(x, 2, function(v) (v - min(v)) / diff(range(v))),
+                                 list(vectors = matrix(1, 3, 1), coefficients = matrix(r), singular_values = 1, discarded_ss = 0),
+                                 list(starts = 2, searches = 1, max_evaluations = 40), list(seed = 1, threads = 1))
+  forest <- if (requireNamespace("ranger", quietly = TRUE)) {
+    strongest(ranger::ranger(x = as.data.frame(unname(x)), y = r, importance = "permutation", num.trees = 300, seed = 1, num.threads = 1)$variable.importance)
+  } else NA
+  list(correlation_condition = strongest(abs(stats::cor(x, r))), forest_condition = forest,
+       ard_condition = strongest(-ard$hyperparameters[1, -(1:3)]))
+}
+
+named_right <- function(row) !is.na(row$mechanism) && row$mechanism %in% row$true_mechanism
+condition_right <- function(row, what = "condition") !is.null(row[[what]]) && !is.na(row[[what]]) && row[[what]] %in% row$true_boundary
+
+rate <- function(flags) {
+  flags <- flags[!is.na(flags)]
+  if (!length(flags)) return(list(rate = NA, n = 0, lower95 = NA, upper95 = NA))
+  interval <- stats::binom.test(sum(flags), length(flags))$conf.int
+  list(rate = mean(flags), n = length(flags), lower95 = interval[1], upper95 = interval[2])
+}
+
+score_rates <- function(rows) {
+  pick <- function(f) Filter(f, rows)
+  flags <- function(rows, f) vapply(rows, function(r) as.logical(f(r)), NA)
+  strong <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95)
+  one <- pick(function(r) length(r$true_mechanism) > 0 && abs(r$achieved - 1) <= 0.2)
+  none <- pick(function(r) r$kind == "none")
+  outside <- pick(function(r) r$kind %in% outside_kinds)
+  both <- pick(function(r) r$kind == "two effects" && r$achieved >= 1.95)
+  list(right_mechanism = rate(flags(strong, named_right)), right_condition = rate(flags(strong, condition_right)),
+       detection_at_1 = rate(flags(one, named_right)), parameter_covered = rate(flags(strong, function(r) r$covered)),
+       false_condition = rate(flags(none, function(r) !is.na(r$condition))), false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
+       outside_blamed = rate(flags(outside, function(r) !is.na(r$mechanism))), outside_unexplained = rate(flags(outside, function(r) r$unexplained)),
+       both_found = rate(flags(both, function(r) all(r$true_mechanism %in% r$adopted))),
+       correlation_condition = rate(flags(strong, function(r) condition_right(r, "correlation_condition"))),
+       forest_condition = rate(flags(strong, function(r) condition_right(r, "forest_condition"))),
+       ard_condition = rate(flags(strong, function(r) condition_right(r, "ard_condition"))))
+}

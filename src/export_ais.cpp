@@ -1,0 +1,42 @@
+// Annealed importance sampling of a posterior whose likelihood is an R function: convert, call, convert.
+#include "export_convert.hpp"
+
+#include "engine/random/transform.hpp"
+
+using namespace amiss;  // NOLINT
+
+namespace {
+
+// R is not to be called from other threads: the context must ask for one.
+class FunctionTarget : public Target {
+ public:
+  FunctionTarget(Rcpp::Function log_likelihood, int dimension)
+      : log_likelihood_(log_likelihood), dimension_(dimension) {}
+
+  Eigen::Index dimension() const override { return dimension_; }
+  Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override {
+    const Eigen::MatrixXd unit = x.transpose().unaryExpr(&normal_cdf);
+    const Eigen::VectorXd values = Rcpp::as<Eigen::VectorXd>(log_likelihood_(unit));
+    if (values.size() != x.cols())
+      throw std::invalid_argument("log_likelihood returned another number of values than it got points");
+    return values;
+  }
+
+ private:
+  Rcpp::Function log_likelihood_;
+  int dimension_;
+};
+
+}  // namespace
+
+// [[Rcpp::export]]
+Rcpp::List ais_(const Rcpp::Function& log_likelihood, int dimension, const Rcpp::List& control,
+                const Rcpp::List& context) {
+  Context own = convert::context(context);
+  own.threads = 1;
+  const AisResult result =
+      sample_ais(FunctionTarget(log_likelihood, dimension), convert::ais_options(control), own);
+  Rcpp::List out = convert::ais_list(result);
+  out["unit"] = Eigen::MatrixXd(result.draws.transpose().unaryExpr(&normal_cdf));
+  return out;
+}
