@@ -40,6 +40,8 @@
 #' @param volume Volume of air, m3.
 #' @param air_capacity_factor Heat capacity of air and furnishings over that of the air, at least 1.
 #' @param initial_air Air temperature at the start when no row is held, degC.
+#' @param initial_wall_offset The walls start in a steady state as if the air had been warmer by this, K. What they were
+#'   before the record is unknown: a heavy building remembers it for days, so that it may be a [free()] parameter.
 #' @return `zone()`: an object of class `amiss_zone`; the others: a component (`amiss_component`) or `amiss_layer`.
 #' @details One opening alone exchanges nothing: use two at different heights or facades.
 #' @examples
@@ -86,7 +88,8 @@ zone_fields <- list(
   supply = list(flow = needed_column(), temperature = needed_column(), scale = between(0)),
   coupling = list(conductance = between(0), temperature = needed_column()),
   gain = list(power = needed_column(), scale = between(), radiant_fraction = between(0, 1)),
-  zone = list(volume = positive(), air_capacity_factor = between(1), initial_air = between()))
+  zone = list(volume = positive(), air_capacity_factor = between(1), initial_air = between(),
+              initial_wall_offset = between()))
 
 is_free <- function(x) inherits(x, c("amiss_free", "amiss_scaled_free"))
 
@@ -226,11 +229,12 @@ gain <- function(name, power, scale = 1, radiant_fraction = 0.5) {
 
 #' @rdname zone_components
 #' @export
-zone <- function(..., volume, air_capacity_factor = 1, initial_air = 20) {
-  new_zone(list(...), volume, air_capacity_factor, initial_air)
+zone <- function(..., volume, air_capacity_factor = 1, initial_air = 20, initial_wall_offset = 0) {
+  new_zone(list(...), list(volume = volume, air_capacity_factor = air_capacity_factor, initial_air = initial_air,
+                           initial_wall_offset = initial_wall_offset))
 }
 
-new_zone <- function(components, volume, air_capacity_factor, initial_air, call = rlang::caller_env()) {
+new_zone <- function(components, own, call = rlang::caller_env()) {
   if (!all(vapply(components, inherits, NA, "amiss_component"))) {
     abort_input(c("A zone is composed of components.", i = "Give for example {.fn wall}, {.fn window}, {.fn heater}."),
                 call = call)
@@ -240,8 +244,7 @@ new_zone <- function(components, volume, air_capacity_factor, initial_air, call 
   if (length(twice) > 0) {
     abort_input(c("Every component needs a name of its own; used more than once: {.val {twice}}."), call = call)
   }
-  x <- list(components = components, volume = volume, air_capacity_factor = air_capacity_factor,
-            initial_air = initial_air)
+  x <- c(list(components = components), own)
   check_fields(x, zone_fields$zone, "zone", call)
   structure(x, class = "amiss_zone")
 }
@@ -255,7 +258,7 @@ new_zone <- function(components, volume, air_capacity_factor, initial_air, call 
 #' @param zone A [zone()].
 #' @param component A component to add.
 #' @param name Name of a component, or `"zone"` for the zone's own fields (`volume`, `air_capacity_factor`,
-#'   `initial_air`).
+#'   `initial_air`, `initial_wall_offset`).
 #' @param ... Fields to replace, by name; the layers of a wall as `layers = list(layer(...), ...)`.
 #' @return The edited zone; of `component()`, the component.
 #' @examples
@@ -291,7 +294,7 @@ find_component <- function(zone, name, call) {
 #' @export
 add_component <- function(zone, component) {
   check_zone(zone)
-  new_zone(c(unname(zone$components), list(component)), zone$volume, zone$air_capacity_factor, zone$initial_air)
+  new_zone(c(unname(zone$components), list(component)), unclass(zone)[names(zone_fields$zone)])
 }
 
 #' @rdname zone_edits

@@ -105,6 +105,7 @@ Zone read_zone(const Rcpp::List& from) {
   zone.volume = number(from, "volume");
   zone.air_capacity_factor = number(from, "air_capacity_factor");
   zone.initial_air = number(from, "initial_air");
+  zone.initial_wall_offset = number(from, "initial_wall_offset");
   for (const Rcpp::List component : Rcpp::List(from["components"])) read_component(component, zone);
   return zone;
 }

@@ -133,6 +133,8 @@ draw_world <- function(seed, kind = NULL, strength = NULL) {
   measured <- suppressMessages(amiss::measurements(data, time = "hour", target = "Ti", boundary = c("Te", "Gv", "Ws", "circular(Wd)", "RHP", "Lw", "Tn"),
                                                    noise_sd = noise, average = if (average > step_h) average, warmup = 24, calibrate = calibrate,
                                                    validate = !calibrate, name = kind, unit = "K"))
+  # What the walls were before the record is unknown to whoever fits.
+  fitted <- amiss::change_component(base, "zone", initial_wall_offset = amiss::free("initial_wall_offset", amiss::normal(0, 1, -3, 3), "K"))
   list(seed = seed, kind = kind, kinds = kinds, strength = strength, achieved = achieved, noise = noise, ar1 = ar1, days = days, values = values, effects = effects,
-       clean = clean, data = data, measurements = measured, base = base, catalogue = amiss::box_catalogue(columns))
+       clean = clean, data = data, measurements = measured, base = fitted, catalogue = amiss::box_catalogue(columns))
 }

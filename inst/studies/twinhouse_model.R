@@ -8,6 +8,7 @@ insulation <- function(thickness) layer(thickness, free("k_insulation", uniform(
 
 zone(
   volume = 86.4, air_capacity_factor = 1.2,
+  initial_wall_offset = free("initial_wall_offset", normal(0, 1, -3, 3), "K", "walls before the record, against the air"),
 
   wall("south facade", area = 7.5, plaster, brick(0.30), old_plaster, insulation(0.12), plaster,
        outside = "Te", sun = "Gv_S", absorptance = 0.23, azimuth = 180,

@@ -118,7 +118,9 @@ void Simulation::start(const Options& options) {
   const auto rows = static_cast<Eigen::Index>(std::clamp(wanted, 1.0, static_cast<double>(drivers_.rows())));
   for (WallState& state : walls_) {
     const Column outside = state.wall->outside;
-    state.solver.start_steady(air_, outside == no_column ? air_ : drivers_.col(outside).head(rows).mean());
+    const double inside = air_ + zone_.initial_wall_offset;
+    state.solver.start_steady(inside,
+                              outside == no_column ? inside : drivers_.col(outside).head(rows).mean());
   }
   spin_up(options.spinup);
 }

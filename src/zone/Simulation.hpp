@@ -22,7 +22,8 @@ namespace amiss::zone {
 ///                 forget their unknown past.
 /// @return         mean air temperature of every interval, and the energy balance.
 ///
-/// Start: air at the first number of `hold`, else at `zone.initial_air`; walls in steady state between that
+/// Start: air at the first number of `hold`, else at `zone.initial_air`; walls in steady state between that,
+/// plus `zone.initial_wall_offset`,
 /// and the mean of the driver on their other side over `options.initial_hours`; heaters emit their first
 /// power. Time: equal sub-steps by the two-stage, second-order, L-stable and stiffly accurate SDIRK method
 /// (gamma = 1 - 1/sqrt 2; Alexander 1977, SIAM J. Numer. Anal. 14); air flows are frozen over a sub-step.

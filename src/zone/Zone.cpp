@@ -148,6 +148,7 @@ void Zone::check(int n_columns) const {
   const Checker checker("zone", n_columns);
   checker.positive("volume", volume);
   checker.finite("initial_air", initial_air);
+  checker.finite("initial_wall_offset", initial_wall_offset);
   checker.finite("air_capacity_factor", air_capacity_factor);
   if (air_capacity_factor < 1.0) {
     checker.fail("air_capacity_factor", air_capacity_factor, "a number not below 1");

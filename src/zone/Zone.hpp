@@ -132,6 +132,7 @@ struct Zone {
   double volume = 50.0;              ///< m3, > 0
   double air_capacity_factor = 1.0;  ///< >= 1, furnishings
   double initial_air = 20.0;         ///< degC, when no row is held
+  double initial_wall_offset = 0.0;  ///< K: the walls start as if the air had been warmer by this
   std::vector<Wall> walls;
   std::vector<Window> windows;
   std::vector<Opening> openings;

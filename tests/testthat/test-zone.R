@@ -143,3 +143,13 @@ test_that("the paper's box loses heat as measured, and more with a crack", {
   expect_lt(loss("M2"), 4.3)
   expect_gt(loss("M3", crack_area = 790), loss("M2") + 0.1)
 })
+
+test_that("the initial offset of the walls is forgotten at the walls' own pace, and only they feel it", {
+  room <- function(offset) {
+    zone(wall("facade", 10, layer(0.1, 1, 2e6), outside = "Te"), volume = 50, initial_wall_offset = offset)
+  }
+  drivers <- cbind(Te = rep(10, 96))
+  difference <- simulate_zone(room(2), drivers = drivers, step_s = 900)[, 1] - simulate_zone(room(0), drivers = drivers, step_s = 900)[, 1]
+  expect_true(all(difference > 0) && all(diff(difference[10:96]) < 0))
+  expect_lt(difference[96], 0.2 * max(difference))
+})
