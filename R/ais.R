@@ -29,7 +29,7 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL) {
   call <- rlang::current_env()
   at_unit <- function(unit) {
     tryCatch(as.numeric(log_likelihood(to_values(unit))), error = function(e) {
-      abort_input(c("{.arg log_likelihood} stopped with an error.", x = conditionMessage(e)), call = call)
+      abort_input(c("{.arg log_likelihood} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
     })
   }
   result <- call_engine(ais_(at_unit, length(priors), control, engine_context(seed, 1)))

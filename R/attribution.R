@@ -16,6 +16,7 @@ attribution_control <- list(surrogates = 199, smallest_shift = 0.05, level = 0.0
 attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
   control <- merge_control(attribution_control, control)
+  check_attribution_control(control)
   ais <- fit$control$ais
   ais[names(control$ais)] <- control$ais
   control$ais <- merge_control(ais_control, ais, "control$ais")
@@ -39,12 +40,20 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
                  control = control, seed = seed), class = "amiss_attribution")
 }
 
+check_attribution_control <- function(control, call = rlang::caller_env()) {
+  check_input(checkmate::check_count(control$surrogates, positive = TRUE), "control$surrogates", call = call)
+  check_input(checkmate::check_number(control$smallest_shift, lower = 0, upper = 0.49), "control$smallest_shift", call = call)
+  check_input(checkmate::check_number(control$level, lower = 0, upper = 1), "control$level", call = call)
+  check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE), "control$least_log10_bf", call = call)
+  check_input(checkmate::check_list(control$ais), "control$ais", call = call)
+}
+
 # Share of the variance of the record outside the simulation space that each condition's fitted response carries:
 # cov(response_s, y) / var(y). Shares and the unexplained rest add to one, whatever the correlation of conditions.
 variance_shares <- function(fit, data) {
   parts <- condition_responses(fit, data)
-  outside <- function(x) stats::lm.fit(data$basis, x)$residuals
-  y <- outside(data$y)
+  outside <- function(x) as.matrix(stats::lm.fit(data$basis, x)$residuals)
+  y <- as.numeric(outside(data$y))
   colSums(outside(parts) * y) / sum(y^2)
 }
 

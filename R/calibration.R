@@ -66,10 +66,10 @@ fill_calibration_control <- function(control, measurements, n, call = rlang::cal
   check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
   check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1), "control$inclusion", call = call)
-  check_input(checkmate::check_number(control$amplitude, lower = 1e-12), "control$amplitude", call = call)
-  check_input(checkmate::check_numeric(control$time_constants, lower = 0, min.len = 1, any.missing = FALSE), "control$time_constants", call = call)
-  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, any.missing = FALSE, max.len = 3), "control$error_times", call = call)
-  check_input(checkmate::check_numeric(control$error_ratios, lower = 0, min.len = 1, any.missing = FALSE), "control$error_ratios", call = call)
+  check_input(checkmate::check_number(control$amplitude, lower = 1e-12, finite = TRUE), "control$amplitude", call = call)
+  check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), "control$time_constants", call = call)
+  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE, max.len = 3), "control$error_times", call = call)
+  check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), "control$error_ratios", call = call)
   check_input(checkmate::check_count(control$error_draws, positive = TRUE), "control$error_draws", call = call)
   control
 }

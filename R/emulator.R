@@ -68,9 +68,19 @@ print.amiss_emulator <- function(x, ...) {
 #' @return A list of `mean` and `sd`, one column per point.
 #' @export
 predict.amiss_emulator <- function(object, newdata, ...) {
+  rlang::check_dots_empty()
   newdata <- as.matrix(newdata)
+  check_input(checkmate::check_matrix(newdata, "numeric", any.missing = FALSE, min.rows = 1), "newdata")
   absent <- setdiff(names(object$parameters), colnames(newdata))
   if (length(absent)) abort_input("{.arg newdata} lacks {cli::qty(absent)}column{?s} {.val {absent}}.")
+  for (name in names(object$parameters)) {
+    prior <- object$parameters[[name]]$prior
+    outside <- which(newdata[, name] < prior$lower | newdata[, name] > prior$upper)
+    if (length(outside)) {
+      abort_input(c("{name} = {newdata[outside[1], name]} in row {outside[1]} of {.arg newdata} lies outside its prior, {format(prior)}.",
+                    i = "The emulator knows nothing there; run the simulator."))
+    }
+  }
   unit <- vapply(names(object$parameters), function(n) prior_cdf(object$parameters[[n]]$prior, newdata[, n]), numeric(nrow(newdata)))
   w <- predict_emulator_(object$processes, matrix(unit, nrow(newdata)))
   list(mean = tcrossprod(object$basis$vectors, w$mean), sd = sqrt(tcrossprod(object$basis$vectors^2, w$variance)))

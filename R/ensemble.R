@@ -37,6 +37,7 @@ ensemble <- function(design, outputs, parameters = NULL) {
   outputs <- as.matrix(outputs)
   check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"), "design")
   check_input(checkmate::check_matrix(outputs, "numeric"), "outputs")
+  storage.mode(design) <- storage.mode(outputs) <- "double"
   if (nrow(design) != ncol(outputs)) {
     abort_input(c("{.arg design} has {nrow(design)} rows and {.arg outputs} {ncol(outputs)} columns; each row of the design needs its run.",
                   i = "Give the outputs as one column per run."))

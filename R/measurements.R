@@ -1,7 +1,7 @@
 #' Measurements: the target, the boundary conditions and what each row is for
 #'
 #' Checks a table of measurements and prepares it for all later stages: the record is cut into segments wherever
-#' time is broken, averaged to a coarser step if asked, and each row is given its use: calibration, validation or
+#' time is broken, averaged to a coarser step if asked (blocks follow the UTC clock), and each row is given its use: calibration, validation or
 #' warm-up. Time stamps mark the end of each interval.
 #'
 #' @param data A data frame; every numeric column may drive the simulator.
@@ -30,6 +30,10 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
   check_input(checkmate::check_number(warmup, lower = 0, finite = TRUE), "warmup")
   terms <- boundary_terms(boundary)
   require_columns(data, c(time, target, terms$name))
+  if (any(terms$name %in% c(time, target))) {
+    abort_input(c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
+                  i = "Leave it out of {.arg boundary}."))
+  }
   hours <- read_time(data[[time]], time)
   step <- stats::median(diff(hours))
   segment <- cumsum(c(TRUE, diff(hours) > 1.5 * step))
@@ -39,6 +43,10 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
   require_numeric(data, c(target, terms$name))
   drivers <- as.matrix(data[numeric_columns])
   y <- as.numeric(data[[target]])
+  if (any(is.infinite(y))) {
+    abort_input(c("Target {.val {target}} has {sum(is.infinite(y))} infinite value{?s}; the first is in row {which(is.infinite(y))[1]}.",
+                  i = "Mark a missing value as NA: it is then left out."))
+  }
   require_complete(drivers, terms$name, hours, data[[time]])
 
   if (is.character(calibrate)) calibrate <- eval_rows(calibrate, data, "calibrate")
@@ -56,8 +64,10 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
   use <- ifelse(warm, "warmup", ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none")))
 
   raw <- list(time = data[[time]], hours = hours, step_h = step, segment = segment, use = use, y = y, drivers = drivers)
-  coarse <- average_rows(raw, average)
-  x <- boundary_columns(coarse$drivers, terms)
+  # Sine and cosine are taken before averages: the mean of 350 and 10 degrees is not 180.
+  columns <- boundary_columns(drivers, terms)
+  coarse <- average_rows(raw, average, columns$values)
+  x <- c(list(values = coarse$boundary), columns[c("names", "condition")])
   constant <- constant_conditions(x, coarse$use == "calibrate")
   if (length(constant)) {
     warn_input(c("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do} not vary over the calibration rows and {?is/are} left out of the analysis.",
@@ -99,7 +109,7 @@ require_columns <- function(data, columns, call = rlang::caller_env()) {
 
 require_numeric <- function(data, columns, call = rlang::caller_env()) {
   for (column in columns) {
-    if (is.numeric(data[[column]])) next
+    if (is.numeric(data[[column]]) && is.null(dim(data[[column]]))) next
     values <- as.character(data[[column]])
     bad <- which(is.na(suppressWarnings(as.numeric(values))) & !is.na(values))
     where <- if (length(bad)) "row {bad[1]} holds {.val {values[bad[1]]}}" else "it is of class {.cls {class(data[[column]])}}"
@@ -121,6 +131,7 @@ read_time <- function(values, name, call = rlang::caller_env()) {
   }
   hours <- if (inherits(values, "POSIXct")) as.numeric(values) / 3600 else if (is.numeric(values)) as.numeric(values)
   if (is.null(hours)) abort_input("Time column {.val {name}} is of class {.cls {class(values)}}; give POSIXct, ISO text or hours.", call = call)
+  if (any(is.infinite(hours))) abort_input("Time column {.val {name}} has an infinite value in row {which(is.infinite(hours))[1]}.", call = call)
   if (anyNA(hours)) {
     abort_input(c("Time column {.val {name}} has {sum(is.na(hours))} missing value{?s}; the first is in row {which(is.na(hours))[1]}.",
                   i = "Every row needs its time; delete rows without one."), call = call)
@@ -138,13 +149,17 @@ read_time <- function(values, name, call = rlang::caller_env()) {
   hours
 }
 
-# Text as time in UTC, or as hours if it is all numbers; NA where it is neither.
+# ISO 8601 text as time in UTC (a date alone is its midnight), or all numbers as hours; NA where it is neither.
 read_time_text <- function(values) {
   hours <- suppressWarnings(as.numeric(values))
   if (!anyNA(hours)) return(hours)
-  formats <- c("%Y-%m-%d %H:%M:%OS", "%Y-%m-%d %H:%M", "%Y-%m-%d")
-  tries <- lapply(formats, function(f) as.POSIXct(strptime(sub("T", " ", values, fixed = TRUE), f, tz = "UTC")))
-  tries[[which.min(vapply(tries, function(t) sum(is.na(t)), 1L))]]
+  parts <- regmatches(values, regexec("^(\\d{4}-\\d{2}-\\d{2})(?:[T ](\\d{2}:\\d{2})(:\\d{2}(?:\\.\\d+)?)?)?(Z|[+-]\\d{2}:?\\d{2})?$", trimws(values), perl = TRUE))
+  part <- function(k, empty) vapply(parts, function(p) if (length(p) < k || !nzchar(p[k])) empty else p[k], "")
+  clock <- paste0(part(2, NA_character_), " ", part(3, "00:00"), part(4, ":00"))
+  time <- as.POSIXct(strptime(clock, "%Y-%m-%d %H:%M:%OS", tz = "UTC"))
+  zone <- sub(":", "", sub("Z", "+0000", part(5, "+0000")))
+  shift <- as.numeric(paste0(substr(zone, 1, 1), 1)) * (60 * as.numeric(substr(zone, 2, 3)) + as.numeric(substr(zone, 4, 5)))
+  time - 60 * shift
 }
 
 check_regular <- function(hours, step, name, call = rlang::caller_env()) {
@@ -182,7 +197,8 @@ require_complete <- function(drivers, analysed, hours, time, call = rlang::calle
 }
 
 eval_rows <- function(text, data, what, call = rlang::caller_env()) {
-  rows <- tryCatch(eval(parse(text = text)[[1]], data, baseenv()),
+  check_input(checkmate::check_string(text, min.chars = 1), what, "One expression in the columns of the data.", call = call)
+  rows <- tryCatch(eval(str2lang(text), data, baseenv()),
                    error = function(e) abort_input(c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
                                                      i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."), call = call))
   rows
@@ -196,7 +212,7 @@ rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {
 }
 
 # Means over blocks of whole rows, aligned to the clock; a block must be complete and of one use and segment.
-average_rows <- function(raw, average, call = rlang::caller_env()) {
+average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
   per_step <- 1L
   if (!is.null(average)) {
     check_input(checkmate::check_number(average, lower = 0, finite = TRUE), "average", call = call)
@@ -217,11 +233,11 @@ average_rows <- function(raw, average, call = rlang::caller_env()) {
   mean_of <- function(v) as.numeric(rowsum(v[keep], index[keep], reorder = TRUE)) / per_step
   y <- mean_of(raw$y)
   spread <- if (per_step > 1) sqrt(pmax(0, as.numeric(rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) / (per_step - 1)) / per_step) else rep(NA_real_, length(whole))
-  drivers <- rowsum(raw$drivers[keep, , drop = FALSE], index[keep], reorder = TRUE) / per_step
+  boundary <- rowsum(boundary[keep, , drop = FALSE], index[keep], reorder = TRUE) / per_step
   last <- which(keep)[!duplicated(index[keep], fromLast = TRUE)]
-  rownames(drivers) <- NULL
+  dimnames(boundary) <- NULL
   list(per_step = per_step, step_h = width, time = raw$time[last], hours = raw$hours[last], segment = raw$segment[last],
-       use = unname(as.character(uses[whole])), y = y, standard_error = spread, drivers = drivers, block = index)
+       use = unname(as.character(uses[whole])), y = y, standard_error = spread, boundary = boundary, block = index)
 }
 
 boundary_columns <- function(drivers, terms) {

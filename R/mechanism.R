@@ -48,7 +48,7 @@ print.amiss_catalogue <- function(x, ...) {
 
 extend <- function(simulator, mechanism, call = rlang::caller_env()) {
   extended <- tryCatch(mechanism$edit(simulator), error = function(e) {
-    abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = conditionMessage(e)), call = call)
+    abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"), call = call)
   })
   if (!inherits(extended, class(simulator)[1])) {
     abort_input("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not a simulator.", call = call)

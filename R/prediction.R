@@ -12,7 +12,11 @@
 #'   `crps`, the continuous ranked probability score of each row.
 #' @export
 predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), draws = 40, seed = object$seed, threads = 1, ...) {
+  rlang::check_dots_empty()
   use <- match.arg(use, several.ok = TRUE)
+  check_input(checkmate::check_count(draws, positive = TRUE), "draws")
+  threads <- check_threads(threads)
+  seed <- pick_seed(seed)
   m <- object$measurements
   simulator <- object$emulator$simulator
   if (is.null(simulator)) {
@@ -22,7 +26,8 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
   picked <- systematic_draws(object$weights[order(object$values[, 1])], draws)
   picked <- order(object$values[, 1])[picked]
   rows <- which(m$use %in% use & !is.na(m$y))
-  runs <- simulate_measured(simulator, object$values[picked, , drop = FALSE], m, use, check_threads(threads))
+  if (!length(rows)) abort_input("The measurements have no row to {.val {use}}.")
+  runs <- simulate_measured(simulator, object$values[picked, , drop = FALSE], m, use, threads)
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
   if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
   with_seed(seed, summarise_prediction(m, rows, runs, error_sd(object)))
@@ -31,7 +36,7 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy
 # as large as they were seen, the Q fitted coefficients taken off the degrees of freedom.
 error_sd <- function(fit) {
-  r <- residuals(fit)
+  r <- stats::residuals(fit)
   sqrt(sum(r^2) / (length(r) - ncol(fit$emulator$basis$vectors)))
 }
 

@@ -27,7 +27,10 @@ study_fields <- list(
 run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE) {
   started <- proc.time()[["elapsed"]]
   study <- read_study(path, quiet)
-  if (!is.null(out)) check_out(out)
+  if (!is.null(out)) {
+    check_report_tools()
+    check_out(out)
+  }
   seed <- pick_seed(seed %||% study$seed)
   stages <- if (!is.null(out)) file.path(out, "stages")
   upgrade <- upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
@@ -47,7 +50,7 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE)
 read_study <- function(path, quiet = TRUE) {
   check_input(checkmate::check_file_exists(path, access = "r"), "path")
   study <- tryCatch(yaml::read_yaml(path), error = function(e) {
-    abort_input(c("The study file {.file {path}} cannot be read as YAML.", x = conditionMessage(e)))
+    abort_input(c("The study file {.file {path}} cannot be read as YAML.", x = "{conditionMessage(e)}"))
   })
   if (!is.list(study)) abort_input("The study file {.file {path}} holds no fields.")
   absent <- setdiff(study_fields$needed, names(study))
@@ -59,8 +62,8 @@ read_study <- function(path, quiet = TRUE) {
   }
   folder <- dirname(normalizePath(path))
   data_file <- study_path(study$data, folder, "data")
-  data <- tryCatch(utils::read.csv(data_file, stringsAsFactors = FALSE), error = function(e) {
-    abort_input(c("The data file {.file {data_file}} cannot be read.", x = conditionMessage(e)))
+  data <- tryCatch(utils::read.csv(data_file, stringsAsFactors = FALSE, check.names = FALSE), error = function(e) {
+    abort_input(c("The data file {.file {data_file}} cannot be read.", x = "{conditionMessage(e)}"))
   })
   measure <- function() {
     measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
@@ -90,7 +93,7 @@ study_path <- function(path, folder, field, call = rlang::caller_env()) {
 source_value <- function(path, field, call = rlang::caller_env()) {
   tryCatch(sys.source_value(path), error = function(e) {
     if (inherits(e, "amiss_error")) stop(e)
-    abort_input(c("The {.field {field}} file {.file {path}} stopped with an error.", x = conditionMessage(e)), call = call)
+    abort_input(c("The {.field {field}} file {.file {path}} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
   })
 }
 
@@ -100,26 +103,32 @@ sys.source_value <- function(path) {
 
 check_out <- function(out, call = rlang::caller_env()) {
   check_input(checkmate::check_string(out, min.chars = 1), "out", call = call)
-  if (file.exists(out) && !dir.exists(out)) abort_input("{.arg out} = {.file {out}} is a file, not a folder.", call = call)
-  parent <- if (dir.exists(out)) out else dirname(out)
-  while (!dir.exists(parent) && parent != dirname(parent)) parent <- dirname(parent)
-  if (file.access(parent, 2) != 0) abort_input("{.arg out} = {.file {out}} cannot be written.", call = call)
+  made <- !dir.exists(out) && suppressWarnings(dir.create(out, recursive = TRUE))
+  probe <- file.path(out, "probe")
+  usable <- dir.exists(out) && suppressWarnings(file.create(probe))
+  unlink(if (made) out else probe, recursive = TRUE)
+  if (!usable) {
+    abort_input(c("{.arg out} = {.file {out}} is not a folder that can be written.", i = "Name another folder; it is made if it does not exist."), call = call)
+  }
 }
 
-# Everything is written to a folder beside the wanted one and moved when complete: nothing half-written stays.
+# Everything is made elsewhere, copied into the folder and renamed when complete: nothing half-written stays.
 write_study <- function(upgrade, out, quiet = FALSE) {
+  work <- tempfile("amiss-")
+  dir.create(file.path(work, "figures"), recursive = TRUE)
   dir.create(out, recursive = TRUE, showWarnings = FALSE)
-  staging <- tempfile("amiss-", tmpdir = out)
-  dir.create(file.path(staging, "figures"), recursive = TRUE)
-  on.exit(unlink(staging, recursive = TRUE))
-  save_figures(upgrade, file.path(staging, "figures"))
-  saveRDS(upgrade, file.path(staging, "result.rds"))
-  jsonlite::write_json(result_list(upgrade), file.path(staging, "result.json"), auto_unbox = TRUE, digits = NA,
+  staging <- file.path(out, basename(work))
+  on.exit(unlink(c(work, staging), recursive = TRUE))
+  save_figures(upgrade, file.path(work, "figures"))
+  saveRDS(upgrade, file.path(work, "result.rds"))
+  jsonlite::write_json(result_list(upgrade), file.path(work, "result.json"), auto_unbox = TRUE, digits = NA,
                        null = "null", na = "null", pretty = TRUE)
-  report(upgrade, file.path(staging, "report.html"))
-  unlink(file.path(out, c("figures", "result.rds", "result.json", "report.html")), recursive = TRUE)
-  moved <- file.rename(file.path(staging, dir(staging)), file.path(out, dir(staging)))
-  if (!all(moved)) abort_input("The results could not be moved into {.file {out}}.")
+  report(upgrade, file.path(work, "report.html"))
+  if (!file.copy(work, out, recursive = TRUE)) abort_input("The results could not be copied into {.file {out}}.")
+  for (name in dir(work)) {
+    unlink(file.path(out, name), recursive = TRUE)
+    if (!file.rename(file.path(staging, name), file.path(out, name))) abort_input("{.file {name}} could not be moved into {.file {out}}.")
+  }
   if (!quiet) cli::cli_alert_success("Written to {.file {out}}: report.html, figures/, result.rds, result.json")
 }
 
@@ -145,6 +154,6 @@ result_list <- function(upgrade) {
   cause <- upgrade$named_cause
   if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
   list(schema = 1L, study = upgrade$study %||% upgrade$measurements$name, seed = upgrade$seed, wall_s = upgrade$wall_s,
-       models = lapply(upgrade$models, model_list), candidates = lapply(seq_len(NROW(upgrade$candidates)), candidate_list),
+       diagnosis = diagnosis_verdict(upgrade), models = lapply(upgrade$models, model_list), candidates = lapply(seq_len(NROW(upgrade$candidates)), candidate_list),
        named_cause = cause, gain = upgrade$gain, stopped_because = upgrade$stopped_because)
 }

@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, level = 0.95, emulator = list(), calibration = list(), attribution = list())
+upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibration = list(), attribution = list())
 
 #' The loop: show, name the cause, extend, measure
 #'
@@ -25,6 +25,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
   check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
   control <- merge_control(upgrade_control, control)
+  check_input(checkmate::check_count(control$max_steps), "control$max_steps")
+  check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   say <- if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
@@ -102,7 +104,7 @@ plain <- function(x) {
 
 measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(paste("measured", name), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)
-  prediction <- predict(fit, seed = settings$seed, threads = settings$threads)
+  prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)
   list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
        prediction = prediction, scores = prediction_scores(prediction))
 })
@@ -126,7 +128,8 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   fits <- list()
   rows <- list()
   for (name in names(catalogue)) {
-    fit <- fit_model(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings)
+    fit <- rlang::try_fetch(fit_model(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings),
+                            amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
     bf <- bayes_factor(fit, current$fit)
     say("  {name}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
     fits[[name]] <- fit
@@ -177,7 +180,8 @@ print.amiss_upgrade <- function(x, ...) {
   cause <- x$named_cause
   cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(x$models) - 1} mechanism{?s} adopted")
   if (is.null(cause)) cli::cli_bullets(c("*" = "no cause is named")) else {
-    cli::cli_bullets(c("*" = "cause: {.strong {cause$mechanism}} ({cause$boundary}), log10 Bayes factor {round(cause$log10_bf, 1)}", " " = "{cause$sentence}"))
+    verdict <- diagnosis_verdict(x)
+    cli::cli_bullets(c("*" = "{verdict$tag}: {.strong {cause$mechanism}} ({cause$boundary}), log10 Bayes factor {round(cause$log10_bf, 1)}", " " = "{cause$sentence}"))
   }
   g <- x$gain
   cli::cli_bullets(c("*" = "RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)} held out",

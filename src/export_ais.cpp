@@ -1,5 +1,5 @@
 // Annealed importance sampling of a posterior whose likelihood is an R function: convert, call, convert.
-#include "export_convert.hpp"
+#include "export_convert.h"
 
 #include "engine/random/transform.hpp"
 

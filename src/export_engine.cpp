@@ -1,5 +1,5 @@
 // Conversions between R and the engine: convert, call, convert. Nothing is computed here.
-#include "export_convert.hpp"
+#include "export_convert.h"
 
 #include "engine/attribution/SurrogateTest.hpp"
 #include "engine/basis/Basis.hpp"

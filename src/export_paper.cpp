@@ -4,7 +4,7 @@
 #include "engine/attribution/VarianceIndex.hpp"
 #include "engine/calibration/PaperCalibration.hpp"
 #include "engine/discrepancy/KernelModel.hpp"
-#include "export_convert.hpp"
+#include "export_convert.h"
 
 using namespace amiss;  // NOLINT
 using Eigen::MatrixXd;

@@ -14,10 +14,10 @@ from_to <- function(what, pair, unit = "") {
 
 numbers <- function(x) suppressWarnings(as.numeric(unlist(x)))
 
-describe_cause <- function(cause) {
-  if (length(cause) == 0) return("No cause is named: the evidence does not single one out.")
+describe_cause <- function(cause, diagnosis) {
+  if (length(cause) == 0) return(diagnosis$headline)
   bayes_factor <- numbers(cause$log10_bf)
-  c(cause$sentence %||% sprintf("The cause named is %s.", cause$mechanism),
+  c(paste0(diagnosis$tag, "."), diagnosis$headline,
     sprintf("Mechanism: %s; boundary condition: %s", cause$mechanism %||% "none",
             paste(unlist(cause$boundary) %||% "none", collapse = ", ")),
     if (length(bayes_factor) == 1 && !is.na(bayes_factor)) paste("Evidence:", odds(bayes_factor)))
@@ -39,6 +39,6 @@ describe_gain <- function(gain) {
 for (folder in commandArgs(trailingOnly = TRUE)) {
   result <- jsonlite::read_json(file.path(folder, "result.json"), simplifyVector = TRUE)
   cat(basename(folder), "\n", sep = "")
-  lines <- c(describe_cause(result$named_cause), describe_gain(result$gain))
+  lines <- c(describe_cause(result$named_cause, result$diagnosis), describe_gain(result$gain))
   writeLines(c(strwrap(lines, width = 100, indent = 2, exdent = 4), paste0("  Report: ", folder, "/report.html"), ""))
 }

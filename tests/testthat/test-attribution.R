@@ -20,3 +20,9 @@ test_that("two threads give the bits of one", {
   expect_identical(attribute_discrepancy(fit, list(surrogates = 19), seed = 1, threads = 2)$table,
                    attribute_discrepancy(fit, list(surrogates = 19), seed = 1, threads = 1)$table)
 })
+
+test_that("one boundary condition is enough", {
+  fit <- linear_fit(linear_measurements(boundary = ~Te))
+  expect_equal(attribute_discrepancy(fit, list(surrogates = 19), seed = 1)$table$boundary, "Te")
+  expect_error(attribute_discrepancy(fit, list(level = 5)), "level", class = "amiss_error_input")
+})

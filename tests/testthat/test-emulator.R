@@ -25,3 +25,11 @@ test_that("a basis that explains too little is said to", {
   expect_error(train_emulator(ensemble(design, noise), 0.01, list(vectors = 3)), "unknown option.*vectors", class = "amiss_error_input")
   expect_error(train_emulator(ensemble(design, matrix(1, 240, 30)), 0.01), "do not vary", class = "amiss_error_input")
 })
+
+test_that("the emulator refuses points it knows nothing of", {
+  m <- linear_measurements()
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
+  expect_error(predict(emulator, cbind(offset = 500, gain = 1)), "outside its prior", class = "amiss_error_input")
+  expect_error(predict(emulator, cbind(offset = NA, gain = 1)), "newdata", class = "amiss_error_input")
+  expect_error(predict(emulator, "a"), "newdata", class = "amiss_error_input")
+})

@@ -39,3 +39,10 @@ test_that("the design follows its seed and leaves R's generator alone", {
   set.seed(2)
   expect_identical(simulate_design(linear_simulator(), m, 20)$values, b$values)
 })
+
+test_that("whole-number runs are as good as any", {
+  m <- linear_measurements()
+  e <- simulate_design(linear_simulator(), m, runs = 30, seed = 3)
+  whole <- matrix(as.integer(round(1000 * e$outputs)), nrow(e$outputs))
+  expect_s3_class(train_emulator(ensemble(e$values, whole, e$parameters), 10), "amiss_emulator")
+})

@@ -68,3 +68,28 @@ test_that("circular conditions enter as sine and cosine of one condition", {
   expect_equal(m$condition, c(1, 2, 2))
   expect_equal(m$boundary[, 2]^2 + m$boundary[, 3]^2, rep(1, 240))
 })
+
+test_that("directions are averaged as directions", {
+  data <- linear_data()
+  data$Wd <- rep(c(350, 10), 120)
+  data$Wd[1:4] <- c(80, 100, 80, 100)
+  m <- linear_measurements(data, boundary = ~ Te + circular(Wd), average = 2)
+  expect_equal(m$boundary[10, 3], cos(10 * pi / 180))
+  expect_equal(m$boundary[10, 2], 0, tolerance = 1e-12)
+})
+
+test_that("target, infinite values and odd expressions are refused by name", {
+  data <- linear_data()
+  fails(data, "Ti.*cannot be a boundary condition", boundary = ~ Te + Ti)
+  fails(broken(Ti = function(v) replace(v, 12, Inf)), "infinite.*row 12")
+  fails(broken(hour = function(v) replace(v, 240, Inf)), "infinite value in row 240")
+  fails(data, "calibrate", calibrate = c("hour < 10", "hour > 100"))
+})
+
+test_that("text times know midnight and offsets, and refuse rubbish", {
+  read <- function(text) amiss:::read_time(text, "t") * 3600
+  start <- as.numeric(as.POSIXct("2024-03-01", tz = "UTC"))
+  expect_equal(read(c("2024-03-01", "2024-03-01 01:00:00")), start + c(0, 3600))
+  expect_equal(read(c("2024-03-01T01:00+0100", "2024-03-01T02:00:00+01:00", "2024-03-01T02:30Z")), start + c(0, 3600, 9000))
+  expect_error(read(c("2024-03-01 01:00:00", "2024-03-01 02:00:00 foo")), "row 2.*foo", class = "amiss_error_input")
+})

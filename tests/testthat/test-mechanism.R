@@ -21,3 +21,8 @@ test_that("every mechanism of the shipped catalogues applies to its model", {
     expect_gt(length(free_parameters(amiss:::extend(paper_box("M2"), entry))), length(free_parameters(paper_box("M2"))))
   }
 })
+
+test_that("braces in another's message are left as they are", {
+  broken <- mechanism("b", function(model) stop("no {way} }"), "Te", "B.")
+  expect_error(amiss:::extend(linear_simulator(), broken), "no {way} }", fixed = TRUE, class = "amiss_error_input")
+})

@@ -100,3 +100,13 @@ test_that("the command follows its exit codes", {
   expect_equal(run("run", shQuote(bad), "--out", shQuote(file.path(folder, "bad"))), 1)
   expect_false(file.exists(file.path(folder, "bad")))
 })
+
+test_that("a folder that cannot be used is refused before anything is computed", {
+  folder <- withr::local_tempdir()
+  study <- write_study_file(folder)
+  file.create(file.path(folder, "afile"))
+  expect_error(run_study(study, file.path(folder, "afile", "sub"), quiet = TRUE), "not a folder", class = "amiss_error_input")
+  out <- file.path(folder, "100 %d")
+  run_study(study, out, quiet = TRUE)
+  expect_true(file.exists(file.path(out, "report.html")))
+})
