@@ -8,6 +8,7 @@
 #include "engine/ais/Target.hpp"
 #include "engine/error/ErrorModel.hpp"
 #include "engine/linalg/Eigen.hpp"
+#include "engine/linalg/constants.hpp"
 
 /// Independent, dense and slow computations that the tests compare the engine with.
 namespace amiss::test {
@@ -15,8 +16,6 @@ namespace amiss::test {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kLogTwoPi = 1.83787706640934548356;
 
 /// Standard normal numbers that do not come from the engine's own streams.
 inline MatrixXd normal_matrix(Index rows, Index columns, unsigned seed) {
