@@ -24,15 +24,9 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #' @return An object of class `amiss_calibration`.
 #' @export
 calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
-  check_input(checkmate::check_class(emulator, "amiss_emulator"), "emulator")
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  rows <- emulated_rows(emulator, measurements)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  rows <- used_rows(measurements, "calibrate")
-  if (nrow(emulator$basis$vectors) != length(rows)) {
-    abort_input(c("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have {length(rows)} calibration rows.",
-                  i = "Train it on runs at exactly these rows."))
-  }
   control <- fill_calibration_control(control, measurements, length(rows))
   data <- history_data(emulator, measurements, rows, control)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
@@ -50,6 +44,18 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
                  centre = result$centre, scale = result$scale, null_setting = result$null_setting,
                  log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
                  interval = posterior$interval, trust = trust(history, posterior)), class = "amiss_calibration")
+}
+
+# The calibration rows, which must be those that the emulator was trained on.
+emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
+  check_input(checkmate::check_class(emulator, "amiss_emulator"), "emulator", call = call)
+  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements", call = call)
+  rows <- used_rows(measurements, "calibrate")
+  if (nrow(emulator$basis$vectors) != length(rows)) {
+    abort_input(c("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have {length(rows)} calibration rows.",
+                  i = "Train it on runs at exactly these rows."), call = call)
+  }
+  rows
 }
 
 fill_calibration_control <- function(control, measurements, n, call = rlang::caller_env()) {

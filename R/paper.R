@@ -48,15 +48,9 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #'   high-dimensional outputs and boundary conditions.
 #' @export
 calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
-  check_input(checkmate::check_class(emulator, "amiss_emulator"), "emulator")
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  rows <- emulated_rows(emulator, measurements)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  rows <- used_rows(measurements, "calibrate")
-  if (nrow(emulator$basis$vectors) != length(rows)) {
-    abort_input(c("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have {length(rows)} calibration rows.",
-                  i = "Train it on runs at exactly these rows."))
-  }
   control <- fill_paper_control(control, length(rows), seed)
   data <- paper_data(emulator, measurements, rows, control)
   priors <- list(alpha = control$alpha, t2 = control$t2, noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence)

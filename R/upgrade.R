@@ -102,7 +102,7 @@ plain <- function(x) {
   x
 }
 
-measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(paste("measured", name), {
+measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(list("measured", name, plain(fit$emulator$simulator)), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)
   prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)
   list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,

@@ -10,9 +10,17 @@ test_that("a planted effect is found in the right condition, and none where ther
   expect_false(any(none$table$significant))
 })
 
-test_that("shares and the rest add to one", {
-  fit <- linear_fit()
-  expect_lt(sum(amiss:::variance_shares(fit, amiss:::history_data(fit$emulator, fit$measurements, fit$rows, fit$control))), 1)
+test_that("shares and the unexplained rest add to one", {
+  data <- linear_data()
+  data$Ti <- data$Ti + 0.004 * data$Gv
+  fit <- linear_fit(linear_measurements(data))
+  inside <- amiss:::history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  outside <- function(x) stats::lm.fit(inside$basis, x)$residuals
+  y <- outside(inside$y)
+  rest <- y - outside(rowSums(amiss:::condition_responses(fit, inside)))
+  shares <- amiss:::variance_shares(fit, inside)
+  expect_equal(sum(shares) + sum(rest * y) / sum(y^2), 1)
+  expect_gt(shares[2], 0.5)  # the sun carries an effect of 0.3 K beside a noise of 0.1 K
 })
 
 test_that("two threads give the bits of one", {

@@ -93,3 +93,10 @@ test_that("text times know midnight and offsets, and refuse rubbish", {
   expect_equal(read(c("2024-03-01T01:00+0100", "2024-03-01T02:00:00+01:00", "2024-03-01T02:30Z")), start + c(0, 3600, 9000))
   expect_error(read(c("2024-03-01 01:00:00", "2024-03-01 02:00:00 foo")), "row 2.*foo", class = "amiss_error_input")
 })
+
+test_that("an error names its function without printing the data", {
+  data <- linear_data()
+  error <- tryCatch(do.call(measurements, list(data[-1], "hour", "Ti", ~Te)), error = identity)
+  expect_lt(max(nchar(rlang::cnd_message(error))), 500)
+  expect_lt(length(deparse(conditionCall(error))), 3)
+})
