@@ -1,3 +1,6 @@
+ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision = 0.1, chains = NULL, sweeps = 3, max_sweeps = 30,
+                    ess_drop = 0.7, resample = TRUE, importance_draws = 1000, max_components = 3)
+
 #' Annealed importance sampling of any posterior
 #'
 #' The sampler behind [calibrate()], for a likelihood written in R: draws from the posterior and its normalising
@@ -6,8 +9,19 @@
 #' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
 #'   log-likelihood of each point; `-Inf` where it is zero.
 #' @param priors Named list of [prior]s.
-#' @param control List of options: `pilot_chains`, `groups`, `chains`, `sweeps`, `ess_drop`, `resample` (`FALSE` for plain
-#'   annealed importance sampling), `importance_draws` and `max_components` of the second estimator.
+#' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for each, how the chains
+#' move and how often. Then all is frozen and fresh, independent groups of chains give the estimate: unbiased, with an
+#' interval by bootstrap over the groups. A second estimator (an importance sample from a Student-t mixture fitted to the
+#' draws or, where none comes close, annealing from that mixture) must agree, and is reported where it is the more
+#' precise one. Groups or draws are added until the standard error is at most `precision`.
+#'
+#' @param control List of options:
+#'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at least 32);
+#'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below `precision` (0.1);
+#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, 30);
+#'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
+#'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
+#'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95 %),
 #'   `annealed` and `second` (estimate and standard error of each estimator), `ladder`, `evaluations`, `trusted`, `verdict`.
@@ -20,7 +34,7 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL) {
   check_input(checkmate::check_function(log_likelihood), "log_likelihood")
   check_input(checkmate::check_list(priors, types = "amiss_prior", min.len = 1, names = "unique"), "priors",
               "For example {.code list(a = uniform(0, 1))}.")
-  control <- merge_control(ais_control, control)
+  control <- fill_ais_control(control)
   seed <- pick_seed(seed)
   to_values <- function(unit) {
     values <- vapply(seq_along(priors), function(p) prior_quantile(priors[[p]], unit[, p]), numeric(nrow(unit)))
@@ -36,6 +50,32 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL) {
   result$draws <- to_values(result$unit)
   result$unit <- NULL
   structure(c(list(format_version = format_version, seed = seed), result), class = "amiss_ais")
+}
+
+# The numbers of chains stay 0 where they follow from the dimension, which the engine knows. Limits that were not
+# given follow those that were: more groups than `max_groups` raise it.
+fill_ais_control <- function(control, what = "control", call = rlang::caller_env()) {
+  filled <- merge_control(ais_control, control, what, call = call)
+  filled$pilot_chains <- filled$pilot_chains %||% 0
+  filled$chains <- filled$chains %||% 0
+  for (limit in c("groups", "sweeps")) {
+    upper <- paste0("max_", limit)
+    if (is.null(control[[upper]])) filled[[upper]] <- max(filled[[upper]], filled[[limit]])
+  }
+  check <- function(name, result, hint = NULL) check_input(result, paste0(what, "$", name), hint, call = call)
+  counts <- list(pilot_chains = 8, groups = 2, max_groups = filled$groups, chains = 4, sweeps = 1, max_sweeps = filled$sweeps,
+                 importance_draws = 50, max_components = 1)
+  absent <- c("pilot_chains", "chains", "importance_draws")
+  for (name in names(counts)) {
+    value <- filled[[name]]
+    if (name %in% absent && identical(as.numeric(value), 0)) next
+    lower <- if (is.numeric(counts[[name]])) counts[[name]] else 1
+    check(name, checkmate::check_int(value, lower = lower, upper = 1e7), paste0("Seen: ", deparse1(value), "."))
+  }
+  check("precision", checkmate::check_number(filled$precision, lower = 1e-6, finite = TRUE), "It is a standard error in nats.")
+  check("ess_drop", checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999))
+  check("resample", checkmate::check_flag(filled$resample))
+  filled
 }
 
 #' @export

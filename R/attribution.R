@@ -1,5 +1,5 @@
 attribution_control <- list(surrogates = 199, smallest_shift = 0.05, level = 0.05, least_log10_bf = 0.5,
-                            ais = list(pilot_chains = 128, groups = 4))
+                            ais = list(pilot_chains = 128, groups = 4, max_groups = 32, precision = 0.2))
 
 #' Which boundary conditions drive the discrepancy
 #'
@@ -19,7 +19,7 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   check_attribution_control(control)
   ais <- fit$control$ais
   ais[names(control$ais)] <- control$ais
-  control$ais <- merge_control(ais_control, ais, "control$ais")
+  control$ais <- fill_ais_control(ais, "control$ais")
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)

@@ -1,6 +1,3 @@
-ais_control <- list(pilot_chains = 256, groups = 8, chains = 32, sweeps = 3, ess_drop = 0.7, resample = TRUE,
-                    importance_draws = 1000, max_components = 3)
-
 calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, time_constants = NULL, error_times = NULL,
                             error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, ais = list())
 
@@ -60,7 +57,7 @@ emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
 
 fill_calibration_control <- function(control, measurements, n, call = rlang::caller_env()) {
   control <- merge_control(calibration_control, control, call = call)
-  control$ais <- merge_control(ais_control, control$ais, "control$ais", call = call)
+  control$ais <- fill_ais_control(control$ais, "control$ais", call = call)
   step <- measurements$step_h
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
   if (is.null(control$amplitude)) control["amplitude"] <- measurements$noise_sd

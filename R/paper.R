@@ -73,7 +73,7 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
 
 fill_paper_control <- function(control, n, seed, call = rlang::caller_env()) {
   control <- merge_control(paper_control, control, call = call)
-  control$ais <- merge_control(ais_control, control$ais, "control$ais", call = call)
+  control$ais <- fill_ais_control(control$ais, "control$ais", call = call)
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
   if (is.null(control$fictitious_seed)) control["fictitious_seed"] <- seed
   check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",

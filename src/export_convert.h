@@ -19,8 +19,11 @@ inline AisOptions ais_options(const Rcpp::List& control) {
   AisOptions options;
   options.pilot_chains = control["pilot_chains"];
   options.groups = control["groups"];
+  options.max_groups = control["max_groups"];
+  options.precision = control["precision"];
   options.chains = control["chains"];
   options.sweeps = control["sweeps"];
+  options.max_sweeps = control["max_sweeps"];
   options.ess_drop = control["ess_drop"];
   options.resample = control["resample"];
   options.importance_draws = control["importance_draws"];
@@ -36,9 +39,11 @@ inline EmulatorState emulator_state(const Rcpp::List& emulator) {
 inline Rcpp::List ais_list(const AisResult& result) {
   const std::size_t levels = result.ladder.size();
   Rcpp::NumericVector beta(levels), step(levels), acceptance(levels), ess(levels);
+  Rcpp::IntegerVector sweeps(levels);
   for (std::size_t k = 0; k < levels; ++k) {
     beta[k] = result.ladder[k].beta;
     step[k] = result.ladder[k].step;
+    sweeps[k] = result.ladder[k].sweeps;
     acceptance[k] = result.ladder[k].acceptance;
     ess[k] = result.ladder[k].ess;
   }
@@ -51,7 +56,7 @@ inline Rcpp::List ais_list(const AisResult& result) {
                          _["second"] = Rcpp::NumericVector::create(result.second, result.second_se),
                          _["second_ess"] = result.second_ess, _["ess"] = result.ess,
                          _["log_weight_variance"] = result.log_weight_variance,
-                         _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step,
+                         _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step, _["sweeps"] = sweeps,
                                                                _["acceptance"] = acceptance, _["ess"] = ess),
                          _["evaluations"] = static_cast<double>(result.evaluations),
                          _["trusted"] = result.trusted, _["verdict"] = result.verdict);

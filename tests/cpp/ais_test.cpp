@@ -279,11 +279,80 @@ TEST(SampleAis, StatedStandardErrorIsThatOfRepeatedRuns) {
   EXPECT_NEAR(std::sqrt(stated.squaredNorm() / 40) / actual, 1.0, 0.5);
 }
 
+// Two thin shells: no Student-t mixture comes close, and the chains move slowly at the cold end.
+FunctionTarget shells(Index d) {
+  return {d, [d](const VectorXd& x) {
+            const VectorXd z = 6.0 * x;
+            const double beyond = z.tail(d - 1).squaredNorm();
+            const auto shell = [&](double centre) {
+              const double r = std::sqrt(beyond + std::pow(z[0] - centre, 2)) - 2.0;
+              return -0.5 * r * r / 0.01;
+            };
+            return log_sum_exp(Eigen::Vector2d(shell(-3.5), shell(3.5)));
+          }};
+}
+
+TEST(SampleAis, GroupsAreAddedUntilTheStandardErrorIsAsAsked) {
+  AisOptions options;
+  options.importance_draws = 0;
+  options.precision = 10.0;
+  const AisResult once = sample_ais(shells(3), options, seeded(21));
+  options.precision = 0.08;
+  const AisResult refined = sample_ais(shells(3), options, seeded(21));
+  ASSERT_GT(once.standard_error, 0.08);
+  EXPECT_LE(refined.standard_error, 0.08);
+  EXPECT_GT(refined.draws.cols(), once.draws.cols());
+  EXPECT_EQ(refined.draws.leftCols(once.draws.cols()), once.draws);  // what was run is kept
+  options.max_groups = 16;
+  EXPECT_LE(sample_ais(shells(3), options, seeded(21)).draws.cols(), 16 * 32);
+}
+
+TEST(SampleAis, MoreImportanceDrawsAreAddedUntilTheStandardErrorIsAsAsked) {
+  AisOptions options;
+  options.precision = 0.01;
+  const LinearGaussian model(3, 0.3);
+  const AisResult result = sample_ais(model.target(), options, seeded(22));
+  EXPECT_EQ(result.estimator, "importance");
+  EXPECT_LE(result.standard_error, 0.01);
+  EXPECT_GE(sample_ais(model.target(), {}, seeded(22)).standard_error, result.standard_error);
+  EXPECT_LT(std::abs(result.log_evidence - model.log_evidence()), 0.04);  // four standard errors
+}
+
+TEST(SampleAis, ThePilotFindsHowManyMovesAreNeeded) {
+  AisOptions options;
+  options.importance_draws = 0;
+  const auto most = [&](const Target& target) {
+    int sweeps = 0;
+    for (const Temperature& level : sample_ais(target, options, seeded(23)).ladder)
+      sweeps = std::max(sweeps, level.sweeps);
+    return sweeps;
+  };
+  EXPECT_EQ(most(LinearGaussian(3, 0.5).target()), 3);
+  // A narrow mode at every whole number: proposals fitted to all of them are far too wide for one.
+  const int many = most(FunctionTarget(
+      2, [](const VectorXd& x) { return 100.0 * (std::cos(2 * kPi * x[0]) + std::cos(2 * kPi * x[1])); }));
+  EXPECT_GT(many, 5);
+  EXPECT_LE(many, 30);
+}
+
+TEST(AisOptions, NumbersOfChainsFollowTheDimension) {
+  const AisOptions few = AisOptions().for_dimension(2), many = AisOptions().for_dimension(40);
+  EXPECT_EQ(few.chains, 32);
+  EXPECT_EQ(few.pilot_chains, 256);
+  EXPECT_EQ(many.chains, 120);
+  EXPECT_EQ(many.pilot_chains, 640);
+  AisOptions own;
+  own.chains = 5;
+  EXPECT_EQ(own.for_dimension(40).chains, 5);
+}
+
 TEST(AisOptions, RefusesImpossibleValues) {
   const FunctionTarget flat(1, [](const VectorXd&) { return 0.0; });
   for (auto spoil :
        {+[](AisOptions& o) { o.groups = 1; }, +[](AisOptions& o) { o.chains = 3; },
-        +[](AisOptions& o) { o.sweeps = 0; }, +[](AisOptions& o) { o.ess_drop = 1.0; },
+        +[](AisOptions& o) { o.sweeps = 0; }, +[](AisOptions& o) { o.max_sweeps = 2; },
+        +[](AisOptions& o) { o.max_groups = 7; }, +[](AisOptions& o) { o.precision = 0.0; },
+        +[](AisOptions& o) { o.pilot_chains = 7; }, +[](AisOptions& o) { o.ess_drop = 1.0; },
         +[](AisOptions& o) { o.importance_draws = -1; }, +[](AisOptions& o) { o.importance_draws = 1; },
         +[](AisOptions& o) { o.max_components = 0; }}) {
     AisOptions options;

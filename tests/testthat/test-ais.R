@@ -36,4 +36,8 @@ test_that("bad likelihoods and priors are classed errors", {
   expect_error(ais(function(z) stop("no simulator"), prior, seed = 1), "no simulator", class = "amiss_error")
   expect_error(ais(function(z) rep(-Inf, nrow(z)), prior, seed = 1), "zero at every draw", class = "amiss_error_numerical")
   expect_error(ais(function(z) z[, 1], list(uniform(0, 1))), "priors", class = "amiss_error_input")
+  for (bad in list(list(chains = "many"), list(groups = NA), list(precision = -1), list(max_groups = 3), list(sweeps = 1.5),
+                   list(ess_drop = 2), list(resample = "no"), list(importance_draws = 10), list(chians = 10))) {
+    expect_error(ais(function(z) z[, 1], prior, bad, seed = 1), names(bad), class = "amiss_error_input")
+  }
 })

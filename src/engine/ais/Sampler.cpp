@@ -4,6 +4,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include "engine/linalg/log_sum_exp.hpp"
@@ -19,6 +20,7 @@ using Eigen::VectorXd;
 constexpr double kMoveDof = 6.0;        // of the proposals while annealing
 constexpr double kImportanceDof = 8.0;  // of the final mixture
 constexpr double kAcceptance = 0.35;    // aimed at by the step length
+constexpr double kMemory = 0.5;         // rank correlation of the likelihoods at which a chain has moved on
 enum Purpose : std::uint64_t { kPilot = 1, kFrozen, kBootstrap, kImportance };
 constexpr std::uint64_t kBridged = 16;  // added to the purposes of the second annealed run
 
@@ -34,6 +36,7 @@ struct Level {
   double beta;
   StudentT proposal;
   double step;
+  int sweeps;
 };
 
 VectorXd evaluate(const Target& target, const MatrixXd& x) {
@@ -115,6 +118,32 @@ double move(const Target& target, Chains& chains, const Level& level, Stream& st
   return static_cast<double>(accepted) / static_cast<double>(n);
 }
 
+// Ranks of the values, centred and scaled: their inner product is Spearman's correlation.
+VectorXd ranks(const VectorXd& values) {
+  const Index n = values.size();
+  std::vector<Index> order(static_cast<std::size_t>(n));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a] < values[b]; });
+  VectorXd rank(n);
+  for (Index i = 0; i < n; ++i) rank[order[static_cast<std::size_t>(i)]] = static_cast<double>(i);
+  rank.array() -= rank.mean();
+  return rank / rank.norm();
+}
+
+// Moves the chains, tuning the step, until their likelihoods have forgotten where they began. The first sweep
+// is still far from the right step and is not counted.
+void tune(const Target& target, const AisOptions& options, Chains& chains, Level& level, Stream& stream) {
+  const VectorXd before = ranks(chains.ll);
+  for (level.sweeps = 0; level.sweeps < options.max_sweeps; ++level.sweeps) {
+    if (level.sweeps >= options.sweeps && before.dot(ranks(chains.ll)) < kMemory) return;
+    const int repeats = level.sweeps == 0 ? 2 : 1;
+    for (int i = 0; i < repeats; ++i) {
+      const double accepted = move(target, chains, level, stream);
+      level.step = std::min(1.0, std::max(0.003, level.step * std::exp(accepted - kAcceptance)));
+    }
+  }
+}
+
 std::vector<Level> pilot(const Target& target, const AisOptions& options, const Context& context,
                          std::uint64_t purpose, long& evaluations) {
   Stream stream(context.seed, kPilot + purpose, 0);
@@ -131,14 +160,11 @@ std::vector<Level> pilot(const Target& target, const AisOptions& options, const 
     const double next = next_beta(chains, beta, options.ess_drop);
     chains.log_w += chains.ll * (next - beta);
     beta = next;
-    levels.push_back({beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step});
+    levels.push_back({beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step, 0});
     resample(chains, stream);
-    for (int sweep = 0; sweep < options.sweeps + 1; ++sweep) {
-      const double accepted = move(target, chains, levels.back(), stream);
-      evaluations += chains.size();
-      step = std::min(1.0, std::max(0.01, levels.back().step * std::exp(accepted - kAcceptance)));
-      levels.back().step = step;
-    }
+    tune(target, options, chains, levels.back(), stream);
+    evaluations += chains.size() * (levels.back().sweeps + 1);
+    step = levels.back().step;
   }
   return levels;
 }
@@ -170,25 +196,12 @@ Group frozen_run(const Target& target, const std::vector<Level>& levels, const A
       resample(group.chains, stream);
     }
     double accepted = 0.0;
-    for (int sweep = 0; sweep < options.sweeps; ++sweep)
+    for (int sweep = 0; sweep < levels[k].sweeps; ++sweep)
       accepted += move(target, group.chains, levels[k], stream);
-    group.acceptance[k] = accepted / options.sweeps;
+    group.acceptance[k] = accepted / levels[k].sweeps;
   }
   group.log_evidence += log_mean_exp(group.chains.log_w);
   return group;
-}
-
-// Without resampling every chain is an estimate of its own; with it, every group is.
-VectorXd independent_estimates(const std::vector<Group>& groups, const AisOptions& options) {
-  if (options.resample) {
-    VectorXd values(static_cast<Index>(groups.size()));
-    for (std::size_t g = 0; g < groups.size(); ++g) values[g] = groups[g].log_evidence;
-    return values;
-  }
-  VectorXd values(static_cast<Index>(groups.size()) * options.chains);
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    values.segment(g * options.chains, options.chains) = groups[g].chains.log_w;
-  return values;
 }
 
 struct Spread {
@@ -219,62 +232,117 @@ Spread bootstrap(const VectorXd& values, double estimate, Stream stream) {
 }
 
 // A pilot and the frozen run that follows it.
-struct AnnealedRun {
-  double log_evidence = 0.0, variance = 0.0;
-  Spread spread{};
-  MatrixXd x;
-  VectorXd ll, weights;
-  std::vector<Temperature> ladder;
-  long evaluations = 0;
-
-  double ess() const { return 1.0 / weights.squaredNorm(); }
-};
-
-AnnealedRun run_annealed(const Target& target, const AisOptions& options, const Context& context,
-                         std::uint64_t purpose) {
-  AnnealedRun run;
-  const std::vector<Level> levels = pilot(target, options, context, purpose, run.evaluations);
-  std::vector<Group> groups(options.groups);
-  parallel_for(options.groups, context, [&](int g) {
-    groups[g] = frozen_run(target, levels, options,
-                           Stream(context.seed, kFrozen + purpose, static_cast<std::uint64_t>(g)));
-  });
-  run.evaluations += static_cast<long>(options.groups) * options.chains *
-                     (1 + static_cast<long>(levels.size()) * options.sweeps);
-
-  const VectorXd estimates = independent_estimates(groups, options);
-  run.log_evidence = log_mean_exp(estimates);
-  if (!std::isfinite(run.log_evidence))
-    throw std::runtime_error("ais: every group of chains ended with likelihood zero");
-  run.spread = bootstrap(estimates, run.log_evidence, Stream(context.seed, kBootstrap + purpose, 0));
-  run.variance = (estimates.array() - estimates.mean()).square().sum() /
-                 std::max<double>(1.0, static_cast<double>(estimates.size()) - 1.0);
-
-  const Index n = options.chains;
-  run.x.resize(target.dimension(), n * options.groups);
-  run.ll.resize(n * options.groups);
-  VectorXd log_w(n * options.groups);
-  for (int g = 0; g < options.groups; ++g) {
-    run.x.middleCols(g * n, n) = groups[g].chains.x;
-    run.ll.segment(g * n, n) = groups[g].chains.ll;
-    const VectorXd& own = groups[g].chains.log_w;
-    const bool dead = !std::isfinite(groups[g].log_evidence);
-    log_w.segment(g * n, n).setConstant(-std::numeric_limits<double>::infinity());
-    if (!dead)
-      log_w.segment(g * n, n) =
-          own.array() + (options.resample ? groups[g].log_evidence - log_mean_exp(own) : 0.0);
+class AnnealedRun {
+ public:
+  AnnealedRun(const Target& target, const AisOptions& options, const Context& context, std::uint64_t purpose)
+      : target_(target), options_(options), context_(context), purpose_(purpose) {
+    levels_ = pilot(target, options, context, purpose, evaluations_);
+    add_groups(options.groups);
   }
-  run.weights = normalised_exp(log_w);
-  for (std::size_t k = 0; k < levels.size(); ++k) {
-    Temperature temperature{levels[k].beta, levels[k].step, 0.0, 0.0};
-    for (const auto& group : groups) {
-      temperature.acceptance += group.acceptance[k] / options.groups;
-      temperature.ess += group.ess[k] / options.groups;
+
+  /// Runs more groups, at most twice as many at a time, until the standard error is as asked.
+  void refine() {
+    // The standard error of few groups is uncertain itself: one standard deviation is added, so that a run
+    // does not stop because it happened to look precise.
+    const auto cautious = [&] {
+      return spread_.se * (1.0 + std::sqrt(0.5 / (static_cast<double>(estimates().size()) - 1.0)));
+    };
+    while (size() < options_.max_groups && !(cautious() <= options_.precision)) {
+      const double excess = std::isfinite(spread_.se) ? std::pow(cautious() / options_.precision, 2) : 2.0;
+      const int wanted = static_cast<int>(std::ceil(size() * std::min(2.0, excess)));
+      add_groups(std::min(wanted, options_.max_groups) - size());
     }
-    run.ladder.push_back(temperature);
   }
-  return run;
-}
+
+  double log_evidence() const { return log_evidence_; }
+  double variance() const {
+    const VectorXd values = estimates();
+    return (values.array() - values.mean()).square().sum() / static_cast<double>(values.size() - 1);
+  }
+  const Spread& spread() const { return spread_; }
+  long evaluations() const { return evaluations_; }
+  /// Likelihood values that one unit of precision (1 / se^2) costs.
+  double price() const { return spread_.se * spread_.se * static_cast<double>(moves()) * size(); }
+
+  // Without resampling every chain is an estimate of its own; with it, every group is.
+  VectorXd estimates() const {
+    const Index n = options_.resample ? 1 : options_.chains;
+    VectorXd values(size() * n);
+    for (int g = 0; g < size(); ++g) {
+      if (options_.resample) {
+        values[g] = groups_[g].log_evidence;
+      } else {
+        values.segment(g * n, n) = groups_[g].chains.log_w;
+      }
+    }
+    return values;
+  }
+
+  // Draws, their log-likelihoods and weights (sum 1) of all groups.
+  void gather(MatrixXd& x, VectorXd& ll, VectorXd& weights) const {
+    const Index n = options_.chains;
+    x.resize(target_.dimension(), n * size());
+    ll.resize(n * size());
+    VectorXd log_w = VectorXd::Constant(n * size(), -std::numeric_limits<double>::infinity());
+    for (int g = 0; g < size(); ++g) {
+      const Group& group = groups_[g];
+      x.middleCols(g * n, n) = group.chains.x;
+      ll.segment(g * n, n) = group.chains.ll;
+      if (!std::isfinite(group.log_evidence)) continue;
+      const double shift = options_.resample ? group.log_evidence - log_mean_exp(group.chains.log_w) : 0.0;
+      log_w.segment(g * n, n) = group.chains.log_w.array() + shift;
+    }
+    weights = normalised_exp(log_w);
+  }
+
+  std::vector<Temperature> ladder() const {
+    std::vector<Temperature> ladder;
+    for (std::size_t k = 0; k < levels_.size(); ++k) {
+      Temperature temperature{levels_[k].beta, levels_[k].step, levels_[k].sweeps, 0.0, 0.0};
+      for (const Group& group : groups_) {
+        temperature.acceptance += group.acceptance[static_cast<Index>(k)] / size();
+        temperature.ess += group.ess[static_cast<Index>(k)] / size();
+      }
+      ladder.push_back(temperature);
+    }
+    return ladder;
+  }
+
+ private:
+  int size() const { return static_cast<int>(groups_.size()); }
+
+  long moves() const {
+    long sweeps = 1;
+    for (const Level& level : levels_) sweeps += level.sweeps;
+    return sweeps * options_.chains;
+  }
+
+  void add_groups(int n) {
+    const int first = size();
+    groups_.resize(static_cast<std::size_t>(first + n));
+    parallel_for(n, context_, [&](int i) {
+      const int g = first + i;
+      groups_[g] = frozen_run(target_, levels_, options_,
+                              Stream(context_.seed, kFrozen + purpose_, static_cast<std::uint64_t>(g)));
+    });
+    evaluations_ += n * moves();
+    const VectorXd values = estimates();
+    log_evidence_ = log_mean_exp(values);
+    if (!std::isfinite(log_evidence_))
+      throw std::runtime_error("ais: every group of chains ended with likelihood zero");
+    spread_ = bootstrap(values, log_evidence_, Stream(context_.seed, kBootstrap + purpose_, 0));
+  }
+
+  const Target& target_;
+  const AisOptions& options_;
+  const Context& context_;
+  std::uint64_t purpose_;
+  std::vector<Level> levels_;
+  std::vector<Group> groups_;
+  double log_evidence_ = 0.0;
+  Spread spread_{};
+  long evaluations_ = 0;
+};
 
 // The same posterior seen from a reference fitted to its draws: little is left to anneal.
 class BridgedTarget : public Target {
@@ -298,100 +366,132 @@ class BridgedTarget : public Target {
 
 struct ImportanceSample {
   MatrixXd x;
-  VectorXd ll;
+  VectorXd ll, log_w;
   double log_evidence = -std::numeric_limits<double>::infinity();
   double se = std::numeric_limits<double>::infinity();
   double ess = 0.0;
   VectorXd weights;
+
+  Index size() const { return ll.size(); }
 };
 
-ImportanceSample importance_sample(const Target& target, const StudentTMixture& mixture, int n,
-                                   const Context& context, Stream& stream) {
-  ImportanceSample sample;
-  sample.x.resize(target.dimension(), n);
-  sample.ll.resize(n);
-  VectorXd log_w(n);
-  for (int i = 0; i < n; ++i) {
+// Adds n draws.
+void extend(ImportanceSample& sample, const Target& target, const StudentTMixture& mixture, Index n,
+            const Context& context, Stream& stream) {
+  const Index before = sample.size(), total = before + n;
+  sample.x.conservativeResize(target.dimension(), total);
+  sample.ll.conservativeResize(total);
+  sample.log_w.conservativeResize(total);
+  for (Index i = before; i < total; ++i) {
     sample.x.col(i) = mixture.draw(stream);
-    log_w[i] = target.log_reference(sample.x.col(i)) - mixture.log_density(sample.x.col(i));
+    sample.log_w[i] = target.log_reference(sample.x.col(i)) - mixture.log_density(sample.x.col(i));
   }
   // Blocks of fixed size, so that the result does not depend on how many threads share them.
-  constexpr int kBlock = 64;
-  parallel_for((n + kBlock - 1) / kBlock, context, [&](int b) {
-    const int first = b * kBlock, count = std::min(kBlock, n - first);
+  constexpr Index kBlock = 64;
+  parallel_for(static_cast<int>((n + kBlock - 1) / kBlock), context, [&](int b) {
+    const Index first = before + b * kBlock, count = std::min(kBlock, total - first);
     sample.ll.segment(first, count) = evaluate(target, sample.x.middleCols(first, count));
   });
-  log_w += sample.ll;
-  if (!std::isfinite(log_w.maxCoeff())) return sample;
-  sample.log_evidence = log_mean_exp(log_w);
-  sample.weights = normalised_exp(log_w);
+  sample.log_w.tail(n) += sample.ll.tail(n);
+  if (!std::isfinite(sample.log_w.maxCoeff())) return;
+  sample.log_evidence = log_mean_exp(sample.log_w);
+  sample.weights = normalised_exp(sample.log_w);
   sample.ess = 1.0 / sample.weights.squaredNorm();
-  sample.se = std::sqrt(std::max(0.0, n / sample.ess - 1.0) / (n - 1.0));
+  const double size = static_cast<double>(total);
+  sample.se = std::sqrt(std::max(0.0, size / sample.ess - 1.0) / (size - 1.0));
+}
+
+// Importance sample from a mixture fitted to the annealed draws, then from mixtures fitted to its own
+// weighted draws; the last mixture's draws alone are the estimator. Its effective size is 0 where no mixture
+// comes close.
+ImportanceSample importance_sample(const Target& target, const StudentTMixture& first,
+                                   const AisOptions& options, const Context& context, Stream& stream,
+                                   long& evaluations) {
+  constexpr int kRounds = 4;
+  constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
+  constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
+  constexpr Index kMost = 16;       // times the draws asked for, at most, for the sake of precision
+  const Index n = options.importance_draws;
+  StudentTMixture mixture = first;
+  ImportanceSample sample;
+  extend(sample, target, mixture, n, context, stream);
+  evaluations += n;
+  const auto good = [&] { return sample.ess >= kGood * static_cast<double>(sample.size()); };
+  for (int round = 1; round < kRounds && sample.ess > kUsable && (round < 2 || !good()); ++round) {
+    mixture = StudentTMixture::fit(sample.x, sample.weights, options.max_components, kImportanceDof, stream);
+    sample = ImportanceSample();
+    extend(sample, target, mixture, n, context, stream);
+    evaluations += n;
+  }
+  while (good() && !(sample.se <= options.precision) && sample.size() < kMost * n) {
+    extend(sample, target, mixture, n, context, stream);
+    evaluations += n;
+  }
+  if (!good()) sample.ess = 0.0;
   return sample;
 }
 
-// Makes an estimator the one that the result reports.
-void report_estimator(AisResult& result, const std::string& name, double log_evidence, const Spread& spread,
-                      MatrixXd x, VectorXd ll, VectorXd weights) {
+void report(AisResult& result, const std::string& name, double log_evidence, const Spread& spread) {
   result.estimator = name;
   result.log_evidence = log_evidence;
   result.standard_error = spread.se;
   result.lower = spread.lower;
   result.upper = spread.upper;
-  result.draws = std::move(x);
-  result.log_likelihood = std::move(ll);
-  result.weights = std::move(weights);
   result.ess = 1.0 / result.weights.squaredNorm();
 }
 
-// Importance sample from a mixture fitted to the annealed draws, then from mixtures fitted to its own
-// weighted draws; the last round alone is the estimator. Where no mixture comes close to the posterior, a
-// second annealed run goes the short way from the mixture to the posterior.
+void report(AisResult& result, ImportanceSample sample) {
+  result.draws = std::move(sample.x);
+  result.log_likelihood = std::move(sample.ll);
+  result.weights = std::move(sample.weights);
+  report(result, "importance", sample.log_evidence,
+         {sample.se, sample.log_evidence - 1.96 * sample.se, sample.log_evidence + 1.96 * sample.se});
+}
+
+void report(AisResult& result, const std::string& name, const AnnealedRun& run) {
+  run.gather(result.draws, result.log_likelihood, result.weights);
+  report(result, name, run.log_evidence(), run.spread());
+}
+
+// The second estimator, and the report of the better one: the importance sample or, where no mixture comes
+// close to the posterior, the annealed run from the prior or the one that goes the short way from the
+// mixture.
 void second_estimator(const Target& target, const AisOptions& options, const Context& context,
-                      AisResult& result) {
-  constexpr int kRounds = 4;
-  constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
-  constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
+                      AnnealedRun& annealed, AisResult& result) {
   Stream stream(context.seed, kImportance, 0);
-  const int n = options.importance_draws;
-  const auto fit = [&](const MatrixXd& x, const VectorXd& w) {
-    return StudentTMixture::fit(x, w, options.max_components, kImportanceDof, stream);
-  };
-  const StudentTMixture first = fit(result.draws, result.weights);
-  ImportanceSample sample = importance_sample(target, first, n, context, stream);
-  result.evaluations += n;
-  for (int round = 1; round < kRounds && sample.ess > kUsable && (round < 2 || sample.ess < kGood * n);
-       ++round) {
-    sample = importance_sample(target, fit(sample.x, sample.weights), n, context, stream);
-    result.evaluations += n;
-  }
-  if (sample.ess >= kGood * n) {
+  annealed.gather(result.draws, result.log_likelihood, result.weights);
+  const StudentTMixture mixture =
+      StudentTMixture::fit(result.draws, result.weights, options.max_components, kImportanceDof, stream);
+  ImportanceSample sample = importance_sample(target, mixture, options, context, stream, result.evaluations);
+  if (sample.ess > 0) {
     result.second = sample.log_evidence;
     result.second_se = sample.se;
     result.second_ess = sample.ess;
-    const Spread spread{sample.se, sample.log_evidence - 1.96 * sample.se,
-                        sample.log_evidence + 1.96 * sample.se};
-    report_estimator(result, "importance", sample.log_evidence, spread, std::move(sample.x),
-                     std::move(sample.ll), std::move(sample.weights));
+    report(result, std::move(sample));
     return;
   }
-  AnnealedRun run = run_annealed(BridgedTarget(target, first), options, context, kBridged);
-  result.evaluations += run.evaluations;
-  result.second = run.log_evidence;
-  result.second_se = run.spread.se;
-  result.second_ess = run.ess();
+  const BridgedTarget bridge(target, mixture);
+  AnnealedRun bridged(bridge, options, context, kBridged);
+  const bool shorter = bridged.price() < annealed.price();
+  (shorter ? bridged : annealed).refine();
+  result.evaluations += bridged.evaluations();
+  result.second = bridged.log_evidence();
+  result.second_se = bridged.spread().se;
+  report(result, "bridged", bridged);
+  result.second_ess = result.ess;
   // The likelihood of a draw, as seen from the target's own reference.
-  for (Index i = 0; i < run.ll.size(); ++i)
-    run.ll[i] += first.log_density(run.x.col(i)) - target.log_reference(run.x.col(i));
-  report_estimator(result, "bridged", run.log_evidence, run.spread, std::move(run.x), std::move(run.ll),
-                   std::move(run.weights));
+  for (Index i = 0; i < result.log_likelihood.size(); ++i)
+    result.log_likelihood[i] +=
+        mixture.log_density(result.draws.col(i)) - target.log_reference(result.draws.col(i));
+  if (!shorter) report(result, "annealed", annealed);
 }
 
 // Both estimates of Z are unbiased, so each is seldom too large (Markov: Z_hat > k Z with probability below 1
-// / k) and easily too small. An annealed estimate below the second one is no objection to it; one above says
-// that the second misses part of the posterior.
+// / k) and easily too small. Another estimate below the one reported is no objection to it; one above says
+// that the one reported misses part of the posterior.
 bool consistent(const AisResult& result) {
-  return result.annealed - result.second < 3.5 * std::hypot(result.annealed_se, result.second_se) + 0.1;
+  const double other = result.estimator == "annealed" ? result.second : result.annealed;
+  return other - result.log_evidence < 3.5 * std::hypot(result.annealed_se, result.second_se) + 0.1;
 }
 
 void judge(AisResult& result, const AisOptions& options) {
@@ -405,7 +505,7 @@ void judge(AisResult& result, const AisOptions& options) {
   } else if (!(result.standard_error <= 1.0)) {
     result.verdict = "not trusted: the standard error exceeds one nat";
   } else if (options.importance_draws > 0 && !consistent(result)) {
-    result.verdict = "not trusted: the second estimator misses part of the posterior that the first has seen";
+    result.verdict = "not trusted: the other estimator has seen part of the posterior that this one misses";
   } else {
     result.trusted = true;
     result.verdict = options.importance_draws > 0
@@ -417,9 +517,12 @@ void judge(AisResult& result, const AisOptions& options) {
 }  // namespace
 
 void AisOptions::check() const {
-  if (pilot_chains < 8 || groups < 2 || chains < 4)
+  if ((pilot_chains != 0 && pilot_chains < 8) || groups < 2 || (chains != 0 && chains < 4))
     throw std::invalid_argument("ais: need pilot_chains >= 8, groups >= 2, chains >= 4");
-  if (sweeps < 1) throw std::invalid_argument("ais: sweeps must be positive");
+  if (max_groups < groups) throw std::invalid_argument("ais: max_groups must not be below groups");
+  if (!(precision > 0)) throw std::invalid_argument("ais: precision must be positive");
+  if (sweeps < 1 || max_sweeps < sweeps)
+    throw std::invalid_argument("ais: sweeps must be positive, max_sweeps not below them");
   if (!(ess_drop > 0 && ess_drop < 1)) throw std::invalid_argument("ais: ess_drop must lie in (0, 1)");
   if (importance_draws != 0 && importance_draws < 50) {
     throw std::invalid_argument("ais: importance_draws must be 0 (none) or at least 50");
@@ -427,19 +530,30 @@ void AisOptions::check() const {
   if (max_components < 1 || max_temperatures < 1) throw std::invalid_argument("ais: negative size");
 }
 
-AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context) {
-  options.check();
+AisOptions AisOptions::for_dimension(Index d) const {
+  AisOptions filled = *this;
+  if (pilot_chains == 0) filled.pilot_chains = static_cast<int>(std::max<Index>(256, 16 * d));
+  if (chains == 0) filled.chains = static_cast<int>(std::max<Index>(32, 3 * d));
+  return filled;
+}
+
+AisResult sample_ais(const Target& target, const AisOptions& asked, const Context& context) {
+  asked.check();
+  const AisOptions options = asked.for_dimension(target.dimension());
   AisResult result;
-  AnnealedRun run = run_annealed(target, options, context, 0);
-  result.evaluations = run.evaluations;
-  result.annealed = run.log_evidence;
-  result.annealed_se = run.spread.se;
-  result.log_weight_variance = run.variance;
-  result.ladder = std::move(run.ladder);
-  report_estimator(result, "annealed", run.log_evidence, run.spread, std::move(run.x), std::move(run.ll),
-                   std::move(run.weights));
+  AnnealedRun annealed(target, options, context, 0);
   result.second = result.second_se = std::numeric_limits<double>::quiet_NaN();
-  if (options.importance_draws > 0) second_estimator(target, options, context, result);
+  if (options.importance_draws == 0) {
+    annealed.refine();
+    report(result, "annealed", annealed);
+  } else {
+    second_estimator(target, options, context, annealed, result);
+  }
+  result.evaluations += annealed.evaluations();
+  result.annealed = annealed.log_evidence();
+  result.annealed_se = annealed.spread().se;
+  result.log_weight_variance = annealed.variance();
+  result.ladder = annealed.ladder();
   judge(result, options);
   return result;
 }

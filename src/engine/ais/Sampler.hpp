@@ -9,23 +9,28 @@
 namespace amiss {
 
 struct AisOptions {
-  int pilot_chains = 256;  ///< chains of the pilot that adapts ladder and proposals
-  int groups = 8;          ///< independent groups of chains of the run that gives the estimate
-  int chains = 32;         ///< chains in a group
-  int sweeps = 3;          ///< moves of every chain at every temperature
+  int pilot_chains = 0;  ///< of the pilot that adapts ladder and proposals; 0: 16 per dimension, at least 256
+  int groups = 8;        ///< independent groups of chains of the run that gives the estimate, at first
+  int max_groups = 64;   ///< more are run, at most so many, until ...
+  double precision = 0.1;  ///< ... the standard error of the log evidence has come down to this, in nats
+  int chains = 0;          ///< in a group; 0: 3 per dimension, at least 32
+  int sweeps = 3;          ///< least number of moves of every chain at every temperature
+  int max_sweeps = 30;     ///< greatest; the pilot finds how many the likelihood needs to forget where it was
   double ess_drop = 0.7;   ///< the pilot's next temperature leaves this conditional effective size per chain
   bool resample = true;    ///< resample a group when its effective size falls below half; false: plain AIS
-  int importance_draws =
-      1000;  ///< draws of the second estimator, from a fitted Student-t mixture; 0 leaves it out
-  int max_components = 3;  ///< of that mixture
+  int importance_draws = 1000;  ///< of the second estimator, from a fitted Student-t mixture; 0 leaves it out
+  int max_components = 3;       ///< of that mixture
   int max_temperatures = 400;
+
   void check() const;
+  AisOptions for_dimension(Eigen::Index d) const;  ///< with the numbers of chains filled in
 };
 
 /// What happened at one temperature of the ladder.
 struct Temperature {
   double beta = 0.0;        ///< inverse temperature, in (0, 1]
   double step = 0.0;        ///< length of the moves
+  int sweeps = 0;           ///< moves of every chain
   double acceptance = 0.0;  ///< of the frozen run
   double ess = 0.0;         ///< effective share of the chains after reweighting, mean over groups
 };
@@ -41,7 +46,7 @@ struct AisResult {
   double second = 0.0, second_se = 0.0;      ///< importance sample, or bridged run; NaN if left out
   double second_ess = 0.0;                   ///< effective size of its draws
   double ess = 0.0;                          ///< effective size of the draws below
-  double log_weight_variance = 0.0;          ///< of the groups' log evidences
+  double log_weight_variance = 0.0;          ///< of the log evidences of the annealed groups
 
   Eigen::MatrixXd draws;           ///< dimension x draws of the chosen estimator, in the target's coordinates
   Eigen::VectorXd weights;         ///< of the draws, sum 1
@@ -54,12 +59,14 @@ struct AisResult {
 
 /// Annealed importance sampling (Neal 2001) of reference x likelihood. A pilot (an adaptive sequential Monte
 /// Carlo sampler; Del Moral, Doucet and Jasra 2006) finds the ladder of temperatures and, at each, a
-/// Student-t proposal and a step length. Both are then frozen, and fresh independent groups of chains are
-/// run, so that each group's estimate of the evidence is unbiased. The chains move by preconditioned
-/// Crank-Nicolson steps that are reversible in the fitted Student t, corrected by Metropolis and Hastings. An
-/// importance sample from a Student-t mixture fitted to the draws is the second estimator; where no mixture
-/// comes close, an annealed run from the mixture to the posterior ("bridged") is. The estimator of smaller
-/// standard error is reported, and both are compared.
+/// Student-t proposal, a step length and how many moves the chains need. All are then frozen, and fresh
+/// independent groups of chains are run, so that each group's estimate of the evidence is unbiased. The
+/// chains move by preconditioned Crank-Nicolson steps that are reversible in the fitted Student t, corrected
+/// by Metropolis and Hastings. An importance sample from a Student-t mixture fitted to the draws is the
+/// second estimator; where no mixture comes close, a second annealed run from the mixture to the posterior
+/// ("bridged") is. The importance sample is reported where there is one, else the annealed run that reaches a
+/// standard error at less cost; more groups or draws are added until the standard error is as asked. The
+/// other estimator has to agree.
 AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context);
 
 }  // namespace amiss
