@@ -68,7 +68,7 @@ fill_ais_control <- function(control, what = "control", call = rlang::caller_env
   absent <- c("pilot_chains", "chains", "importance_draws")
   for (name in names(counts)) {
     value <- filled[[name]]
-    if (name %in% absent && identical(as.numeric(value), 0)) next
+    if (name %in% absent && (identical(value, 0) || identical(value, 0L))) next
     lower <- if (is.numeric(counts[[name]])) counts[[name]] else 1
     check(name, checkmate::check_int(value, lower = lower, upper = 1e7), paste0("Seen: ", deparse1(value), "."))
   }

@@ -3,18 +3,12 @@
 # Worlds S, S+1, ... are drawn, scored and written as JSON. Each finished world is kept in FILE.worlds/, so that a
 # stopped run goes on where it was. Work goes through the user's future plan if --workers is not given.
 
-arguments <- commandArgs(trailingOnly = TRUE)
-option <- function(name, default = NULL) {
-  at <- match(paste0("--", name), arguments)
-  if (is.na(at)) return(default)
-  if (at == length(arguments)) stop("--", name, " needs a value", call. = FALSE)
-  arguments[at + 1]
-}
+here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
+source(file.path(here, "options.R"))
 worlds <- as.integer(option("worlds", "24"))
 first <- as.integer(option("seed", "1"))
 out <- option("out", "hidden_effects.json")
 workers <- option("workers")
-here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 suppressPackageStartupMessages(library(amiss))
 
 keep <- paste0(out, ".worlds")

@@ -1,0 +1,16 @@
+# Command line of a benchmark: --name value. Sourced by the commands of this folder.
+arguments <- commandArgs(trailingOnly = TRUE)
+
+option <- function(name, default = NULL) {
+  at <- match(paste0("--", name), arguments)
+  if (is.na(at)) return(default)
+  if (at == length(arguments)) stop("--", name, " needs a value", call. = FALSE)
+  arguments[at + 1]
+}
+
+write_rows <- function(rows, out) {
+  part <- paste0(out, ".part")
+  jsonlite::write_json(rows, part, auto_unbox = TRUE, na = "null", null = "null", digits = NA, pretty = TRUE, dataframe = "rows")
+  if (!file.rename(part, out)) stop(out, " cannot be written", call. = FALSE)
+  message("written to ", out)
+}
