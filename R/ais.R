@@ -1,28 +1,32 @@
 ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision = 0.1, chains = NULL, sweeps = 3, max_sweeps = 30,
-                    ess_drop = 0.7, resample = TRUE, importance_draws = 1000, max_components = 3)
+                    ess_drop = 0.7, gradient = FALSE, resample = TRUE, importance_draws = 1000, max_components = 3)
 
 #' Annealed importance sampling of any posterior
 #'
 #' The sampler behind [calibrate()], for a likelihood written in R: draws from the posterior and its normalising
 #' constant (the evidence), with an interval, a second estimator and a verdict.
 #'
-#' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
-#'   log-likelihood of each point; `-Inf` where it is zero.
-#' @param priors Named list of [prior]s.
 #' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for each, how the chains
 #' move and how often. Then all is frozen and fresh, independent groups of chains give the estimate: unbiased, with an
 #' interval by bootstrap over the groups. A second estimator (an importance sample from a Student-t mixture fitted to the
 #' draws or, where none comes close, annealing from that mixture) must agree, and is reported where it is the more
 #' precise one. Groups or draws are added until the standard error is at most `precision`.
 #'
+#' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
+#'   log-likelihood of each point; `-Inf` where it is zero.
+#' @param priors Named list of [prior]s.
+#' @param seed Seed; if `NULL`, R's generator gives one.
+#' @param gradient Function of the same matrix that returns the gradient of the log-likelihood with respect to the
+#'   parameters, a matrix of the same shape; the chains then make Hamiltonian moves too.
 #' @param control List of options:
 #'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at least 32);
 #'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below `precision` (0.1);
 #'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
+#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient ([calibrate()]'s discrepancy; `FALSE`: they make
+#'     the annealed run more reliable at several times its cost). [ais()] makes them if it is given a gradient;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
 #'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
-#' @param seed Seed; if `NULL`, R's generator gives one.
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95 %),
 #'   `annealed` and `second` (estimate and standard error of each estimator), `ladder`, `evaluations`, `trusted`, `verdict`.
 #' @examples
@@ -30,23 +34,37 @@ ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision 
 #' ais(function(z) vapply(z[, "mean"], function(m) sum(dnorm(y, m, 1, log = TRUE)), 0),
 #'     list(mean = normal(0, 2)), seed = 1)
 #' @export
-ais <- function(log_likelihood, priors, control = NULL, seed = NULL) {
+ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = NULL) {
   check_input(checkmate::check_function(log_likelihood), "log_likelihood")
   check_input(checkmate::check_list(priors, types = "amiss_prior", min.len = 1, names = "unique"), "priors",
               "For example {.code list(a = uniform(0, 1))}.")
+  check_input(checkmate::check_function(gradient, null.ok = TRUE), "gradient")
   control <- fill_ais_control(control)
+  control$gradient <- !is.null(gradient)
   seed <- pick_seed(seed)
   to_values <- function(unit) {
     values <- vapply(seq_along(priors), function(p) prior_quantile(priors[[p]], unit[, p]), numeric(nrow(unit)))
     matrix(values, nrow(unit), dimnames = list(NULL, names(priors)))
   }
   call <- rlang::current_env()
-  at_unit <- function(unit) {
-    tryCatch(as.numeric(log_likelihood(to_values(unit))), error = function(e) {
-      abort_input(c("{.arg log_likelihood} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
+  attempt <- function(f, name, values) {
+    tryCatch(f(values), error = function(e) {
+      abort_input(c("{.arg {name}} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
     })
   }
-  result <- call_engine(ais_(at_unit, length(priors), control, engine_context(seed, 1)))
+  at_unit <- function(unit) as.numeric(attempt(log_likelihood, "log_likelihood", to_values(unit)))
+  # d value / du is one over the prior's density.
+  slope_at_unit <- function(unit) {
+    values <- to_values(unit)
+    slope <- attempt(gradient, "gradient", values)
+    if (!is.numeric(slope) || !identical(dim(slope), dim(values))) {
+      abort_input(c("{.arg gradient} must return a matrix like the one it is given, {nrow(values)} x {ncol(values)}.",
+                    x = "It returned {.cls {class(slope)}} of length {length(slope)}."), call = call)
+    }
+    density <- vapply(seq_along(priors), function(p) prior_density(priors[[p]], values[, p]), numeric(nrow(unit)))
+    unname(slope / matrix(density, nrow(unit)))
+  }
+  result <- call_engine(ais_(at_unit, if (!is.null(gradient)) slope_at_unit, length(priors), control, engine_context(seed, 1)))
   result$draws <- to_values(result$unit)
   result$unit <- NULL
   structure(c(list(format_version = format_version, seed = seed), result), class = "amiss_ais")
@@ -74,7 +92,7 @@ fill_ais_control <- function(control, what = "control", call = rlang::caller_env
   }
   check("precision", checkmate::check_number(filled$precision, lower = 1e-6, finite = TRUE), "It is a standard error in nats.")
   check("ess_drop", checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999))
-  check("resample", checkmate::check_flag(filled$resample))
+  for (flag in c("gradient", "resample")) check(flag, checkmate::check_flag(filled[[flag]]))
   filled
 }
 

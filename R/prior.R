@@ -102,6 +102,20 @@ untruncated_quantile <- function(prior, u) {
     triangular = triangular_quantile(u, prior$lower, p$mode, prior$upper))
 }
 
+untruncated_density <- function(prior, x) {
+  p <- prior$parameters
+  switch(prior$family,
+    uniform = stats::dunif(x, prior$lower, prior$upper),
+    normal = stats::dnorm(x, p$mean, p$sd),
+    lognormal = stats::dlnorm(x, p$meanlog, p$sdlog),
+    beta = stats::dbeta((x - prior$lower) / (prior$upper - prior$lower), p$shape1, p$shape2) / (prior$upper - prior$lower),
+    triangular = triangular_density(x, prior$lower, p$mode, prior$upper))
+}
+
+triangular_density <- function(x, a, m, b) {
+  ifelse(x < m, 2 * (x - a) / ((b - a) * max(m - a, .Machine$double.xmin)), 2 * (b - x) / ((b - a) * max(b - m, .Machine$double.xmin)))
+}
+
 triangular_cdf <- function(x, a, m, b) {
   x <- pmin(pmax(x, a), b)
   ifelse(x <= m, if (m > a) (x - a)^2 / ((b - a) * (m - a)) else 0,
@@ -122,6 +136,11 @@ prior_cdf <- function(prior, x) {
 prior_quantile <- function(prior, u) {
   limits <- untruncated_cdf(prior, c(prior$lower, prior$upper))
   pmin(pmax(untruncated_quantile(prior, limits[1] + u * (limits[2] - limits[1])), prior$lower), prior$upper)
+}
+
+prior_density <- function(prior, x) {
+  limits <- untruncated_cdf(prior, c(prior$lower, prior$upper))
+  untruncated_density(prior, x) / (limits[2] - limits[1])
 }
 
 #' @export

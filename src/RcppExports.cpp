@@ -12,16 +12,17 @@ Rcpp::Rostream<false>& Rcpp::Rcerr = Rcpp::Rcpp_cerr_get();
 #endif
 
 // ais_
-Rcpp::List ais_(const Rcpp::Function& log_likelihood, int dimension, const Rcpp::List& control, const Rcpp::List& context);
-RcppExport SEXP _amiss_ais_(SEXP log_likelihoodSEXP, SEXP dimensionSEXP, SEXP controlSEXP, SEXP contextSEXP) {
+Rcpp::List ais_(const Rcpp::Function& log_likelihood, const Rcpp::Nullable<Rcpp::Function>& gradient, int dimension, const Rcpp::List& control, const Rcpp::List& context);
+RcppExport SEXP _amiss_ais_(SEXP log_likelihoodSEXP, SEXP gradientSEXP, SEXP dimensionSEXP, SEXP controlSEXP, SEXP contextSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::Function& >::type log_likelihood(log_likelihoodSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::Nullable<Rcpp::Function>& >::type gradient(gradientSEXP);
     Rcpp::traits::input_parameter< int >::type dimension(dimensionSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
-    rcpp_result_gen = Rcpp::wrap(ais_(log_likelihood, dimension, control, context));
+    rcpp_result_gen = Rcpp::wrap(ais_(log_likelihood, gradient, dimension, control, context));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -181,7 +182,7 @@ END_RCPP
 }
 
 static const R_CallMethodDef CallEntries[] = {
-    {"_amiss_ais_", (DL_FUNC) &_amiss_ais_, 4},
+    {"_amiss_ais_", (DL_FUNC) &_amiss_ais_, 5},
     {"_amiss_make_basis_", (DL_FUNC) &_amiss_make_basis_, 2},
     {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 4},
     {"_amiss_predict_emulator_", (DL_FUNC) &_amiss_predict_emulator_, 2},

@@ -10,8 +10,8 @@ namespace {
 // R is not to be called from other threads: the context must ask for one.
 class FunctionTarget : public Target {
  public:
-  FunctionTarget(Rcpp::Function log_likelihood, int dimension)
-      : log_likelihood_(log_likelihood), dimension_(dimension) {}
+  FunctionTarget(Rcpp::Function log_likelihood, Rcpp::Nullable<Rcpp::Function> gradient, int dimension)
+      : log_likelihood_(log_likelihood), gradient_(gradient), dimension_(dimension) {}
 
   Eigen::Index dimension() const override { return dimension_; }
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override {
@@ -21,21 +21,29 @@ class FunctionTarget : public Target {
       throw std::invalid_argument("log_likelihood returned another number of values than it got points");
     return values;
   }
+  bool has_gradient() const override { return gradient_.isNotNull(); }
+  Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override {
+    const Eigen::MatrixXd unit = x.transpose().unaryExpr(&normal_cdf);
+    const Eigen::MatrixXd slope = Rcpp::as<Eigen::MatrixXd>(Rcpp::Function(gradient_)(unit));
+    gradient = slope.transpose().cwiseProduct(x.unaryExpr(&normal_density));
+    return log_likelihood(x);
+  }
 
  private:
   Rcpp::Function log_likelihood_;
+  Rcpp::Nullable<Rcpp::Function> gradient_;
   int dimension_;
 };
 
 }  // namespace
 
 // [[Rcpp::export]]
-Rcpp::List ais_(const Rcpp::Function& log_likelihood, int dimension, const Rcpp::List& control,
-                const Rcpp::List& context) {
+Rcpp::List ais_(const Rcpp::Function& log_likelihood, const Rcpp::Nullable<Rcpp::Function>& gradient,
+                int dimension, const Rcpp::List& control, const Rcpp::List& context) {
   Context own = convert::context(context);
   own.threads = 1;
   const AisResult result =
-      sample_ais(FunctionTarget(log_likelihood, dimension), convert::ais_options(control), own);
+      sample_ais(FunctionTarget(log_likelihood, gradient, dimension), convert::ais_options(control), own);
   Rcpp::List out = convert::ais_list(result);
   out["unit"] = Eigen::MatrixXd(result.draws.transpose().unaryExpr(&normal_cdf));
   return out;

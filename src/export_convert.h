@@ -25,6 +25,7 @@ inline AisOptions ais_options(const Rcpp::List& control) {
   options.sweeps = control["sweeps"];
   options.max_sweeps = control["max_sweeps"];
   options.ess_drop = control["ess_drop"];
+  options.gradient = control["gradient"];
   options.resample = control["resample"];
   options.importance_draws = control["importance_draws"];
   options.max_components = control["max_components"];

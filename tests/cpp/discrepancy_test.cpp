@@ -296,6 +296,24 @@ TEST(HistoryTarget, LikelihoodIsTheModelsAtTheMappedPoint) {
   }
 }
 
+TEST(HistoryTarget, GradientIsTheDerivative) {
+  const HistoryModel model = make_model();
+  const HistoryTarget target(model, {0, 2});
+  const Index d = target.dimension();
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    // The first condition in its slab, the second in the slab or the spike; away from the jumps of the grid.
+    VectorXd x = 0.7 * normal_vector(d, 90 + seed);
+    x[d - 2] = 1.2 + 0.1 * seed;
+    MatrixXd gradient;
+    const VectorXd value = target.log_likelihood(x, gradient);
+    EXPECT_EQ(value[0], target.log_likelihood(MatrixXd(x))[0]);
+    const VectorXd expected = numerical_gradient(
+        [&](const VectorXd& at) { return target.log_likelihood(MatrixXd(at))[0]; }, x, 1e-6);
+    for (Index i = 0; i < d; ++i)
+      EXPECT_NEAR(gradient(i, 0), expected[i], 1e-5 * (1 + std::abs(expected[i]))) << i;
+  }
+}
+
 TEST(HistoryTarget, ExtremeCoordinatesStayUsable) {
   const HistoryModel model = make_model();
   const HistoryTarget target(model, {0, 1, 2});

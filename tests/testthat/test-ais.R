@@ -30,6 +30,17 @@ test_that("plain annealed importance sampling stays selectable and the same seed
   expect_identical(ais(case$f, case$priors, seed = 5), ais(case$f, case$priors, seed = 5))
 })
 
+test_that("a gradient with respect to the parameters is taken through every kind of prior", {
+  f <- function(z) -0.5 * rowSums(z^2) / 0.01
+  for (prior in list(normal(0, 1), uniform(-3, 2), lognormal(-1, 1), beta_prior(2, 3), triangular(-1, 0.2, 2), normal(0, 1, lower = 0.05))) {
+    exact <- log(stats::integrate(function(x) prior_density(prior, x) * exp(-0.5 * x^2 / 0.01), max(prior$lower, -1), min(prior$upper, 1), rel.tol = 1e-8)$value)
+    result <- ais(f, list(a = prior, b = prior), seed = 4, gradient = function(z) -z / 0.01)
+    # Four standard errors: exceeded by chance once in 16,000.
+    expect_lt(abs(result$log_evidence - 2 * exact), 4 * result$standard_error)
+  }
+  expect_error(ais(f, list(a = normal(0, 1)), seed = 1, gradient = function(z) z[, 1]), "gradient", class = "amiss_error_input")
+})
+
 test_that("bad likelihoods and priors are classed errors", {
   prior <- list(a = uniform(0, 1))
   expect_error(ais(function(z) 1:2, prior, seed = 1), "another number of values", class = "amiss_error_input")

@@ -20,7 +20,9 @@ using Eigen::VectorXd;
 constexpr double kMoveDof = 6.0;        // of the proposals while annealing
 constexpr double kImportanceDof = 8.0;  // of the final mixture
 constexpr double kAcceptance = 0.35;    // aimed at by the step length
-constexpr double kMemory = 0.5;         // rank correlation of the likelihoods at which a chain has moved on
+constexpr double kHamiltonianAcceptance = 0.75;
+constexpr int kLeapfrogs = 4;    // of one Hamiltonian move
+constexpr double kMemory = 0.5;  // rank correlation of the likelihoods at which a chain has moved on
 enum Purpose : std::uint64_t { kPilot = 1, kFrozen, kBootstrap, kImportance };
 constexpr std::uint64_t kBridged = 16;  // added to the purposes of the second annealed run
 
@@ -36,12 +38,15 @@ struct Level {
   double beta;
   StudentT proposal;
   double step;
+  double hamiltonian_step;
   int sweeps;
 };
 
+// Not a number, and infinity, count as likelihood zero.
+double finite_or_zero(double v) { return std::isfinite(v) ? v : -std::numeric_limits<double>::infinity(); }
+
 VectorXd evaluate(const Target& target, const MatrixXd& x) {
-  return target.log_likelihood(x).unaryExpr(
-      [](double v) { return std::isfinite(v) ? v : -std::numeric_limits<double>::infinity(); });
+  return target.log_likelihood(x).unaryExpr(&finite_or_zero);
 }
 
 Chains start(const Target& target, int n, Stream& stream) {
@@ -95,7 +100,7 @@ void resample(Chains& chains, Stream& stream) {
   chains.log_w.setZero();
 }
 
-// One move of every chain at inverse temperature beta; returns the share accepted.
+// One Crank-Nicolson move of every chain; returns the share accepted.
 double move(const Target& target, Chains& chains, const Level& level, Stream& stream) {
   const Index n = chains.size();
   MatrixXd proposed(chains.x.rows(), n);
@@ -116,6 +121,52 @@ double move(const Target& target, Chains& chains, const Level& level, Stream& st
     }
   }
   return static_cast<double>(accepted) / static_cast<double>(n);
+}
+
+bool hamiltonian(const Target& target, const AisOptions& options) {
+  return options.gradient && target.has_gradient();
+}
+
+// One Hamiltonian move of every chain: leapfrog steps in the coordinates in which the proposal's scale is the
+// identity (Neal 2011); returns the share accepted.
+double hamiltonian_move(const Target& target, Chains& chains, const Level& level, Stream& stream) {
+  const Index n = chains.size(), d = chains.x.rows();
+  const auto root = level.proposal.root().triangularView<Eigen::Lower>();
+  MatrixXd x = chains.x, slope(d, n), momentum = stream.normals(d, n);
+  VectorXd ll;
+  const auto force = [&] {  // L' gradient of the log density at this temperature
+    ll = target.log_likelihood(x, slope).unaryExpr(&finite_or_zero);
+    slope *= level.beta;
+    for (Index i = 0; i < n; ++i) slope.col(i) += target.reference_gradient(x.col(i));
+    slope = root.transpose() * slope;
+    slope = slope.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
+  };
+  VectorXd log_ratio = 0.5 * momentum.colwise().squaredNorm().transpose() - level.beta * chains.ll;
+  for (Index i = 0; i < n; ++i) log_ratio[i] -= target.log_reference(chains.x.col(i));
+  const double step = level.hamiltonian_step;
+  force();
+  for (int k = 0; k < kLeapfrogs; ++k) {
+    momentum += 0.5 * step * slope;
+    x += root * MatrixXd(step * momentum);
+    force();
+    momentum += 0.5 * step * slope;
+  }
+  log_ratio += level.beta * ll - 0.5 * momentum.colwise().squaredNorm().transpose();
+  int accepted = 0;
+  for (Index i = 0; i < n; ++i) {
+    const double log_u = std::log(stream.uniform());
+    if (!std::isfinite(ll[i]) || !(log_u < log_ratio[i] + target.log_reference(x.col(i)))) continue;
+    chains.x.col(i) = x.col(i);
+    chains.ll[i] = ll[i];
+    ++accepted;
+  }
+  return static_cast<double>(accepted) / static_cast<double>(n);
+}
+
+// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move and, where there is a gradient, a
+// Hamiltonian one.
+int sweep_cost(const Target& target, const AisOptions& options) {
+  return hamiltonian(target, options) ? 2 + kLeapfrogs : 1;
 }
 
 // Ranks of the values, centred and scaled: their inner product is Spearman's correlation.
@@ -140,6 +191,10 @@ void tune(const Target& target, const AisOptions& options, Chains& chains, Level
     for (int i = 0; i < repeats; ++i) {
       const double accepted = move(target, chains, level, stream);
       level.step = std::min(1.0, std::max(0.003, level.step * std::exp(accepted - kAcceptance)));
+      if (!hamiltonian(target, options)) continue;
+      const double moved = hamiltonian_move(target, chains, level, stream);
+      level.hamiltonian_step =
+          std::min(1.5, std::max(0.001, level.hamiltonian_step * std::exp(moved - kHamiltonianAcceptance)));
     }
   }
 }
@@ -152,7 +207,7 @@ std::vector<Level> pilot(const Target& target, const AisOptions& options, const 
   if (!std::isfinite(chains.ll.maxCoeff()))
     throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
   std::vector<Level> levels;
-  double beta = 0.0, step = 0.8;
+  double beta = 0.0, step = 0.8, hamiltonian_step = 0.5;
   while (beta < 1.0) {
     if (context.poll) context.poll();
     if (static_cast<int>(levels.size()) >= options.max_temperatures)
@@ -160,11 +215,13 @@ std::vector<Level> pilot(const Target& target, const AisOptions& options, const 
     const double next = next_beta(chains, beta, options.ess_drop);
     chains.log_w += chains.ll * (next - beta);
     beta = next;
-    levels.push_back({beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step, 0});
+    levels.push_back(
+        {beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step, hamiltonian_step, 0});
     resample(chains, stream);
     tune(target, options, chains, levels.back(), stream);
-    evaluations += chains.size() * (levels.back().sweeps + 1);
+    evaluations += chains.size() * (levels.back().sweeps + 1) * sweep_cost(target, options);
     step = levels.back().step;
+    hamiltonian_step = levels.back().hamiltonian_step;
   }
   return levels;
 }
@@ -196,8 +253,10 @@ Group frozen_run(const Target& target, const std::vector<Level>& levels, const A
       resample(group.chains, stream);
     }
     double accepted = 0.0;
-    for (int sweep = 0; sweep < levels[k].sweeps; ++sweep)
+    for (int sweep = 0; sweep < levels[k].sweeps; ++sweep) {
       accepted += move(target, group.chains, levels[k], stream);
+      if (hamiltonian(target, options)) hamiltonian_move(target, group.chains, levels[k], stream);
+    }
     group.acceptance[k] = accepted / levels[k].sweeps;
   }
   group.log_evidence += log_mean_exp(group.chains.log_w);
@@ -312,9 +371,9 @@ class AnnealedRun {
   int size() const { return static_cast<int>(groups_.size()); }
 
   long moves() const {
-    long sweeps = 1;
-    for (const Level& level : levels_) sweeps += level.sweeps;
-    return sweeps * options_.chains;
+    long values = 1;
+    for (const Level& level : levels_) values += level.sweeps * sweep_cost(target_, options_);
+    return values * options_.chains;
   }
 
   void add_groups(int n) {
@@ -358,6 +417,16 @@ class BridgedTarget : public Target {
       values[i] += target_.log_reference(x.col(i)) - mixture_.log_density(x.col(i));
     return values;
   }
+  bool has_gradient() const override { return target_.has_gradient(); }
+  VectorXd log_likelihood(const MatrixXd& x, MatrixXd& gradient) const override {
+    VectorXd values = target_.log_likelihood(x, gradient);
+    for (Index i = 0; i < x.cols(); ++i) {
+      values[i] += target_.log_reference(x.col(i)) - mixture_.log_density(x.col(i));
+      gradient.col(i) += target_.reference_gradient(x.col(i)) - mixture_.gradient(x.col(i));
+    }
+    return values;
+  }
+  VectorXd reference_gradient(const VectorXd& x) const override { return mixture_.gradient(x); }
 
  private:
   const Target& target_;

@@ -128,6 +128,12 @@ double StudentT::log_density(const VectorXd& x) const {
          0.5 * (dof_ + static_cast<double>(x.size())) * std::log1p(whiten(x).squaredNorm() / dof_);
 }
 
+VectorXd StudentT::gradient(const VectorXd& x) const {
+  const VectorXd z = whiten(x);
+  const double weight = (dof_ + static_cast<double>(x.size())) / (dof_ + z.squaredNorm());
+  return -weight * root_.transpose().triangularView<Eigen::Upper>().solve(z);
+}
+
 VectorXd StudentT::draw(Stream& stream) const {
   const double w = 0.5 * dof_ / stream.gamma(0.5 * dof_);
   return location_ +
@@ -156,11 +162,21 @@ StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights,
   return mixture;
 }
 
-double StudentTMixture::log_density(const VectorXd& x) const {
-  VectorXd log_part(static_cast<Index>(components_.size()));
+VectorXd StudentTMixture::log_parts(const VectorXd& x) const {
+  VectorXd parts(static_cast<Index>(components_.size()));
   for (std::size_t k = 0; k < components_.size(); ++k)
-    log_part[k] = std::log(weights_[k]) + components_[k].log_density(x);
-  return log_sum_exp(log_part);
+    parts[static_cast<Index>(k)] = std::log(weights_[k]) + components_[k].log_density(x);
+  return parts;
+}
+
+double StudentTMixture::log_density(const VectorXd& x) const { return log_sum_exp(log_parts(x)); }
+
+VectorXd StudentTMixture::gradient(const VectorXd& x) const {
+  const VectorXd share = normalised_exp(log_parts(x));
+  VectorXd gradient = VectorXd::Zero(x.size());
+  for (std::size_t k = 0; k < components_.size(); ++k)
+    gradient += share[static_cast<Index>(k)] * components_[k].gradient(x);
+  return gradient;
 }
 
 VectorXd StudentTMixture::draw(Stream& stream) const {

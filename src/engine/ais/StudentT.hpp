@@ -16,7 +16,9 @@ class StudentT {
   static StudentT fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, double dof);
 
   double log_density(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  ///< of log_density
   Eigen::VectorXd draw(Stream& stream) const;
+  const Eigen::MatrixXd& root() const { return root_; }  ///< L
 
   /// A step of length s in (0, 1] that leaves this distribution invariant and is reversible in it: with
   /// d = L^-1 (x - m), draw w ~ InvGamma((nu + dim) / 2, (nu + d'd) / 2), then
@@ -41,10 +43,13 @@ class StudentTMixture {
                              double dof, Stream& stream);
 
   double log_density(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  ///< of log_density
   Eigen::VectorXd draw(Stream& stream) const;
   std::size_t size() const { return components_.size(); }
 
  private:
+  Eigen::VectorXd log_parts(const Eigen::VectorXd& x) const;
+
   std::vector<double> weights_;
   std::vector<StudentT> components_;
 };

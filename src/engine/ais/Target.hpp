@@ -20,6 +20,16 @@ class Target {
   virtual double log_reference(const Eigen::VectorXd& x) const {
     return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));
   }
+
+  /// A target that has the gradient of its likelihood says so and overrides the next function; its chains
+  /// then make Hamiltonian moves too.
+  virtual bool has_gradient() const { return false; }
+  /// Log-likelihood of each column of x, and its gradient with respect to x (dimension x n).
+  virtual Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const {
+    gradient.setZero(x.rows(), x.cols());
+    return log_likelihood(x);
+  }
+  virtual Eigen::VectorXd reference_gradient(const Eigen::VectorXd& x) const { return -x; }
 };
 
 }  // namespace amiss

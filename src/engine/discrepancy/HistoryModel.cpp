@@ -198,4 +198,28 @@ VectorXd HistoryTarget::log_likelihood(const MatrixXd& x) const {
   return values;
 }
 
+// d log sigma^2 / dx and d log t / dx of the maps in parameters(): with u uniform and x = Phi^-1(u), du / dx
+// is the normal density.
+VectorXd HistoryTarget::log_likelihood(const MatrixXd& x, MatrixXd& gradient) const {
+  const HistoryPriors& priors = model_.priors();
+  const Index first = 1 + priors.error.correlation_times.size();
+  gradient.setZero(x.rows(), x.cols());
+  VectorXd values(x.cols()), natural;
+  for (Index i = 0; i < x.cols(); ++i) {
+    const HistoryParameters point = parameters(x.col(i));
+    values[i] = model_.log_likelihood(point.setting, std::log(point.variance), point.t, &natural);
+    const double scaled = priors.noise_shape * priors.noise_sd * priors.noise_sd / point.variance;
+    gradient(0, i) = -natural[0] * normal_density(x(0, i)) /
+                     (scaled * boost::math::gamma_p_derivative(priors.noise_shape, scaled));
+    for (std::size_t a = 0; a < active_.size(); ++a) {
+      const Index row = first + static_cast<Index>(a);
+      if (!(point.t[active_[a]] > 0)) continue;
+      const double root = std::sqrt(point.t[active_[a]]) / priors.amplitude;  // tan(pi u / 2)
+      gradient(row, i) = natural[1 + active_[a]] * normal_density(x(row, i)) / priors.inclusion * kPi *
+                         (1.0 + root * root) / root;
+    }
+  }
+  return values;
+}
+
 }  // namespace amiss

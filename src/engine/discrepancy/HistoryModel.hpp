@@ -100,6 +100,9 @@ class HistoryTarget : public Target {
 
   Eigen::Index dimension() const override;
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
+  /// The coordinates of the error's grid have gradient zero: the likelihood is constant between its jumps.
+  bool has_gradient() const override { return true; }
+  Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override;
   HistoryParameters parameters(const Eigen::VectorXd& x) const;
   const HistoryModel& model() const { return model_; }
 
