@@ -16,8 +16,8 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #' (1992): all parameters share one `beta`; at each stage each of those that still share it is given its own in turn,
 #' and the one that raises the joint density most keeps it. The selection ends when twice that rise is not significant
 #' as chi-squared with one degree of freedom at `significance / k`, the best of k candidates having been taken
-#' (Bonferroni). It costs about eight times as many evaluations; on the boxes of [paper_box()] its leave-one-out errors
-#' are the same within 2 %.
+#' (Bonferroni). It is greedy and costs about 17 times as many evaluations; on the boxes of [paper_box()] its leave-one-out errors
+#' are about 2 % larger.
 #'
 #' *Errors.* A run's coefficient varies about the smooth part of its process by the nugget and `1 / lambda`, as those of
 #' the training runs do: both belong to the variance of a prediction and of a run left out. The series of a run also

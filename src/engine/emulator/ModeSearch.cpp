@@ -16,6 +16,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr double kLogNugget = -9.0, kLogitBeta = 3.5;  // of a nearly linear response, where searches start
+
 // A point in the coordinates of log_density() with shared betas, and who shares them.
 struct Point {
   std::vector<int> beta_of;
@@ -49,8 +51,8 @@ class Search {
     const double log_lambda = std::min(std::max(mode, kLower[2]), kUpper[2]);
     std::vector<VectorXd> points;
     for (int s = 0; s < options_.starts; ++s) {
-      VectorXd x = VectorXd::Constant(3 + n_betas, 3.5 - 5.0 * s / std::max(1, options_.starts - 1));
-      x.head(3) << (s == 0 ? 3.0 : 1.0), -9.0, lambda.shape > 0 ? log_lambda : kUpper[2];
+      VectorXd x = VectorXd::Constant(3 + n_betas, kLogitBeta - 5.0 * s / std::max(1, options_.starts - 1));
+      x.head(3) << (s == 0 ? 3.0 : 1.0), kLogNugget, lambda.shape > 0 ? log_lambda : kUpper[2];
       points.push_back(x);
     }
     return points;
@@ -81,8 +83,7 @@ class Search {
       Point winner = best;
       int chosen = -1;
       for (int p : sharing) {
-        Point candidate = with_own_beta(best, p);
-        candidate.at = climb(candidate.beta_of, candidate.at.x);
+        const Point candidate = climb_with_own_beta(best, p);
         if (candidate.at.value > winner.at.value) {
           winner = candidate;
           chosen = p;
@@ -97,12 +98,21 @@ class Search {
     }
   }
 
-  static Point with_own_beta(const Point& point, int parameter) {
+  // From where the last step ended, and from there off the plateaus of a nugget near 0 and a beta near 1,
+  // from which a gradient leads nowhere.
+  Point climb_with_own_beta(const Point& point, int parameter) {
     const Index n = point.at.x.size();
     Point out = point;
     out.beta_of[static_cast<std::size_t>(parameter)] = static_cast<int>(n) - 3;
-    out.at.x.conservativeResize(n + 1);
-    out.at.x[n] = point.at.x[3];
+    VectorXd warm(n + 1);
+    warm << point.at.x, point.at.x[3];
+    VectorXd raised = warm;
+    raised[1] = std::max(warm[1], kLogNugget);
+    raised[n] = std::min(warm[n], kLogitBeta);
+    out.at = climb(out.beta_of, warm);
+    if (raised == warm) return out;
+    const Maximum second = climb(out.beta_of, raised);
+    if (second.value > out.at.value) out.at = second;
     return out;
   }
 
