@@ -56,6 +56,7 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   }
   check_input(checkmate::check_number(noise_sd, lower = 0, finite = TRUE), "noise_sd")
   control <- fill_emulator_control(control)
+  check_runs_differ(ensemble)
   threads <- check_threads(threads)
   basis <- call_engine(make_basis_(ensemble$outputs, c(control, noise_sd = noise_sd)))
   basis$discarded_sd <- discarded_sd(basis, ensemble$outputs)
@@ -72,6 +73,18 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
                  processes = trained[c("inputs", "coefficients", "hyperparameters")], selection = selection,
                  diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble), control = control,
                  noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
+}
+
+check_runs_differ <- function(ensemble, call = rlang::caller_env()) {
+  y <- ensemble$outputs
+  if (all(y == y[, 1])) {
+    abort_input(c("All {ncol(y)} runs are the same: none of {.val {names(ensemble$parameters)}} acts on the output.",
+                  i = "Check that the simulator uses its parameters."), call = call)
+  }
+  if (all(t(y) == y[1, ])) {
+    abort_input(c("The runs do not vary over their {nrow(y)} steps; the first run is {signif(y[1, 1], 4)} throughout.",
+                  i = "Check that the simulator follows its drivers."), call = call)
+  }
 }
 
 fill_emulator_control <- function(control, call = rlang::caller_env()) {
