@@ -44,6 +44,7 @@ ensemble <- function(design, outputs, parameters = NULL) {
   }
   check_enough_runs(nrow(design), ncol(design))
   if (is.null(parameters)) {
+    for (name in colnames(design)) check_varies(name, design[, name])
     parameters <- lapply(colnames(design), function(name) free(name, uniform(min(design[, name]), max(design[, name]))))
   }
   names(parameters) <- vapply(parameters, `[[`, "", "name")
@@ -63,8 +64,46 @@ ensemble <- function(design, outputs, parameters = NULL) {
                     i = "Widen the prior or leave these runs out."))
     }
     unit[, name] <- prior_cdf(prior, values[, name])
+    check_covered(name, prior, values[, name], unit[, name])
   }
-  new_ensemble(parameters, unname(unit), values, outputs, NULL, NA)
+  made <- new_ensemble(parameters, unname(unit), values, outputs, NULL, NA)
+  uncovered <- uncovered_statement(made)
+  if (!is.null(uncovered)) {
+    warn_input(c("{toupper(substr(uncovered, 1, 1))}{substring(uncovered, 2)}.",
+                 i = "The emulator extrapolates over the rest: add runs there or narrow the prior."))
+  }
+  made
+}
+
+check_varies <- function(name, values, call = rlang::caller_env()) {
+  if (diff(range(values)) == 0) {
+    abort_input(c("Parameter {.val {name}} has the same value, {signif(values[1], 4)}, in all {length(values)} runs.",
+                  i = "Vary it, or leave it out of the design."), call = call)
+  }
+}
+
+# Runs that all lie in a sliver of the prior say nothing about the parameter.
+check_covered <- function(name, prior, values, unit, call = rlang::caller_env()) {
+  check_varies(name, values, call)
+  share <- diff(range(unit))
+  if (share < 0.05) {
+    abort_input(c("The runs lie where the prior of {.val {name}} has next to no mass: {format(prior)} has {signif(100 * share, 2)} % of it between {signif(min(values), 4)} and {signif(max(values), 4)}.",
+                  i = "Correct the prior or make runs where its mass is."), call = call)
+  }
+}
+
+# The parameters whose prior reaches further than the runs, or NULL. Of M points scattered over the prior, the range
+# holds a Beta(M - 1, 2) share of its mass: what happens to one design in a thousand, and leaves out a tenth, is told.
+uncovered_statement <- function(ensemble) {
+  runs <- nrow(ensemble$unit)
+  share <- apply(ensemble$unit, 2, function(u) diff(range(u)))
+  little <- which(share < min(0.9, stats::qbeta(0.001, runs - 1, 2)))
+  if (!length(little)) return(NULL)
+  spans <- vapply(little, function(p) {
+    span <- format(signif(range(ensemble$values[, p]), 4))
+    sprintf("%.0f %% of the prior of %s (from %s to %s)", 100 * share[p], names(ensemble$parameters)[p], trimws(span[1]), trimws(span[2]))
+  }, "")
+  paste("the runs cover only", paste(spans, collapse = ", "))
 }
 
 check_enough_runs <- function(runs, parameters, call = rlang::caller_env()) {

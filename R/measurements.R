@@ -9,15 +9,17 @@
 #' @param target Name of the measured target.
 #' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws + circular(Wd)` or their
 #'   names. A circular quantity (degrees) enters as sine and cosine.
-#' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's unit. If not
-#'   given, the standard error of the averages is taken, which needs `average`.
+#' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's unit; or
+#'   `"bootstrap"` or [bootstrap_noise()], which estimate it from the readings inside each average. If not given, the
+#'   standard error of the averages is taken. Both need `average`.
 #' @param average Width of the averages in hours; `NULL` keeps the step of the data.
 #' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that say which rows
 #'   calibrate and which validate. Rows of neither use still drive the simulator.
 #' @param warmup Hours at the start of each segment that are left out, so that the simulator's unknown initial
 #'   state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
-#' @return An object of class `amiss_measurements`.
+#' @return An object of class `amiss_measurements`; `noise` says how `noise_sd` came about (`method`, and
+#'   `per_step`, the value of each average, where it was estimated).
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6)
@@ -78,9 +80,9 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
     abort_input(c("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after averaging and warm-up; at least 20 are needed.",
                   i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
   }
-  noise_sd <- noise_or_standard_error(noise_sd, coarse)
-  structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise_sd,
-                 raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
+  noise <- noise_level(noise_sd, coarse, y)
+  structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise$sd,
+                 noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names),
             class = "amiss_measurements")
@@ -262,17 +264,76 @@ x_keep <- function(x, names, call = rlang::caller_env()) {
   list(values = x$values[, columns, drop = FALSE], names = names, condition = match(x$names[x$condition][columns], names))
 }
 
-noise_or_standard_error <- function(noise_sd, coarse, call = rlang::caller_env()) {
-  if (!is.null(noise_sd)) {
+# The noise of the averages and how it came about: given, standard error or bootstrap; RMS over the calibration steps.
+noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
+  if (identical(noise_sd, "bootstrap")) noise_sd <- bootstrap_noise()
+  if (is.numeric(noise_sd)) {
     check_input(checkmate::check_number(noise_sd, finite = TRUE), "noise_sd", call = call)
     if (noise_sd <= 0) abort_input("{.arg noise_sd} must be positive; got {noise_sd}.", call = call)
-    return(as.numeric(noise_sd))
+    return(list(sd = as.numeric(noise_sd), method = "given"))
   }
-  if (coarse$per_step < 3) {
-    abort_input(c("{.arg noise_sd} is needed: the data are not averaged, so that their scatter within a step is unknown.",
-                  i = "Give the standard deviation of the measurement error in the target's unit."), call = call)
+  if (!is.null(noise_sd) && !inherits(noise_sd, "amiss_bootstrap_noise")) {
+    abort_input(c("{.arg noise_sd} is neither a number nor a way to estimate one; got {.cls {class(noise_sd)}}{if (is.character(noise_sd)) paste0(' ', dQuote(noise_sd[1], FALSE))}.",
+                  i = "Give a number, {.val bootstrap} or {.fun bootstrap_noise}."), call = call)
   }
-  sqrt(mean(coarse$standard_error[coarse$use == "calibrate"]^2, na.rm = TRUE))
+  needed <- if (is.null(noise_sd) || noise_sd$detrend) 3 else 2
+  if (coarse$per_step < needed) {
+    abort_input(c("{.arg noise_sd} is needed as a number: {if (coarse$per_step == 1) 'the data are not averaged' else paste('an average is of', coarse$per_step, 'readings only')}, so that their scatter within a step is unknown.",
+                  i = "Give the standard deviation of the measurement error in the target's unit, or an {.arg average} over at least {needed} readings."), call = call)
+  }
+  noise <- if (is.null(noise_sd)) list(method = "standard error", per_step = coarse$standard_error) else bootstrap_averages(y, coarse, noise_sd)
+  sd <- sqrt(mean(noise$per_step[coarse$use == "calibrate"]^2, na.rm = TRUE))
+  if (!is.finite(sd) || sd <= 0) {
+    abort_input(c("The readings do not scatter within the averages ({noise$method}: {signif(sd, 3)}), so that {.arg noise_sd} cannot be estimated from them.",
+                  i = "Give the standard deviation of the measurement error."), call = call)
+  }
+  c(list(sd = sd), noise)
+}
+
+#' Noise of averages, by bootstrapping the readings
+#'
+#' Given as `noise_sd` to [measurements()], which must `average`: the readings inside each averaging window are drawn
+#' again with replacement, and the standard deviation of the means of these draws is the noise of that average. The
+#' RMS over the calibration steps is the noise of the record. As the number of replicates grows, the plain bootstrap
+#' tends to `sqrt((n - 1) / n) * s / sqrt(n)` for n readings of standard deviation `s`.
+#'
+#' What changes inside a window counts as noise: a trend of `d` per reading adds `d^2 (n^2 - 1) / 12` to `s^2 (n - 1) / n`.
+#' `detrend` takes a straight line off each window first and bootstraps the residuals, raised by `sqrt(n / (n - 2))` for the
+#' two degrees of freedom that the line uses, so that neither a trend nor the line biases the variance. Either way the
+#' readings' errors are taken as independent: what they have in common over a window, such as an offset of the sensor,
+#' is not seen, and the noise is then larger than the estimate.
+#'
+#' @param replicates Number of bootstrap draws of each window.
+#' @param detrend Take a straight line off each window first; the paper does not.
+#' @param seed Seed of the draws.
+#' @return An object of class `amiss_bootstrap_noise`.
+#' @examples
+#' table <- data.frame(hour = seq(0.1, 24, 0.1), Te = 5 + sin(1:240 / 20), Ti = 20 + sin(1:240 / 20) + 0.1 * sin(61 * (1:240)^2))
+#' measurements(table, time = "hour", target = "Ti", boundary = ~Te, average = 1, noise_sd = bootstrap_noise(detrend = TRUE))
+#' @source Efron (1979), Bootstrap methods: another look at the jackknife, Annals of Statistics 7, 1-26; for averages of raw
+#'   data in this method: Monari (2022). Residuals: Davison and Hinkley (1997), Bootstrap methods and their application.
+#' @export
+bootstrap_noise <- function(replicates = 1000, detrend = FALSE, seed = 1) {
+  check_input(checkmate::check_count(replicates), "replicates")
+  if (replicates < 50) abort_input("{.arg replicates} = {replicates} is too few for a standard deviation; give at least 50.")
+  check_input(checkmate::check_flag(detrend), "detrend")
+  structure(list(replicates = as.integer(replicates), detrend = detrend, seed = pick_seed(seed)), class = "amiss_bootstrap_noise")
+}
+
+# Standard deviation of the bootstrapped mean of each window; NA where a reading is missing.
+bootstrap_averages <- function(y, coarse, options) {
+  windows <- matrix(y[!is.na(coarse$block)], coarse$per_step)
+  n <- nrow(windows)
+  if (options$detrend) {
+    line <- qr(cbind(1, seq_len(n)))
+    complete <- !is.na(colSums(windows))
+    windows[, complete] <- qr.resid(line, windows[, complete, drop = FALSE]) * sqrt(n / (n - 2))
+  }
+  per_step <- with_seed(options$seed, apply(windows, 2, function(readings) {
+    drawn <- sample.int(n, n * options$replicates, replace = TRUE)
+    if (anyNA(readings)) NA else stats::sd(colMeans(matrix(readings[drawn], n)))
+  }))
+  c(list(method = if (options$detrend) "bootstrap of detrended readings" else "bootstrap of readings", per_step = per_step, readings = n), unclass(options))
 }
 
 # Rows of a use that have a measured value.
@@ -288,7 +349,9 @@ segment_starts <- function(measurements, rows) {
 print.amiss_measurements <- function(x, ...) {
   n <- table(factor(x$use, c("calibrate", "validate", "warmup")))
   cli::cli_text("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in {length(unique(x$segment))} segment{?s}")
-  cli::cli_bullets(c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}",
+  origin <- switch(x$noise$method, given = "", `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
+                   sprintf(" (%s, %d an average, %d times)", x$noise$method, x$noise$readings, x$noise$replicates))
+  cli::cli_bullets(c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}{origin}",
                      "*" = "{n[['calibrate']]} calibrate, {n[['validate']]} validate, {n[['warmup']]} warm up",
                      "*" = "boundary conditions {.field {x$conditions}}",
                      ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))

@@ -59,6 +59,26 @@ void add_history_draws(Rcpp::List& out, const AisResult& result, Parameters para
   out["t"] = t;
 }
 
+BetaShapes beta_shapes(const VectorXd& shapes) { return {shapes[0], shapes[1]}; }
+
+// One row for each step of the forward selection of each coefficient; numbers from 1.
+Rcpp::DataFrame selection_table(const Emulator& emulator) {
+  std::vector<int> vector, step, parameter;
+  std::vector<double> gain;
+  const auto selections = emulator.selections();
+  for (std::size_t q = 0; q < selections.size(); ++q) {
+    for (std::size_t k = 0; k < selections[q].size(); ++k) {
+      vector.push_back(static_cast<int>(q) + 1);
+      step.push_back(static_cast<int>(k) + 1);
+      parameter.push_back(selections[q][k].parameter + 1);
+      gain.push_back(selections[q][k].gain);
+    }
+  }
+  using Rcpp::_;
+  return Rcpp::DataFrame::create(_["vector"] = vector, _["step"] = step, _["parameter"] = parameter,
+                                 _["gain"] = gain);
+}
+
 }  // namespace
 
 // [[Rcpp::export]]
@@ -84,9 +104,16 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
   basis.singular_values = Rcpp::as<VectorXd>(basis_list["singular_values"]);
   basis.discarded_ss = basis_list["discarded_ss"];
   EmulatorOptions options;
-  options.starts = control["starts"];
-  options.searches = control["searches"];
-  options.max_evaluations = control["max_evaluations"];
+  options.search.starts = control["starts"];
+  options.search.searches = control["searches"];
+  options.search.max_evaluations = control["max_evaluations"];
+  options.search.forward = Rcpp::as<std::string>(control["selection"]) == "forward";
+  options.search.significance = control["significance"];
+  options.priors.s2 = beta_shapes(Rcpp::as<VectorXd>(control["s2"]));
+  options.priors.eta2 = beta_shapes(Rcpp::as<VectorXd>(control["eta2"]));
+  options.priors.beta = beta_shapes(Rcpp::as<VectorXd>(control["beta"]));
+  const VectorXd lambda = Rcpp::as<VectorXd>(control["lambda"]);
+  options.priors.lambda = {lambda[0], lambda[1]};
   const Emulator emulator = Emulator::train(inputs, basis, options, convert::context(context));
   MatrixXd mean, variance;
   emulator.leave_one_out(mean, variance);
@@ -94,7 +121,8 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
   using Rcpp::_;
   return Rcpp::List::create(_["inputs"] = state.inputs, _["coefficients"] = state.coefficients,
                             _["hyperparameters"] = state.parameters, _["loo_mean"] = mean,
-                            _["loo_variance"] = variance, _["evaluations"] = emulator.evaluations());
+                            _["loo_variance"] = variance, _["evaluations"] = emulator.evaluations(),
+                            _["selection"] = selection_table(emulator));
 }
 
 // [[Rcpp::export]]

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <boost/math/distributions/beta.hpp>
+
 #include "engine/emulator/Emulator.hpp"
+#include "engine/emulator/ModeSearch.hpp"
+#include "engine/optimise/maximise.hpp"
 #include "helpers.hpp"
 
 namespace amiss {
@@ -32,7 +36,8 @@ MatrixXd smooth_covariance(const MatrixXd& a, const MatrixXd& b, double amplitud
 
 const VectorXd kBeta = Eigen::Vector3d(0.3, 0.9, 0.05);
 constexpr double kAmplitude = 1.7, kNugget = 0.05, kLambda = 8.0;
-const GammaPrior kPrior{3.0, 0.4};
+const HyperPriors kPriors{{3.0, 0.4}, {}, {}, {}};
+const HyperPriors kShaped{{3.0, 0.4}, {2.0, 3.0}, {1.5, 4.0}, {3.0, 1.2}};
 
 struct Sample {
   MatrixXd inputs = uniform_matrix(15, 3, 21);
@@ -49,14 +54,33 @@ TEST(GaussianProcess, LogDensityIsEquationThree) {
   VectorXd none(0);
   const double constant = -0.5 * 15 * kLogTwoPi;
   const double expected = log_normal_density(s.values, VectorXd::Zero(15), s.covariance()) - constant +
-                          (kPrior.shape - 1) * std::log(kLambda) - kPrior.rate * kLambda;
+                          (kPriors.lambda.shape - 1) * std::log(kLambda) - kPriors.lambda.rate * kLambda;
   // The jitter of 1e-10 of the amplitude moves the value by about 1e-8.
-  EXPECT_NEAR(GaussianProcess::log_density(s.inputs, s.values, kPrior, s.own.pack(), none), expected, 1e-6);
+  EXPECT_NEAR(GaussianProcess::log_density(s.inputs, s.values, kPriors, s.own.pack(), none), expected, 1e-6);
+}
+
+// The density of s2, eta2 and beta themselves: no Jacobian of the coordinates.
+TEST(GaussianProcess, BetaPriorsAreDensitiesOfTheQuantityItself) {
+  const Sample s;
+  VectorXd none(0);
+  const auto log_beta = [](const BetaShapes& prior, double x) {
+    return std::log(boost::math::pdf(boost::math::beta_distribution<double>(prior.a, prior.b), x));
+  };
+  double expected = log_beta(kShaped.s2, 1 / (1 + kAmplitude)) + log_beta(kShaped.eta2, 1 / (1 + kNugget));
+  for (double beta : kBeta) expected += log_beta(kShaped.beta, beta);
+  const auto density = [&](const HyperPriors& priors) {
+    return GaussianProcess::log_density(s.inputs, s.values, priors, s.own.pack(), none);
+  };
+  // Rounding of values around 20.
+  EXPECT_NEAR(density(kShaped) - density(kPriors), expected, 1e-11);
+  HyperPriors wrong = kShaped;
+  wrong.beta.a = 0.5;
+  EXPECT_THROW(GaussianProcess::fit(s.inputs, s.values, wrong, {}), std::invalid_argument);
 }
 
 TEST(GaussianProcess, GradientOfTheLogDensityIsItsDerivative) {
   const Sample s;
-  for (const GammaPrior& prior : {kPrior, GammaPrior{}}) {
+  for (const HyperPriors& prior : {kPriors, HyperPriors{}, kShaped}) {
     const VectorXd x = s.own.pack();
     VectorXd gradient(x.size()), none(0);
     GaussianProcess::log_density(s.inputs, s.values, prior, x, gradient);
@@ -67,6 +91,29 @@ TEST(GaussianProcess, GradientOfTheLogDensityIsItsDerivative) {
       ASSERT_GT(std::abs(expected[i]), 1e-3) << "coordinate " << i << " tests nothing";
       EXPECT_NEAR(gradient[i] / expected[i], 1.0, 1e-5) << "coordinate " << i;
     }
+  }
+}
+
+TEST(GaussianProcess, DensityWithSharedBetasIsThatOfEqualOnesEachCountedOnce) {
+  const Sample s;
+  const std::vector<int> beta_of{0, 1, 0};
+  VectorXd x(5), full(6), gradient(5), none(0);
+  x << 0.4, -3.0, 2.0, 0.8, -0.7;
+  full << 0.4, -3.0, 2.0, 0.8, -0.7, 0.8;
+  const auto density = [&](const VectorXd& at) {
+    return GaussianProcess::log_density(s.inputs, s.values, kShaped, beta_of, at, none);
+  };
+  const double shared = 1 / (1 + std::exp(-0.8));
+  const boost::math::beta_distribution<double> prior(kShaped.beta.a, kShaped.beta.b);
+  EXPECT_NEAR(density(x),
+              GaussianProcess::log_density(s.inputs, s.values, kShaped, full, none) -
+                  std::log(boost::math::pdf(prior, shared)),
+              1e-11);
+  GaussianProcess::log_density(s.inputs, s.values, kShaped, beta_of, x, gradient);
+  const VectorXd expected = numerical_gradient(density, x);
+  for (Index i = 0; i < x.size(); ++i) {
+    ASSERT_GT(std::abs(expected[i]), 1e-3) << "coordinate " << i << " tests nothing";
+    EXPECT_NEAR(gradient[i] / expected[i], 1.0, 1e-5) << "coordinate " << i;
   }
 }
 
@@ -104,20 +151,122 @@ TEST(GaussianProcess, FitEndsAtAMaximumOfTheDensity) {
   VectorXd values(40);
   for (Index i = 0; i < 40; ++i) values[i] = std::sin(5 * inputs(i, 0)) + 0.3 * inputs(i, 1);
   values += 0.1 * normal_vector(40, 25);
-  EmulatorOptions options;
+  SearchOptions options;
   options.max_evaluations = 500;
-  const GaussianProcess process = GaussianProcess::fit(inputs, values, kPrior, options);
+  const GaussianProcess process = GaussianProcess::fit(inputs, values, kPriors, options);
   const VectorXd mode = process.parameters().pack();
   VectorXd none(0);
-  EXPECT_EQ(process.log_joint, GaussianProcess::log_density(inputs, values, kPrior, mode, none));
+  EXPECT_EQ(process.log_joint, GaussianProcess::log_density(inputs, values, kPriors, mode, none));
   for (Index i = 0; i < mode.size(); ++i) {
     for (double step : {-0.3, 0.3}) {
       VectorXd moved = mode;
       moved[i] += step;
-      EXPECT_GE(process.log_joint, GaussianProcess::log_density(inputs, values, kPrior, moved, none) - 1e-3)
+      EXPECT_GE(process.log_joint, GaussianProcess::log_density(inputs, values, kPriors, moved, none) - 1e-3)
           << "coordinate " << i;
     }
   }
+}
+
+// Six inputs, of which the second and the fifth act, the fifth on a shorter scale.
+struct TwoOfSix {
+  MatrixXd inputs = uniform_matrix(60, 6, 41);
+  VectorXd values = VectorXd(60);
+  TwoOfSix() {
+    for (Index i = 0; i < 60; ++i) values[i] = respond(inputs.row(i));
+  }
+  static double respond(const VectorXd& u) { return 2 * u[1] * u[1] - 1 + std::sin(7 * u[4]); }
+  static GaussianProcess fit(const MatrixXd& inputs, const VectorXd& values, bool forward) {
+    SearchOptions options;
+    options.forward = forward;
+    return GaussianProcess::fit(inputs, values, {}, options);
+  }
+  double rmse(const GaussianProcess& process) const {
+    const MatrixXd points = uniform_matrix(200, 6, 42);
+    VectorXd mean(200), variance(200);
+    process.predict(points, mean, variance);
+    for (Index i = 0; i < 200; ++i) mean[i] -= respond(points.row(i));
+    return std::sqrt(mean.squaredNorm() / 200);
+  }
+};
+
+TEST(ForwardSelection, FindsTheInputsThatAct) {
+  const TwoOfSix two;
+  const GaussianProcess forward = TwoOfSix::fit(two.inputs, two.values, true);
+  ASSERT_GE(forward.selection.size(), 2u);
+  EXPECT_EQ(forward.selection[0].parameter, 4);
+  EXPECT_EQ(forward.selection[1].parameter, 1);
+  const VectorXd& logit_beta = forward.parameters().logit_beta;
+  for (Index p : {0, 2, 3, 5}) EXPECT_GT(logit_beta[p], std::max(logit_beta[1], logit_beta[4]) + 3) << p;
+  // Both fits find the response (its standard deviation is 0.9) and the fit with fewer betas is as good.
+  const GaussianProcess ard = TwoOfSix::fit(two.inputs, two.values, false);
+  EXPECT_LT(two.rmse(ard), 0.01);
+  EXPECT_LT(two.rmse(forward), 1.5 * two.rmse(ard));
+  EXPECT_TRUE(ard.selection.empty());
+}
+
+TEST(ForwardSelection, FirstStepIsTheBestOfAllByBruteForce) {
+  const TwoOfSix two;
+  const VectorXd noisy = two.values + 0.3 * normal_vector(60, 43);
+  SearchOptions options;
+  options.forward = true;
+  const Mode mode = find_mode(two.inputs, noisy, {}, options);
+  ASSERT_FALSE(mode.selection.empty());
+  // Greatest density with beta number beta_of[p], from three starts of its own.
+  const auto highest = [&](const std::vector<int>& beta_of, Index betas) {
+    double best = -1e300;
+    for (double start : {-1.0, 1.0, 3.0}) {
+      VectorXd x = VectorXd::Constant(3 + betas, start), range = VectorXd::Constant(3 + betas, 12.0);
+      x.head(3) << 0.5, -2.0, 40.0;
+      range[2] = 40.0;
+      const Objective density = [&](const VectorXd& at, Eigen::Ref<VectorXd> gradient) {
+        return GaussianProcess::log_density(two.inputs, noisy, {}, beta_of, at, gradient);
+      };
+      best = std::max(best, maximise(density, x, -range, range, 1e-10, 500).value);
+    }
+    return best;
+  };
+  const double shared = highest({0, 0, 0, 0, 0, 0}, 1);
+  int winner = -1;
+  double best = shared;
+  for (int p = 0; p < 6; ++p) {
+    std::vector<int> beta_of(6, 0);
+    beta_of[static_cast<std::size_t>(p)] = 1;
+    const double value = highest(beta_of, 2);
+    if (value > best) {
+      best = value;
+      winner = p;
+    }
+  }
+  EXPECT_EQ(mode.selection[0].parameter, winner);
+  // The search ends when a step changes the density, of size 50, by less than 1e-7 of it.
+  EXPECT_NEAR(mode.selection[0].gain, best - shared, 1e-3);
+  double rises = 0.0;
+  for (std::size_t k = 0; k < mode.selection.size(); ++k) {
+    rises += mode.selection[k].gain;
+    EXPECT_GE(mode.selection[k].gain, selection_threshold(0.05, 6 - static_cast<int>(k)));
+  }
+  EXPECT_NEAR(mode.value, shared + rises, 1e-3);
+}
+
+// Equal betas are the truth: a step is a false alarm, at the stated rate of 5 %.
+TEST(ForwardSelection, InputsAlikeAreKeptTogether) {
+  SearchOptions options;
+  options.forward = true;
+  int alarms = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    const MatrixXd inputs = uniform_matrix(30, 4, 500 + seed);
+    const MatrixXd covariance = smooth_covariance(inputs, inputs, 1.0, VectorXd::Constant(4, 0.3)) +
+                                0.01 * MatrixXd::Identity(30, 30);
+    const VectorXd values = covariance.llt().matrixL() * normal_vector(30, 600 + seed);
+    if (!find_mode(inputs, values, {}, options).selection.empty()) ++alarms;
+  }
+  // Binomial(40, 0.05) exceeds 7 with probability 0.0007.
+  EXPECT_LE(alarms, 7);
+}
+
+TEST(ForwardSelection, ThresholdIsHalfTheQuantileOfChiSquared) {
+  EXPECT_NEAR(selection_threshold(0.05, 1), 0.5 * 3.841458820694124, 1e-12);  // published table
+  EXPECT_NEAR(selection_threshold(0.05, 5), 0.5 * 6.634896601021214, 1e-12);  // level 0.01
 }
 
 // A simulator with three parameters, of which the last does nothing.
@@ -140,10 +289,12 @@ struct Trained {
     options.explained = 0.9999;
     basis = make_basis(outputs, options);
   }
-  Emulator emulator(int threads = 1) const {
+  Emulator emulator(int threads = 1, bool forward = false) const {
     Context context;
     context.threads = threads;
-    return Emulator::train(inputs, basis, {}, context);
+    EmulatorOptions options;
+    options.search.forward = forward;
+    return Emulator::train(inputs, basis, options, context);
   }
 };
 
@@ -180,26 +331,33 @@ TEST(Emulator, RunsOnTheDesignAreReproduced) {
 
 TEST(Emulator, TrainsEachCoefficientWithTheStatedNoisePrior) {
   const Trained trained;
-  const EmulatorState state = trained.emulator().state();
   const Basis& basis = trained.basis;
   const double discarded = (trained.outputs - basis.vectors * basis.coefficients.transpose()).squaredNorm();
-  const double shape = 2.0 + 40.0 * static_cast<double>(50 - basis.size()) / 2.0;
-  const double largest =
-      basis.vectors.col(0).norm();  // the first vector is scaled by the largest singular value
-  const double rate = std::sqrt(2.220446049250313e-16) * largest + 0.5 * discarded;
-  for (Index q = 0; q < basis.size(); ++q) {
-    const VectorXd w = basis.coefficients.col(q);
-    const double centre = w.mean(), sd = std::sqrt((w.array() - centre).square().sum() / 39.0);
-    const VectorXd standard = (w.array() - centre) / sd;
-    // In units of sd, lambda is larger by sd^2.
-    const GammaPrior prior{shape, rate / (basis.vectors.col(q).squaredNorm() * sd * sd)};
-    const VectorXd own = state.parameters.row(q).transpose();
-    VectorXd none(0);
-    const double fitted = GaussianProcess::fit(trained.inputs, standard, prior, {}).log_joint;
-    EXPECT_NEAR(GaussianProcess::log_density(trained.inputs, standard, prior, own, none), fitted,
-                1e-4 * std::abs(fitted))
-        << "coefficient " << q;
-    EXPECT_NEAR(own[2], std::log((prior.shape - 1) / prior.rate), 1.0) << "coefficient " << q;
+  const double default_rate = std::sqrt(2.220446049250313e-16) * basis.vectors.col(0).norm();
+  EmulatorOptions given;
+  given.priors.lambda = {500.0, 0.3};
+  given.priors.beta = {2.0, 1.5};
+  for (const EmulatorOptions& options : {EmulatorOptions(), given}) {
+    const bool is_default = std::isnan(options.priors.lambda.rate);
+    const EmulatorState state = Emulator::train(trained.inputs, basis, options, Context()).state();
+    const double shape = (is_default ? 2.0 : 500.0) + 40.0 * static_cast<double>(50 - basis.size()) / 2.0;
+    // The first vector is scaled by the largest singular value.
+    const double rate = (is_default ? default_rate : 0.3) + 0.5 * discarded;
+    for (Index q = 0; q < basis.size(); ++q) {
+      const VectorXd w = basis.coefficients.col(q);
+      const double centre = w.mean(), sd = std::sqrt((w.array() - centre).square().sum() / 39.0);
+      const VectorXd standard = (w.array() - centre) / sd;
+      // In units of sd, lambda is larger by sd^2.
+      const HyperPriors prior{
+          {shape, rate / (basis.vectors.col(q).squaredNorm() * sd * sd)}, {}, {}, options.priors.beta};
+      const VectorXd own = state.parameters.row(q).transpose();
+      VectorXd none(0);
+      const double fitted = GaussianProcess::fit(trained.inputs, standard, prior, {}).log_joint;
+      EXPECT_NEAR(GaussianProcess::log_density(trained.inputs, standard, prior, own, none), fitted,
+                  1e-4 * std::abs(fitted))
+          << "coefficient " << q;
+      EXPECT_NEAR(own[2], std::log((prior.lambda.shape - 1) / prior.lambda.rate), 1.0) << "coefficient " << q;
+    }
   }
 }
 
@@ -216,7 +374,9 @@ TEST(Emulator, StateMakesTheSameEmulatorAgain) {
 
 TEST(Emulator, OneAndTwoThreadsGiveTheSameBits) {
   const Trained trained;
-  EXPECT_EQ(trained.emulator(1).state().parameters, trained.emulator(2).state().parameters);
+  for (bool forward : {false, true})
+    EXPECT_EQ(trained.emulator(1, forward).state().parameters,
+              trained.emulator(2, forward).state().parameters);
 }
 
 TEST(Emulator, LeaveOneOutIsInTheCoefficientsOwnScale) {
@@ -256,7 +416,9 @@ TEST(Emulator, PredictionIsInTheCoefficientsOwnScale) {
     GaussianProcess(state.inputs, (w.array() - centre) / sd, p).predict(points, m, v);
     // Rounding of centre and scale, enlarged by the condition number of a nearly interpolating covariance.
     EXPECT_LT((mean.col(q).array() - centre - sd * m.array()).abs().maxCoeff(), 1e-5 * sd) << q;
-    EXPECT_LT((variance.col(q).array() / (sd * sd * v.array()) - 1.0).abs().maxCoeff(), 1e-5) << q;
+    const double noise =
+        std::exp(p.log_nugget) + std::exp(-p.log_lambda);  // a run varies about the smooth part
+    EXPECT_LT((variance.col(q).array() / (sd * sd * (v.array() + noise)) - 1.0).abs().maxCoeff(), 1e-5) << q;
   }
 }
 

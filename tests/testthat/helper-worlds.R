@@ -59,3 +59,6 @@ linear_fit <- function(measurements = linear_measurements(), seed = 3, threads =
 }
 
 twinhouse_study <- function(house) system.file("studies", sprintf("twinhouse_%s.yml", house), package = "amiss")
+
+# What print() says, in one line.
+printed <- function(x) gsub("\\s+", " ", paste(cli::cli_fmt(print(x)), collapse = " "))

@@ -46,3 +46,20 @@ test_that("whole-number runs are as good as any", {
   whole <- matrix(as.integer(round(1000 * e$outputs)), nrow(e$outputs))
   expect_s3_class(train_emulator(ensemble(e$values, whole, e$parameters), 10), "amiss_emulator")
 })
+
+test_that("runs that cover a part of the prior are told, by parameter and number", {
+  r <- simulate_design(linear_simulator(), linear_measurements(), runs = 30, seed = 3)
+  with_prior <- function(prior, values = r$values) ensemble(values, r$outputs, list(free("offset", prior), free("gain", uniform(0, 1))))
+  expect_warning(part <- with_prior(uniform(10, 60)), "only 38 % of the prior of offset \\(from 10.51 to 29.36\\)", class = "amiss_warning_input")
+  emulator <- train_emulator(part, 0.1)
+  expect_false(emulator$trust$trusted)
+  expect_match(emulator$trust$verdict, "only 38 % of the prior of offset")
+  expect_true(train_emulator(r, 0.1)$trust$trusted)
+  # An untruncated prior reaches everywhere: its mass between the runs counts, not its limits.
+  expect_error(with_prior(normal(500, 2)), "offset.*next to no mass.*between 10.51 and 29.36", class = "amiss_error_input")
+  expect_no_warning(with_prior(normal(20, 4)))
+  still <- r$values
+  still[, "offset"] <- 20
+  expect_error(with_prior(uniform(10, 30), still), "offset.*same value, 20, in all 30 runs", class = "amiss_error_input")
+  expect_error(ensemble(still, r$outputs), "offset.*same value", class = "amiss_error_input")
+})

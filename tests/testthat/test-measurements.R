@@ -100,3 +100,51 @@ test_that("an error names its function without printing the data", {
   expect_lt(max(nchar(rlang::cnd_message(error))), 500)
   expect_lt(length(deparse(conditionCall(error))), 3)
 })
+
+test_that("the bootstrapped noise is that of the closed form", {
+  data <- linear_data()
+  m <- linear_measurements(data, average = 6, noise_sd = bootstrap_noise(replicates = 4000))
+  windows <- matrix(data$Ti, 6)
+  exact <- apply(windows, 2, stats::sd) * sqrt(5 / 6) / sqrt(6)
+  # A standard deviation from B draws has a relative error of about 1 / sqrt(2 B) = 0.011; the largest of 40 is within 4.
+  expect_lt(max(abs(m$noise$per_step / exact - 1)), 4 * 0.011)
+  expect_equal(m$noise_sd, sqrt(mean(m$noise$per_step^2)))
+  expect_equal(m$noise_sd, sqrt(mean(exact^2)), tolerance = 4 * 0.011 / sqrt(40))
+  expect_match(printed(m), "bootstrap of readings.*6 an average.*4000 times")
+  expect_identical(linear_measurements(data, average = 6, noise_sd = "bootstrap"), linear_measurements(data, average = 6, noise_sd = bootstrap_noise()))
+})
+
+test_that("a trend inside the windows is noise to the plain bootstrap, and not to the detrended one", {
+  set.seed(8)
+  data <- data.frame(hour = 1:1200, Te = sin(1:1200 / 9), Ti = 20 + 0.3 * (1:1200) + stats::rnorm(1200, 0, 0.2), Gv = stats::runif(1200))
+  noise <- function(...) linear_measurements(data, average = 6, noise_sd = bootstrap_noise(replicates = 500, ...))$noise_sd
+  # 200 windows: the variance of detrended windows has 800 degrees of freedom, a relative error of 2.5 % of the sd.
+  expect_equal(noise(detrend = TRUE), 0.2 / sqrt(6), tolerance = 0.08)
+  expect_equal(noise(), sqrt((0.3^2 * (6^2 - 1) / 12 + 0.2^2 * 5 / 6) / 6), tolerance = 0.08)
+})
+
+test_that("a noise that cannot be bootstrapped is refused", {
+  data <- linear_data()
+  fails(data, "not averaged", noise_sd = "bootstrap")
+  fails(data, "not averaged", noise_sd = "bootstrap", average = 1)
+  fails(data, "an average is of 2 readings only", noise_sd = bootstrap_noise(detrend = TRUE), average = 2)
+  fails(broken(Ti = function(v) rep(20, 240)), "do not scatter", noise_sd = "bootstrap", average = 6)
+  fails(data, "neither a number nor.*guess", noise_sd = "guess", average = 6)
+  expect_error(bootstrap_noise(replicates = 3), "too few", class = "amiss_error_input")
+  expect_equal(linear_measurements(data)$noise$method, "given")
+  expect_equal(linear_measurements(data, average = 6, noise_sd = NULL)$noise$method, "standard error")
+  missing <- linear_measurements(broken(Ti = function(v) replace(v, 9, NA)), average = 6, noise_sd = "bootstrap")
+  expect_equal(which(is.na(missing$noise$per_step)), 2)
+})
+
+test_that("a study may ask for the bootstrap", {
+  path <- twinhouse_study("N2")
+  study <- yaml::read_yaml(path)
+  study$noise_sd <- "bootstrap"
+  for (field in c("data", "model", "catalogue")) study[[field]] <- file.path(normalizePath(dirname(path)), study[[field]])
+  file <- withr::local_tempfile(fileext = ".yml")
+  yaml::write_yaml(study, file)
+  m <- read_study(file)$measurements
+  expect_equal(m$noise$method, "bootstrap of readings")
+  expect_gt(m$noise_sd, 0)
+})

@@ -36,15 +36,20 @@ Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const Emula
                          const Context& context) {
   Emulator emulator(inputs, basis.coefficients);
   const double runs = static_cast<double>(inputs.rows());
-  const double shape = 2.0 + 0.5 * runs * static_cast<double>(basis.vectors.rows() - basis.size());
-  const double rate =
-      std::sqrt(std::numeric_limits<double>::epsilon()) * basis.singular_values[0] + 0.5 * basis.discarded_ss;
+  const GammaPrior& lambda = options.priors.lambda;
+  const double shape = lambda.shape + 0.5 * runs * static_cast<double>(basis.vectors.rows() - basis.size());
+  const double b = std::isnan(lambda.rate)
+                       ? std::sqrt(std::numeric_limits<double>::epsilon()) * basis.singular_values[0]
+                       : lambda.rate;
+  const double rate = b + 0.5 * basis.discarded_ss;
   std::vector<std::optional<GaussianProcess>> fitted(static_cast<std::size_t>(basis.size()));
   parallel_for(static_cast<int>(basis.size()), context, [&](int q) {
     const double norm = basis.vectors.col(q).squaredNorm() * emulator.scale_[q] * emulator.scale_[q];
     const VectorXd values =
         (emulator.coefficients_.col(q).array() - emulator.centre_[q]) / emulator.scale_[q];
-    fitted[q] = GaussianProcess::fit(inputs, values, {shape, rate / norm}, options);
+    HyperPriors priors = options.priors;
+    priors.lambda = {shape, rate / norm};
+    fitted[q] = GaussianProcess::fit(inputs, values, priors, options.search);
   });
   for (auto& process : fitted) emulator.processes_.push_back(std::move(*process));
   return emulator;
@@ -56,7 +61,7 @@ void Emulator::predict(const MatrixXd& points, MatrixXd& mean, MatrixXd& varianc
   for (Index q = 0; q < n_outputs(); ++q) {
     processes_[q].predict(points, mean.col(q), variance.col(q));
     mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
-    variance.col(q) *= scale_[q] * scale_[q];
+    variance.col(q) = (variance.col(q).array() + processes_[q].noise()) * (scale_[q] * scale_[q]);
   }
 }
 
@@ -81,6 +86,12 @@ int Emulator::evaluations() const {
   int total = 0;
   for (const auto& process : processes_) total += process.evaluations;
   return total;
+}
+
+std::vector<std::vector<SelectionStep>> Emulator::selections() const {
+  std::vector<std::vector<SelectionStep>> all;
+  for (const auto& process : processes_) all.push_back(process.selection);
+  return all;
 }
 
 }  // namespace amiss

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <vector>
 
 #include "engine/Context.hpp"
@@ -14,18 +15,26 @@ struct EmulatorState {
   Eigen::MatrixXd parameters;    ///< Q rows of GaussianProcessParameters::pack()
 };
 
+struct EmulatorOptions {
+  SearchOptions search;
+  /// Priors of every process. Those of lambda are a and b of the joint density (3), b in the squared unit of
+  /// the outputs; NaN stands for sqrt(machine epsilon) times the largest singular value.
+  HyperPriors priors{{2.0, std::numeric_limits<double>::quiet_NaN()}, {}, {}, {}};
+};
+
 /// Independent Gaussian processes, one for each basis coefficient.
 class Emulator {
  public:
   explicit Emulator(const EmulatorState& state);
 
   /// Trains all Q processes; work is shared over the threads of the context. The prior of lambda_q is
-  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2, with a = 2 and b =
-  /// sqrt(machine epsilon) times the largest singular value.
+  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2.
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context);
 
-  /// Mean and variance (n x Q) of the coefficients at points (n x P).
+  /// Mean and variance (n x Q) of the coefficients of runs at points (n x P): those that the projection of
+  /// such a run on the basis has. They vary about the smooth part of the process by the nugget and 1 /
+  /// lambda, as those of the training runs do, so that both are in the variance.
   void predict(const Eigen::MatrixXd& points, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
   /// Leave-one-out mean and variance (M x Q), in the coefficients' own scale.
   void leave_one_out(Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
@@ -34,6 +43,8 @@ class Emulator {
   Eigen::Index n_inputs() const { return inputs_.cols(); }
   Eigen::Index n_outputs() const { return coefficients_.cols(); }
   int evaluations() const;  ///< of the joint density, while training
+  /// Of the forward selection while training, one for each coefficient.
+  std::vector<std::vector<SelectionStep>> selections() const;
 
  private:
   Emulator(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& coefficients);

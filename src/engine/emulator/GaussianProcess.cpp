@@ -1,13 +1,10 @@
 #include "engine/emulator/GaussianProcess.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
-#include <vector>
 
-#include "engine/optimise/maximise.hpp"
+#include "engine/emulator/ModeSearch.hpp"
 
 namespace amiss {
 namespace {
@@ -32,34 +29,92 @@ MatrixXd correlation(const MatrixXd& a, const MatrixXd& b) {
   return r.array().min(0.0).exp();
 }
 
-double noise(const GaussianProcessParameters& p) {
+double noise_variance(const GaussianProcessParameters& p) {
   return std::exp(p.log_nugget) + (std::isfinite(p.log_lambda) ? std::exp(-p.log_lambda) : 0.0);
 }
 
 MatrixXd covariance(const MatrixXd& scaled, const GaussianProcessParameters& p) {
   MatrixXd c = std::exp(p.log_amplitude) * correlation(scaled, scaled);
-  c.diagonal().array() += noise(p) + kJitter * std::exp(p.log_amplitude);
+  c.diagonal().array() += noise_variance(p) + kJitter * std::exp(p.log_amplitude);
   return c;
 }
 
-struct Box {
-  VectorXd lower, upper;
-};
+// log Beta(x; a, b) at x = 1 / (1 + exp(-t)), as a density of x, and its derivative by t.
+double log_beta_density(const BetaShapes& prior, double t, double& slope) {
+  const double log_x = t > 0 ? -std::log1p(std::exp(-t)) : t - std::log1p(std::exp(t));
+  const double log_rest = log_x - t;  // log(1 - x)
+  slope = (prior.a - 1) * std::exp(log_rest) - (prior.b - 1) * std::exp(log_x);
+  const double log_constant = std::lgamma(prior.a + prior.b) - std::lgamma(prior.a) - std::lgamma(prior.b);
+  return log_constant + (prior.a - 1) * log_x + (prior.b - 1) * log_rest;
+}
 
-Box search_box(Eigen::Index n_inputs, const GammaPrior& prior) {
-  Box box{VectorXd::Constant(n_inputs + 3, -9.0), VectorXd::Constant(n_inputs + 3, 14.0)};
-  box.lower.head(3) << -6.0, -25.0, -5.0;
-  box.upper.head(3) << 14.0, 2.0, 40.0;
-  if (prior.shape <= 0) box.lower[2] = box.upper[2] = 40.0;
-  return box;
+// Log prior density of the hyper-parameters at x, whose betas may be fewer than the inputs; the gradient is
+// added.
+double log_prior(const HyperPriors& priors, const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
+  double value = 0.0;
+  const auto add = [&](Eigen::Index i, const BetaShapes& prior, double sign) {
+    double slope = 0.0;
+    value += log_beta_density(prior, sign * x[i], slope);
+    if (gradient.size() > 0) gradient[i] += sign * slope;
+  };
+  add(0, priors.s2, -1.0);
+  add(1, priors.eta2, -1.0);
+  for (Eigen::Index i = 3; i < x.size(); ++i) add(i, priors.beta, 1.0);
+  if (priors.lambda.shape > 0) {
+    const double lambda = std::exp(x[2]);
+    value += (priors.lambda.shape - 1) * x[2] - priors.lambda.rate * lambda;
+    if (gradient.size() > 0) gradient[2] += priors.lambda.shape - 1 - priors.lambda.rate * lambda;
+  }
+  return value;
+}
+
+// Log density of the values, up to a constant, and its gradient in pack()'s coordinates.
+double log_likelihood(const MatrixXd& inputs, const VectorXd& values, const VectorXd& packed,
+                      Eigen::Ref<VectorXd> gradient) {
+  const auto p = GaussianProcessParameters::unpack(packed);
+  const VectorXd theta = decay_rates(p.logit_beta);
+  const MatrixXd scaled = inputs * theta.cwiseSqrt().asDiagonal();
+  MatrixXd c = covariance(scaled, p);
+  const Eigen::LLT<MatrixXd> factor(c);
+  if (factor.info() != Eigen::Success) {
+    gradient.setZero();
+    return -std::numeric_limits<double>::infinity();
+  }
+  const VectorXd weights = factor.solve(values);
+  const double log_det = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+
+  if (gradient.size() > 0) {
+    // d value / d theta_j = 1/2 tr[(w w' - C^-1) dC/dtheta_j] (Rasmussen and Williams 2006, equation 5.9).
+    MatrixXd sensitivity = -factor.solve(MatrixXd::Identity(c.rows(), c.cols()));
+    sensitivity.noalias() += weights * weights.transpose();
+    const double trace = sensitivity.trace();
+    c.diagonal().array() -= noise_variance(p);
+    sensitivity.array() *= c.array();
+    gradient[0] = 0.5 * sensitivity.sum();
+    gradient[1] = 0.5 * trace * std::exp(p.log_nugget);
+    gradient[2] = -0.5 * trace / std::exp(p.log_lambda);
+    // sum_ij S_ij (u_ip - u_jp)^2 = 2 [sum_i u_ip^2 (S 1)_i - u_p' S u_p], S symmetric.
+    const VectorXd row_sums = sensitivity.rowwise().sum();
+    const MatrixXd product = sensitivity * inputs;
+    for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+      const double squared =
+          2.0 * (inputs.col(j).cwiseAbs2().dot(row_sums) - inputs.col(j).dot(product.col(j)));
+      // d theta / d logit(beta) = -4 (1 - beta).
+      gradient[3 + j] = 0.5 * squared * 4.0 / (1.0 + std::exp(p.logit_beta[j]));
+    }
+  }
+  return -0.5 * log_det - 0.5 * values.dot(weights);
 }
 
 }  // namespace
 
-void EmulatorOptions::check() const {
-  if (starts < 1 || searches < 1 || searches > starts)
-    throw std::invalid_argument("emulator: need 1 <= searches <= starts");
-  if (max_evaluations < 1) throw std::invalid_argument("emulator: max_evaluations must be positive");
+void HyperPriors::check() const {
+  for (const BetaShapes& prior : {s2, eta2, beta}) {
+    if (!(prior.a >= 1 && prior.b >= 1) || !std::isfinite(prior.a + prior.b))
+      throw std::invalid_argument("emulator: the shapes of a beta prior must be at least 1");
+  }
+  if (!(lambda.shape >= 0 && lambda.rate >= 0))
+    throw std::invalid_argument("emulator: shape and rate of the prior of lambda must not be negative");
 }
 
 VectorXd GaussianProcessParameters::pack() const {
@@ -86,78 +141,39 @@ GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values,
   weights_ = inverse_ * values_;
 }
 
-double GaussianProcess::log_density(const MatrixXd& inputs, const VectorXd& values, const GammaPrior& prior,
+double GaussianProcess::log_density(const MatrixXd& inputs, const VectorXd& values, const HyperPriors& priors,
                                     const VectorXd& packed, Eigen::Ref<VectorXd> gradient) {
-  const auto p = GaussianProcessParameters::unpack(packed);
-  const VectorXd theta = decay_rates(p.logit_beta);
-  const MatrixXd scaled = inputs * theta.cwiseSqrt().asDiagonal();
-  MatrixXd c = covariance(scaled, p);
-  const Eigen::LLT<MatrixXd> factor(c);
-  if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
-  const VectorXd weights = factor.solve(values);
-  const double log_det = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-  const double lambda = std::exp(p.log_lambda);
-  double value = -0.5 * log_det - 0.5 * values.dot(weights);
-  if (prior.shape > 0) value += (prior.shape - 1) * p.log_lambda - prior.rate * lambda;
-
-  if (gradient.size() > 0) {
-    // d value / d theta_j = 1/2 tr[(w w' - C^-1) dC/dtheta_j] (Rasmussen and Williams 2006, equation 5.9).
-    MatrixXd sensitivity = -factor.solve(MatrixXd::Identity(c.rows(), c.cols()));
-    sensitivity.noalias() += weights * weights.transpose();
-    const double trace = sensitivity.trace();
-    c.diagonal().array() -= noise(p);
-    sensitivity.array() *= c.array();
-    gradient[0] = 0.5 * sensitivity.sum();
-    gradient[1] = 0.5 * trace * std::exp(p.log_nugget);
-    gradient[2] = -0.5 * trace / lambda + (prior.shape > 0 ? prior.shape - 1 - prior.rate * lambda : 0.0);
-    // sum_ij S_ij (u_ip - u_jp)^2 = 2 [sum_i u_ip^2 (S 1)_i - u_p' S u_p], S symmetric.
-    const VectorXd row_sums = sensitivity.rowwise().sum();
-    const MatrixXd product = sensitivity * inputs;
-    for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
-      const double squared =
-          2.0 * (inputs.col(j).cwiseAbs2().dot(row_sums) - inputs.col(j).dot(product.col(j)));
-      // d theta / d logit(beta) = -4 (1 - beta).
-      gradient[3 + j] = 0.5 * squared * 4.0 / (1.0 + std::exp(p.logit_beta[j]));
-    }
-  }
-  return value;
+  const double value = log_likelihood(inputs, values, packed, gradient);
+  return value + log_prior(priors, packed, gradient);
 }
 
-GaussianProcess GaussianProcess::fit(const MatrixXd& inputs, const VectorXd& values, const GammaPrior& prior,
-                                     const EmulatorOptions& options) {
-  options.check();
-  const Box box = search_box(inputs.cols(), prior);
-  const double log_lambda =
-      prior.shape > 1 ? std::log((prior.shape - 1) / prior.rate) : (prior.shape > 0 ? 10.0 : 40.0);
-  // Starting points from nearly linear to rough responses.
-  std::vector<Maximum> candidates;
-  for (int s = 0; s < options.starts; ++s) {
-    const double logit_beta = 3.5 - 5.0 * s / std::max(1, options.starts - 1);
-    GaussianProcessParameters p{s == 0 ? 3.0 : 1.0, -9.0,
-                                std::min(std::max(log_lambda, box.lower[2]), box.upper[2]),
-                                VectorXd::Constant(inputs.cols(), logit_beta)};
-    VectorXd none(0);
-    candidates.push_back({p.pack(), log_density(inputs, values, prior, p.pack(), none), 1, false});
+double GaussianProcess::log_density(const MatrixXd& inputs, const VectorXd& values, const HyperPriors& priors,
+                                    const std::vector<int>& beta_of, const VectorXd& x,
+                                    Eigen::Ref<VectorXd> gradient) {
+  const Eigen::Index n = inputs.cols();
+  VectorXd packed(n + 3), slope(gradient.size() > 0 ? n + 3 : 0);
+  packed.head(3) = x.head(3);
+  for (Eigen::Index p = 0; p < n; ++p) packed[3 + p] = x[3 + beta_of[p]];
+  const double value = log_likelihood(inputs, values, packed, slope);
+  if (gradient.size() > 0) {
+    gradient.setZero();
+    gradient.head(3) = slope.head(3);
+    for (Eigen::Index p = 0; p < n; ++p) gradient[3 + beta_of[p]] += slope[3 + p];
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Maximum& a, const Maximum& b) { return a.value > b.value; });
-  const Objective objective = [&](const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
-    return log_density(inputs, values, prior, x, gradient);
-  };
-  Maximum best;
-  best.value = -std::numeric_limits<double>::infinity();
-  int evaluations = options.starts;
-  for (int s = 0; s < options.searches; ++s) {
-    Maximum found = maximise(objective, candidates[s].x, box.lower, box.upper, 1e-7, options.max_evaluations);
-    evaluations += found.evaluations;
-    if (found.value > best.value) best = found;
-  }
-  if (!std::isfinite(best.value)) throw std::runtime_error("emulator: no usable hyper-parameters were found");
-  GaussianProcess process(inputs, values, GaussianProcessParameters::unpack(best.x));
-  process.log_joint = best.value;
-  process.evaluations = evaluations;
+  return value + log_prior(priors, x, gradient);
+}
+
+GaussianProcess GaussianProcess::fit(const MatrixXd& inputs, const VectorXd& values,
+                                     const HyperPriors& priors, const SearchOptions& options) {
+  const Mode mode = find_mode(inputs, values, priors, options);
+  GaussianProcess process(inputs, values, mode.parameters);
+  process.log_joint = mode.value;
+  process.evaluations = mode.evaluations;
+  process.selection = mode.selection;
   return process;
 }
+
+double GaussianProcess::noise() const { return noise_variance(parameters_); }
 
 void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
                               Eigen::Ref<VectorXd> variance) const {

@@ -1,4 +1,6 @@
 #pragma once
+#include <vector>
+
 #include "engine/linalg/Eigen.hpp"
 
 namespace amiss {
@@ -9,12 +11,34 @@ struct GammaPrior {
   double rate = 0.0;
 };
 
-struct EmulatorOptions {
-  int starts = 3;             ///< starting points screened; the search runs from the best of them
-  int searches = 1;           ///< how many of them are searched
-  int max_evaluations = 120;  ///< per search
+/// Beta(a, b) prior of a hyper-parameter in (0, 1). With a shape below 1 the density has no greatest value.
+struct BetaShapes {
+  double a = 1.0;
+  double b = 1.0;
+};
+
+struct HyperPriors {
+  GammaPrior lambda;
+  BetaShapes s2, eta2;
+  BetaShapes beta;  ///< of each beta that is searched
+
+  void check() const;  ///< @throws std::invalid_argument
+};
+
+struct SearchOptions {
+  int starts = 3;              ///< starting points screened; the search runs from the best of them
+  int searches = 1;            ///< how many of them are searched
+  int max_evaluations = 120;   ///< per search
+  bool forward = false;        ///< parameters get their own beta by forward selection, not all at once
+  double significance = 0.05;  ///< of a step of the forward selection
 
   void check() const;
+};
+
+/// A step of the forward selection: this parameter got its own beta, which raised the log density by `gain`.
+struct SelectionStep {
+  int parameter = 0;
+  double gain = 0.0;
 };
 
 /// Hyper-parameters of equation (2) on the scales on which they are searched:
@@ -39,16 +63,25 @@ class GaussianProcess {
   GaussianProcess(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
                   const GaussianProcessParameters& parameters);
 
-  /// Mode of the joint density (3) of values and hyper-parameters, by gradient search.
+  /// Mode of the joint density (3) of values and hyper-parameters, by gradient search; all betas at once, or
+  /// by forward selection.
   static GaussianProcess fit(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
-                             const GammaPrior& prior, const EmulatorOptions& options);
+                             const HyperPriors& priors, const SearchOptions& options);
 
-  /// Logarithm of the joint density (3), up to a constant, and its gradient in pack()'s coordinates.
+  /// Logarithm of the joint density (3), up to a constant, and its gradient in pack()'s coordinates. It is
+  /// the density of s2, eta2, beta and lambda themselves: the coordinates only carry the search, no Jacobian
+  /// enters, so that uniform priors leave the likelihood as it is.
   static double log_density(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
-                            const GammaPrior& prior, const Eigen::VectorXd& packed,
+                            const HyperPriors& priors, const Eigen::VectorXd& packed,
                             Eigen::Ref<Eigen::VectorXd> gradient);
 
-  /// Mean and variance of the smooth part at points (n x P).
+  /// The same, with betas that several parameters share: parameter p has the beta number beta_of[p] of those
+  /// in x (log_amplitude, log_nugget, log_lambda, then the logits), and each counts once in the prior.
+  static double log_density(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
+                            const HyperPriors& priors, const std::vector<int>& beta_of,
+                            const Eigen::VectorXd& x, Eigen::Ref<Eigen::VectorXd> gradient);
+
+  /// Mean and variance of the smooth part at points (n x P); a value seen there varies by noise() more.
   void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean,
                Eigen::Ref<Eigen::VectorXd> variance) const;
 
@@ -56,8 +89,11 @@ class GaussianProcess {
   void leave_one_out(Eigen::VectorXd& mean, Eigen::VectorXd& variance) const;
 
   const GaussianProcessParameters& parameters() const { return parameters_; }
-  double log_joint = 0.0;  ///< value of (3) at the mode, if fitted
-  int evaluations = 0;     ///< of (3), while fitting
+  /// Variance of a value about the smooth part: nugget + 1 / lambda.
+  double noise() const;
+  double log_joint = 0.0;                ///< value of (3) at the mode, if fitted
+  int evaluations = 0;                   ///< of (3), while fitting
+  std::vector<SelectionStep> selection;  ///< if fitted by forward selection
 
  private:
   Eigen::MatrixXd scaled_inputs_;  // M x P: input p times sqrt(-4 log beta_p)
