@@ -37,6 +37,10 @@ calibrate_paper_ <- function(data, priors, emulator_list, control, context_list)
     .Call(`_amiss_calibrate_paper_`, data, priors, emulator_list, control, context_list)
 }
 
+fictitious_condition_ <- function(n, seed) {
+    .Call(`_amiss_fictitious_condition_`, n, seed)
+}
+
 paper_discrepancy_ <- function(data, priors, draws) {
     .Call(`_amiss_paper_discrepancy_`, data, priors, draws)
 }

@@ -135,6 +135,18 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// fictitious_condition_
+Eigen::VectorXd fictitious_condition_(int n, double seed);
+RcppExport SEXP _amiss_fictitious_condition_(SEXP nSEXP, SEXP seedSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< int >::type n(nSEXP);
+    Rcpp::traits::input_parameter< double >::type seed(seedSEXP);
+    rcpp_result_gen = Rcpp::wrap(fictitious_condition_(n, seed));
+    return rcpp_result_gen;
+END_RCPP
+}
 // paper_discrepancy_
 Eigen::MatrixXd paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws);
 RcppExport SEXP _amiss_paper_discrepancy_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP) {
@@ -190,6 +202,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_history_coefficients_", (DL_FUNC) &_amiss_history_coefficients_, 3},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
+    {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
     {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},
     {"_amiss_zone_simulate_", (DL_FUNC) &_amiss_zone_simulate_, 6},
     {"_amiss_zone_balance_", (DL_FUNC) &_amiss_zone_balance_, 5},

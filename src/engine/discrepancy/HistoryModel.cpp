@@ -72,9 +72,15 @@ WhitenedData whiten(const HistoryData& data, const VectorXd& correlation_times, 
   out.gram.triangularView<Eigen::StrictlyUpper>() = out.gram.transpose();
   out.cross = outside.transpose() * y_outside;
   out.square = y_outside.squaredNorm();
-  out.log_det = whitener.log_det();
+  out.log_det = whitener.log_det() + log_volume(data.basis) - out.root.diagonal().cwiseAbs().array().log().sum();
   out.residual_dimension = y.size() - q;
   return out;
+}
+
+double log_volume(const MatrixXd& basis) {
+  const VectorXd norms = basis.colwise().norm().transpose();
+  const Eigen::HouseholderQR<MatrixXd> qr(basis * norms.cwiseInverse().asDiagonal());
+  return norms.array().log().sum() + qr.matrixQR().diagonal().cwiseAbs().array().log().sum();
 }
 
 HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context& context)
@@ -103,7 +109,7 @@ double HistoryModel::log_likelihood(int setting, double log_variance, const Vect
 }
 
 // With D = diag(t_s / p_s), B = I + D^1/2 G D^1/2 / sigma^2 and b = D^1/2 g:
-//   log |H'AH| = (N - Q) log sigma^2 + log |B|,   quadratic form = (y'y - b' B^-1 b / sigma^2) / sigma^2.
+//   log |H~'AH~| = (N - Q) log sigma^2 + log |B|,   quadratic form = (y'y - b' B^-1 b / sigma^2) / sigma^2.
 // With r = B^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(B^-1)_ss - p_s]; it holds at t_s = 0 too.
 double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_variance, const VectorXd& t,
                                     VectorXd* gradient) const {
