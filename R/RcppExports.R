@@ -29,6 +29,10 @@ history_coefficients_ <- function(data, priors, draws) {
     .Call(`_amiss_history_coefficients_`, data, priors, draws)
 }
 
+shapley_shares_ <- function(data, priors, draws, context_list) {
+    .Call(`_amiss_shapley_shares_`, data, priors, draws, context_list)
+}
+
 attribute_ <- function(data, priors, error_settings, control, context_list) {
     .Call(`_amiss_attribute_`, data, priors, error_settings, control, context_list)
 }

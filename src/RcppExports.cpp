@@ -105,6 +105,20 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// shapley_shares_
+Eigen::MatrixXd shapley_shares_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_shapley_shares_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP, SEXP context_listSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type draws(drawsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
+    rcpp_result_gen = Rcpp::wrap(shapley_shares_(data, priors, draws, context_list));
+    return rcpp_result_gen;
+END_RCPP
+}
 // attribute_
 Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::IntegerVector& error_settings, const Rcpp::List& control, const Rcpp::List& context_list);
 RcppExport SEXP _amiss_attribute_(SEXP dataSEXP, SEXP priorsSEXP, SEXP error_settingsSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
@@ -200,6 +214,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
     {"_amiss_history_coefficients_", (DL_FUNC) &_amiss_history_coefficients_, 3},
+    {"_amiss_shapley_shares_", (DL_FUNC) &_amiss_shapley_shares_, 4},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},

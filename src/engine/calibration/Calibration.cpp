@@ -62,7 +62,8 @@ double CalibrationTarget::log_density_inside(const HistoryParameters& point, con
   if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
   const VectorXd z = factor.matrixL().solve((data.estimate - mean).cwiseQuotient(scale));
   const double half_log_det = factor.matrixLLT().diagonal().array().log().sum() + scale.array().log().sum();
-  return log_jacobian_ - half_log_det - 0.5 * (static_cast<double>(mean.size()) * kLogTwoPi + z.squaredNorm());
+  return log_jacobian_ - half_log_det -
+         0.5 * (static_cast<double>(mean.size()) * kLogTwoPi + z.squaredNorm());
 }
 
 VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {

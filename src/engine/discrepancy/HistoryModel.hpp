@@ -64,8 +64,9 @@ class HistoryModel {
  public:
   HistoryModel(HistoryData data, HistoryPriors priors, const Context& context);
 
-  /// log density of H'y, the part of y outside the simulation space, given the error setting, log sigma^2 and the
-  /// t_s of the conditions (t_s = 0 leaves one out). The gradient is with respect to (log sigma^2, log t_1
+  /// log density of H'y, the part of y outside the simulation space, given the error setting, log sigma^2 and
+  /// the t_s of the conditions (t_s = 0 leaves one out). The gradient is with respect to (log sigma^2, log
+  /// t_1
   /// ... log t_S).
   double log_likelihood(int setting, double log_variance, const Eigen::VectorXd& t,
                         Eigen::VectorXd* gradient = nullptr) const;
@@ -75,6 +76,13 @@ class HistoryModel {
   /// Posterior mean of the coefficients of the (scaled) filter columns.
   Eigen::VectorXd coefficients(const WhitenedData& whitened, double log_variance,
                                const Eigen::VectorXd& t) const;
+
+  /// Share of y outside the simulation space that the conditions with t_s > 0 explain, in the metric of the
+  /// error:
+  ///     1 - sigma^2 v'(H'AH)^-1 v / v'(H'CH)^-1 v,  v = H'y,  A = sigma^2 C + sum_s t_s Phi_s Phi_s' / p_s.
+  /// The numerator is the response fitted by the conditions times v, so that for white error this is
+  /// cov(response, y) / var(y). Between 0 and 1; never less for more conditions.
+  double explained(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t) const;
 
   const HistoryData& data() const { return data_; }
   const HistoryPriors& priors() const { return priors_; }
@@ -86,6 +94,9 @@ class HistoryModel {
   const Eigen::RowVectorXd& scale() const { return scale_; }    ///< then divided by this
 
  private:
+  struct Factor;
+  Factor factorise(const WhitenedData& whitened, double precision, const Eigen::VectorXd& t) const;
+
   HistoryData data_;
   HistoryPriors priors_;
   int conditions_;
