@@ -42,7 +42,7 @@ rank_figure(parts, rows, figure)
 
 worlds <- box_worlds()
 for (name in names(sources)) {
-  cases <- do.call(rbind, spread_work(first + 3e4 + seq_len(draws), function(seed) model_case(worlds, sources[[name]], seed), workers))
+  cases <- do.call(rbind, spread_work(first + 3e4 + seq_len(3 * draws), function(seed) model_case(worlds, sources[[name]], seed), workers))
   rows <- rbind(rows, probability_rows(cases, name))
   said(paste("model probabilities,", name))
 }

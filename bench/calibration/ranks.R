@@ -12,9 +12,11 @@ ranks <- function(truth, draws, weights) {
   }, 0)
 }
 
-# Both tests of uniformity, chi-square on the 20 ranks and Kolmogorov-Smirnov, with Bonferroni's correction for two.
+# Both tests of uniformity, chi-square (on the 20 ranks, or on pairs where records are few) and Kolmogorov-Smirnov,
+# with Bonferroni's correction for two.
 uniformity <- function(rank) {
   counts <- tabulate(rank + 1, sbc_draws + 1)
+  if (length(rank) < 100) counts <- colSums(matrix(counts, 2))
   spread <- (rank + stats::runif(length(rank))) / (sbc_draws + 1)
   tests <- c(stats::chisq.test(counts)$p.value, stats::ks.test(spread, "punif")$p.value)
   min(1, 2 * min(tests))
