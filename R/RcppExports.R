@@ -29,12 +29,20 @@ history_coefficients_ <- function(data, priors, draws) {
     .Call(`_amiss_history_coefficients_`, data, priors, draws)
 }
 
+shapley_shares_ <- function(data, priors, draws, context_list) {
+    .Call(`_amiss_shapley_shares_`, data, priors, draws, context_list)
+}
+
 attribute_ <- function(data, priors, error_settings, control, context_list) {
     .Call(`_amiss_attribute_`, data, priors, error_settings, control, context_list)
 }
 
 calibrate_paper_ <- function(data, priors, emulator_list, control, context_list) {
     .Call(`_amiss_calibrate_paper_`, data, priors, emulator_list, control, context_list)
+}
+
+fictitious_condition_ <- function(n, seed) {
+    .Call(`_amiss_fictitious_condition_`, n, seed)
 }
 
 paper_discrepancy_ <- function(data, priors, draws) {

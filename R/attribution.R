@@ -4,8 +4,14 @@ attribution_control <- list(surrogates = 199, smallest_shift = 0.05, level = 0.0
 #' Which boundary conditions drive the discrepancy
 #'
 #' For each condition: the evidence that the history model loses when the condition is dropped, its share of the
-#' variance, and a p-value from surrogates (all conditions shifted in time together, which keeps their
+#' discrepancy, and a p-value from surrogates (all conditions shifted in time together, which keeps their
 #' autocorrelation and their correlation with one another), adjusted over all conditions by Holm's method.
+#'
+#' *Share.* A set of conditions explains `1 - RSS / TSS` of the record outside the simulation space, its sums of squares
+#' weighed by the covariance of the error (for white error: the plain share of the variance). The share of a condition
+#' is its Shapley value: what it adds to those before it, averaged over all orders of the conditions and over the
+#' posterior. So shares are not negative and add up to what all conditions explain together, also where conditions are
+#' correlated; two conditions that say the same share evenly. Beyond 10 conditions that act, 400 random orders stand for all.
 #'
 #' @param fit A calibration ([calibrate()]).
 #' @param control List of options: `surrogates` (199), `smallest_shift` (0.05 of the record), `level` (0.05),
@@ -30,7 +36,7 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   log10_bf <- (fit$history$log_evidence - result$log_evidence_dropped) / log(10)
   table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf,
                       standard_error = sqrt(fit$history$standard_error^2 + result$standard_error^2) / log(10),
-                      share = variance_shares(fit, data), p_value = result$adjusted, p_value_single = result$p_value,
+                      share = variance_shares(fit, data, seed, threads), p_value = result$adjusted, p_value_single = result$p_value,
                       significant = result$adjusted <= control$level & log10_bf >= control$least_log10_bf,
                       trusted = result$trusted & fit$history$trusted)
   table <- table[order(-table$log10_bf_dropped), ]
@@ -48,13 +54,9 @@ check_attribution_control <- function(control, call = rlang::caller_env()) {
   check_input(checkmate::check_list(control$ais), "control$ais", call = call)
 }
 
-# Share of the variance of the record outside the simulation space that each condition's fitted response carries:
-# cov(response_s, y) / var(y). Shares and the unexplained rest add to one, whatever the correlation of conditions.
-variance_shares <- function(fit, data) {
-  parts <- condition_responses(fit, data)
-  outside <- function(x) as.matrix(stats::lm.fit(data$basis, x)$residuals)
-  y <- as.numeric(outside(data$y))
-  colSums(outside(parts) * y) / sum(y^2)
+# Shapley shares, averaged over the posterior draws that are kept for the discrepancy.
+variance_shares <- function(fit, data, seed, threads) {
+  colMeans(call_engine(shapley_shares_(data, fit$priors, fit$errors, engine_context(seed, threads))))
 }
 
 # Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).

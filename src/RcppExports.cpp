@@ -106,6 +106,20 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// shapley_shares_
+Eigen::MatrixXd shapley_shares_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_shapley_shares_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP, SEXP context_listSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type draws(drawsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
+    rcpp_result_gen = Rcpp::wrap(shapley_shares_(data, priors, draws, context_list));
+    return rcpp_result_gen;
+END_RCPP
+}
 // attribute_
 Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::IntegerVector& error_settings, const Rcpp::List& control, const Rcpp::List& context_list);
 RcppExport SEXP _amiss_attribute_(SEXP dataSEXP, SEXP priorsSEXP, SEXP error_settingsSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
@@ -133,6 +147,18 @@ BEGIN_RCPP
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
     rcpp_result_gen = Rcpp::wrap(calibrate_paper_(data, priors, emulator_list, control, context_list));
+    return rcpp_result_gen;
+END_RCPP
+}
+// fictitious_condition_
+Eigen::VectorXd fictitious_condition_(int n, double seed);
+RcppExport SEXP _amiss_fictitious_condition_(SEXP nSEXP, SEXP seedSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< int >::type n(nSEXP);
+    Rcpp::traits::input_parameter< double >::type seed(seedSEXP);
+    rcpp_result_gen = Rcpp::wrap(fictitious_condition_(n, seed));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -189,8 +215,10 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
     {"_amiss_history_coefficients_", (DL_FUNC) &_amiss_history_coefficients_, 3},
+    {"_amiss_shapley_shares_", (DL_FUNC) &_amiss_shapley_shares_, 4},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
+    {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
     {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},
     {"_amiss_zone_simulate_", (DL_FUNC) &_amiss_zone_simulate_, 6},
     {"_amiss_zone_balance_", (DL_FUNC) &_amiss_zone_balance_, 5},

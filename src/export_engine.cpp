@@ -1,6 +1,7 @@
 // Conversions between R and the engine: convert, call, convert. Nothing is computed here.
 #include "export_convert.h"
 
+#include "engine/attribution/ShapleyShares.hpp"
 #include "engine/attribution/SurrogateTest.hpp"
 #include "engine/basis/Basis.hpp"
 #include "engine/calibration/Calibration.hpp"
@@ -187,6 +188,21 @@ Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& 
         model.coefficients(model.whitened(setting[j]), std::log(variance[j]), t.row(j).transpose());
   }
   return coefficients;
+}
+
+// Shapley shares of the discrepancy (draws x S), for given draws of the history parameters.
+// [[Rcpp::export]]
+Eigen::MatrixXd shapley_shares_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws,
+                                const Rcpp::List& context_list) {
+  const Context context = convert::context(context_list);
+  const HistoryModel model = make_history_model(data, priors, context);
+  const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
+  const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
+  const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
+  std::vector<HistoryParameters> points;
+  for (Eigen::Index j = 0; j < variance.size(); ++j)
+    points.push_back({setting[static_cast<std::size_t>(j)], variance[j], t.row(j).transpose()});
+  return shapley_shares(model, points, ShapleyOptions(), context);
 }
 
 // Evidence without each of the given conditions (0-based), and the surrogate test.

@@ -100,6 +100,12 @@ Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, co
                             _["index"] = list_index(index), _["log_jacobian"] = coefficients.log_jacobian());
 }
 
+// The fictitious condition x_0 of (6).
+// [[Rcpp::export]]
+Eigen::VectorXd fictitious_condition_(int n, double seed) {
+  return fictitious_condition(n, static_cast<std::uint64_t>(seed));
+}
+
 // Posterior mean of the discrepancy (N x draws, equation 8) for draws of the hyper-parameters of (6).
 // [[Rcpp::export]]
 Eigen::MatrixXd paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors,

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <stdexcept>
 
+#include "engine/attribution/ShapleyShares.hpp"
 #include "engine/attribution/SurrogateTest.hpp"
 #include "engine/discrepancy/FilterBank.hpp"
 #include "helpers.hpp"
@@ -174,6 +176,177 @@ TEST(NullSetting, PicksWhiteForWhiteNoiseAndMemoryForMemory) {
       error_covariance(data.axis, error.correlation_times, VectorXd::Constant(1, 10.0)).llt().matrixL();
   data.y = 20.0 + (0.5 * root * normal_vector(kN, 91)).array();
   EXPECT_EQ(null_setting(make_model(data, error)), 2);
+}
+
+// Average over all orders of the players, as Shapley values are defined.
+VectorXd over_all_orders(int n, const std::function<double(std::uint64_t)>& value) {
+  std::vector<int> order(static_cast<std::size_t>(n));
+  std::iota(order.begin(), order.end(), 0);
+  VectorXd sum = VectorXd::Zero(n);
+  int orders = 0;
+  do {
+    std::uint64_t before = 0;
+    for (int s : order) {
+      const std::uint64_t now = before | (std::uint64_t{1} << s);
+      sum[s] += value(now) - value(before);
+      before = now;
+    }
+    ++orders;
+  } while (std::next_permutation(order.begin(), order.end()));
+  return sum / orders;
+}
+
+TEST(ShapleyValues, PairOfGloves) {
+  // One has a left glove (bit 0), two have right ones; only a pair has a value. Textbook: 2/3, 1/6, 1/6.
+  const auto pair = [](std::uint64_t a) { return (a & 1) != 0 && (a & 6) != 0 ? 1.0 : 0.0; };
+  const VectorXd values = shapley_values(3, pair, {}, Context());
+  EXPECT_NEAR(values[0], 2.0 / 3, 1e-14);
+  EXPECT_NEAR(values[1], 1.0 / 6, 1e-14);
+  EXPECT_NEAR(values[2], 1.0 / 6, 1e-14);
+}
+
+TEST(ShapleyValues, EqualTheAverageOverAllOrders) {
+  for (int n : {0, 1, 2, 5, 7}) {
+    const VectorXd table = normal_vector(Index{1} << n, 5);
+    const auto value = [&](std::uint64_t a) { return table[static_cast<Index>(a)]; };
+    const VectorXd own = shapley_values(n, value, {}, Context());
+    ASSERT_EQ(own.size(), n);
+    if (n == 0) continue;
+    EXPECT_LT((own - over_all_orders(n, value)).cwiseAbs().maxCoeff(), 1e-12) << n;
+  }
+}
+
+TEST(ShapleyValues, RandomOrdersAddUpExactlyAndComeClose) {
+  const int n = 8;
+  const VectorXd table = uniform_matrix(1 << n, 1, 6);
+  const auto value = [&](std::uint64_t a) { return table[static_cast<Index>(a)]; };
+  const VectorXd exact = shapley_values(n, value, {}, Context());
+  ShapleyOptions options;
+  options.exact_players = 0;
+  options.orders = 2000;
+  const VectorXd sampled = shapley_values(n, value, options, Context());
+  EXPECT_NEAR(sampled.sum(), table[(1 << n) - 1] - table[0], 1e-12);
+  // A marginal contribution has sd 0.41 (difference of two uniforms); 4000 orders: 0.0065; 5 of it.
+  EXPECT_LT((sampled - exact).cwiseAbs().maxCoeff(), 0.033);
+  EXPECT_GT((sampled - exact).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_EQ(sampled, shapley_values(n, value, options, Context()));
+  EXPECT_THROW(shapley_values(64, value, options, Context()), std::invalid_argument);
+}
+
+const ErrorOptions kTwoErrors{VectorXd::Constant(1, 3.0), Eigen::Vector2d(0.0, 2.0)};
+
+std::vector<HistoryParameters> make_history_draws() {
+  return {{0, 0.3, Eigen::Vector3d(0.5, 2.0, 0.01)},
+          {1, 0.1, Eigen::Vector3d(0.02, 0.7, 3.0)},
+          {1, 0.2, Eigen::Vector3d(0.4, 0.0, 0.3)}};
+}
+
+// 1 - sigma^2 v'(H'AH)^-1 v / v'(H'CH)^-1 v with N x N matrices and an explicit complement, the conditions in
+// the coalition only.
+double dense_explained(const HistoryData& data, const HistoryParameters& p, std::uint64_t coalition) {
+  const MatrixXd h = Eigen::HouseholderQR<MatrixXd>(data.basis).householderQ() *
+                     MatrixXd::Identity(kN, kN).rightCols(kN - data.basis.cols());
+  const MatrixXd c = error_covariance(data.axis, kTwoErrors.correlation_times, kTwoErrors.setting(p.setting));
+  MatrixXd phi = data.responses.rowwise() - data.responses.colwise().mean();
+  for (Index j = 0; j < phi.cols(); ++j) {
+    const int s = data.condition[static_cast<std::size_t>(j)];
+    const double columns = static_cast<double>(std::count(data.condition.begin(), data.condition.end(), s));
+    phi.col(j) *=
+        ((coalition >> s) & 1) != 0 ? std::sqrt(p.t[s] / columns * kN / phi.col(j).squaredNorm()) : 0.0;
+  }
+  const VectorXd v = h.transpose() * data.y;
+  const MatrixXd seen = h.transpose() * (p.variance * c + phi * phi.transpose()) * h;
+  return 1.0 - p.variance * v.dot(seen.ldlt().solve(v)) / v.dot((h.transpose() * c * h).ldlt().solve(v));
+}
+
+TEST(ShapleyShares, EqualTheDenseOnes) {
+  const HistoryData data = make_data(1.0, 3);
+  const HistoryModel model = make_model(data, kTwoErrors);
+  const std::vector<HistoryParameters> draws = make_history_draws();
+  const MatrixXd shares = shapley_shares(model, draws, {}, Context());
+  for (Index i = 0; i < 3; ++i) {
+    const HistoryParameters& p = draws[static_cast<std::size_t>(i)];
+    const auto value = [&](std::uint64_t a) { return dense_explained(data, p, a); };
+    EXPECT_LT((shares.row(i).transpose() - over_all_orders(3, value)).cwiseAbs().maxCoeff(), 1e-9) << i;
+    // What all explain, exactly; no share is negative; a condition without variance has none.
+    EXPECT_NEAR(shares.row(i).sum(), model.explained(model.whitened(p.setting), std::log(p.variance), p.t),
+                1e-13);
+    EXPECT_GE(shares.row(i).minCoeff(), 0.0);
+  }
+  EXPECT_EQ(shares(2, 1), 0.0);
+  Context two;
+  two.threads = 2;
+  EXPECT_EQ(shapley_shares(model, draws, {}, two), shares);
+}
+
+// Centred columns orthogonal to one another, with white error and K the vector of ones.
+HistoryData orthogonal_data() {
+  HistoryData data;
+  data.axis = even_axis(kN);
+  data.basis = VectorXd::Ones(kN);
+  MatrixXd x(kN, 4);
+  x << VectorXd::Ones(kN), normal_matrix(kN, 3, 71);
+  const MatrixXd o = Eigen::HouseholderQR<MatrixXd>(x).householderQ() * MatrixXd::Identity(kN, 4);
+  data.responses = o.rightCols(3);
+  data.condition = {0, 1, 2};
+  data.y = 20.0 + (data.responses * Eigen::Vector3d(3.0, 1.0, 5.0) + 0.3 * normal_vector(kN, 72)).array();
+  return data;
+}
+
+TEST(ShapleyShares, OfOrthogonalConditionsAreWhatEachExplains) {
+  const HistoryData data = orthogonal_data();
+  const HistoryModel model = make_model(data);
+  const HistoryParameters p{0, 0.04, Eigen::Vector3d(0.3, 0.02, 1.0)};
+  const VectorXd shares = shapley_shares(model, {p}, {}, Context()).row(0).transpose();
+  const VectorXd centred = data.y.array() - data.y.mean();
+  for (Index s = 0; s < 3; ++s) {
+    // Simple regression on a column of squared norm N: R^2, shrunk by N t / (N t + sigma^2).
+    const double plain = std::pow(centred.dot(data.responses.col(s)), 2) / centred.squaredNorm();
+    EXPECT_NEAR(shares[s], plain * kN * p.t[s] / (kN * p.t[s] + p.variance), 1e-12) << s;
+  }
+}
+
+TEST(ShapleyShares, TwoConditionsThatAreTheSameShareEvenly) {
+  HistoryData data = orthogonal_data();
+  data.responses.col(2) = 7.0 * data.responses.col(0).array() - 2.0;
+  const HistoryModel model = make_model(data);
+  const VectorXd t = Eigen::Vector3d(0.3, 0.02, 0.3);
+  const VectorXd shares = shapley_shares(model, {{0, 0.04, t}}, {}, Context()).row(0).transpose();
+  EXPECT_NEAR(shares[0], shares[2], 1e-12);
+  EXPECT_NEAR(shares[0] + shares[2],
+              model.explained(model.whitened(0), std::log(0.04), Eigen::Vector3d(0.3, 0.0, 0.3)), 1e-12);
+}
+
+TEST(ShapleyShares, NamesOfTheConditionsDoNotMatter) {
+  const HistoryData data = make_data(1.0, 3);
+  HistoryData other = data;  // 0, 1, 2 become 2, 0, 1
+  for (int& s : other.condition) s = (s + 2) % 3;
+  const HistoryModel a = make_model(data, kTwoErrors), b = make_model(other, kTwoErrors);
+  for (HistoryParameters p : make_history_draws()) {
+    HistoryParameters q = p;
+    for (int s = 0; s < 3; ++s) q.t[(s + 2) % 3] = p.t[s];
+    EXPECT_NEAR(a.log_likelihood(p.setting, std::log(p.variance), p.t),
+                b.log_likelihood(q.setting, std::log(q.variance), q.t), 1e-8);
+    const MatrixXd first = shapley_shares(a, {p}, {}, Context()),
+                   second = shapley_shares(b, {q}, {}, Context());
+    for (int s = 0; s < 3; ++s) EXPECT_NEAR(first(0, s), second(0, (s + 2) % 3), 1e-12);
+  }
+}
+
+TEST(ShapleyShares, SharesOfElevenConditionsAddUp) {
+  HistoryData data = make_data(1.0, 3);
+  data.responses = normal_matrix(kN, 11, 73);
+  data.condition.resize(11);
+  std::iota(data.condition.begin(), data.condition.end(), 0);
+  const HistoryModel model = make_model(data);
+  const HistoryParameters p{0, 0.3, VectorXd::LinSpaced(11, 0.1, 1.0)};
+  ShapleyOptions all;
+  all.exact_players = 11;
+  const MatrixXd sampled = shapley_shares(model, {p}, {}, Context()),
+                 exact = shapley_shares(model, {p}, all, Context());
+  EXPECT_NEAR(sampled.sum(), model.explained(model.whitened(0), std::log(0.3), p.t), 1e-12);
+  // Nearly orthogonal columns: what a condition adds depends little on the order.
+  EXPECT_LT((sampled - exact).cwiseAbs().maxCoeff(), 0.003);
 }
 
 }  // namespace

@@ -429,6 +429,14 @@ TEST(PaperCalibration, UnitOfTheBasisDoesNotMatter) {
   }
 }
 
+TEST(PaperCalibration, OrderOfTheTimeStepsDoesNotMatter) {
+  const KernelData data = make_data();
+  const PaperCalibration a(data.y, data.basis), b(data.y.reverse(), data.basis.colwise().reverse());
+  const VectorXd mean = Eigen::Vector3d(0.015, 3.4, 20.6), variance = Eigen::Vector3d(1e-6, 0.04, 0.2);
+  const VectorXd lambda = Eigen::Vector3d(9.0, 11.0, 30.0);
+  EXPECT_NEAR(a.log_density(mean, variance, lambda), b.log_density(mean, variance, lambda), 1e-8);
+}
+
 // Without emulator variance lambda*_q can be integrated: w*_q is a Student t of 2 a* degrees of freedom with
 // scale sqrt(b* / (a* k_q'k_q)). That scale is the scaling of the prior.
 TEST(PaperCalibration, PrecisionIntegratesToAStudentT) {

@@ -58,6 +58,13 @@ linear_fit <- function(measurements = linear_measurements(), seed = 3, threads =
   calibrate(emulator, measurements, quick_ais, seed = seed, threads = threads)
 }
 
+# The same simulation space with its basis in another unit.
+rescaled <- function(emulator, factor) {
+  emulator$basis$vectors <- emulator$basis$vectors * factor
+  emulator$processes$coefficients <- emulator$processes$coefficients / factor
+  emulator
+}
+
 twinhouse_study <- function(house) system.file("studies", sprintf("twinhouse_%s.yml", house), package = "amiss")
 
 # What print() says, in one line.

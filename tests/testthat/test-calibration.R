@@ -32,6 +32,22 @@ test_that("the evidence does not depend on the unit of a boundary condition", {
   expect_equal(linear_fit(linear_measurements(other))$log_evidence, a$log_evidence, tolerance = 1e-6)
 })
 
+test_that("the unit of the basis and the order of the conditions do not matter", {
+  m <- linear_measurements()
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
+  fit <- calibrate(emulator, m, quick_ais, seed = 3)
+  # Powers of two round nothing; what other factors change in the last digit, chains amplify (test-paper.R).
+  for (factor in c(2^10, 2^-10, 1000)) {
+    other <- calibrate(rescaled(emulator, factor), m, quick_ais, seed = 3)
+    expect_lt(abs(other$log_evidence - fit$log_evidence), if (factor == 1000) 1e-4 else 1e-8)
+    expect_lt(abs(other$history$log_evidence - fit$history$log_evidence), if (factor == 1000) 1e-4 else 1e-8)
+    expect_equal(other$values, fit$values, tolerance = if (factor == 1000) 1e-4 else 1e-8)
+  }
+  # Another order gives each condition other random numbers: the likelihood is the same (tests/cpp), the evidence within its error.
+  turned <- calibrate(emulator, linear_measurements(boundary = ~ Gv + Te), quick_ais, seed = 3)
+  expect_lt(abs(turned$log_evidence - fit$log_evidence), 4 * sqrt(turned$standard_error^2 + fit$standard_error^2))
+})
+
 test_that("options are checked", {
   m <- linear_measurements()
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)

@@ -110,3 +110,17 @@ test_that("it prints, and options are checked", {
   expect_error(calibrate_paper(fit$emulator, fit$measurements, list(shared_lambda = 2)), "shared_lambda", class = "amiss_error_input")
   expect_error(calibrate_paper(fit$emulator, paper_measurements(paper_data_frame(n = 40))), "60 steps.*40", class = "amiss_error_input")
 })
+
+test_that("the unit of the basis does not matter", {
+  m <- paper_measurements(paper_data_frame(sun))
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
+  fit <- calibrate_paper(emulator, m, quick_ais, seed = 3)
+  # Rounding of the last digit, which chains and the emulator's inverse (condition 1e10) amplify, is all that remains: by a
+  # power of two only that of the logarithms. Without the Jacobian |K'K|^(-1/2) it would be Q log(factor), more than 13.
+  for (factor in c(2^10, 2^-10, 1000)) {
+    other <- calibrate_paper(rescaled(emulator, factor), m, quick_ais, seed = 3)
+    tolerance <- if (factor == 1000) 1e-5 else 1e-8
+    expect_equal(other$evidence$log_evidence, fit$evidence$log_evidence, tolerance = tolerance)
+    expect_equal(other$values, fit$values, tolerance = tolerance)
+  }
+})

@@ -22,7 +22,10 @@ double log_standard_normal(const VectorXd& x) {
 
 CalibrationTarget::CalibrationTarget(const HistoryTarget& history, StudentTMixture reference,
                                      const Emulator& emulator)
-    : history_(history), reference_(std::move(reference)), emulator_(emulator) {
+    : history_(history),
+      reference_(std::move(reference)),
+      emulator_(emulator),
+      log_jacobian_(-log_volume(history.model().data().basis)) {
   const HistoryModel& model = history.model();
   for (int g = 0; g < model.settings(); ++g) {
     const MatrixXd& root = model.whitened(g).root;
@@ -59,8 +62,8 @@ double CalibrationTarget::log_density_inside(const HistoryParameters& point, con
   if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
   const VectorXd z = factor.matrixL().solve((data.estimate - mean).cwiseQuotient(scale));
   const double half_log_det = factor.matrixLLT().diagonal().array().log().sum() + scale.array().log().sum();
-  const double log_jacobian = -data.root.diagonal().cwiseAbs().array().log().sum();
-  return log_jacobian - half_log_det - 0.5 * (static_cast<double>(mean.size()) * kLogTwoPi + z.squaredNorm());
+  return log_jacobian_ - half_log_det -
+         0.5 * (static_cast<double>(mean.size()) * kLogTwoPi + z.squaredNorm());
 }
 
 VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {

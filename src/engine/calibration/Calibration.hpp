@@ -12,8 +12,8 @@ namespace amiss {
 /// Under an error setting with W K = O R, the part of y inside the simulation space is seen as
 ///     estimate = R^-1 O' W y ~ N(w(z), sigma^2 (R'R)^-1),
 /// and with the emulator's mean w' and variance S (equation 5, with one error for inside and outside)
-///     p(y | z, ...) = p(outside part | ...) N(estimate; w'(z), S(z) + sigma^2 (R'R)^-1) / |R|.
-/// |R|^-1 is the Jacobian that makes this a density of y, whatever the basis (for white error |K'K|^-1/2).
+///     p(y | z, ...) = p(H'y | ...) |K'K|^(-1/2) N(estimate; w'(z), S(z) + sigma^2 (R'R)^-1).
+/// |K'K|^(-1/2) is the Jacobian that makes this a density of y, whatever the basis.
 ///
 /// The reference is a Student-t mixture close to the history posterior, times the prior of the parameters, so
 /// that annealing only has to bring in what the inside part says. The normalising constant is the evidence of
@@ -41,6 +41,7 @@ class CalibrationTarget : public Target {
   const HistoryTarget& history_;
   StudentTMixture reference_;
   const Emulator& emulator_;
+  double log_jacobian_;                           // -1/2 log|K'K|
   std::vector<Eigen::MatrixXd> unit_covariance_;  // (R'R)^-1 of each error setting
 };
 

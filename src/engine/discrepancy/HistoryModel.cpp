@@ -72,9 +72,16 @@ WhitenedData whiten(const HistoryData& data, const VectorXd& correlation_times, 
   out.gram.triangularView<Eigen::StrictlyUpper>() = out.gram.transpose();
   out.cross = outside.transpose() * y_outside;
   out.square = y_outside.squaredNorm();
-  out.log_det = whitener.log_det();
+  out.log_det =
+      whitener.log_det() + log_volume(data.basis) - out.root.diagonal().cwiseAbs().array().log().sum();
   out.residual_dimension = y.size() - q;
   return out;
+}
+
+double log_volume(const MatrixXd& basis) {
+  const VectorXd norms = basis.colwise().norm().transpose();
+  const Eigen::HouseholderQR<MatrixXd> qr(basis * norms.cwiseInverse().asDiagonal());
+  return norms.array().log().sum() + qr.matrixQR().diagonal().cwiseAbs().array().log().sum();
 }
 
 HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context& context)
@@ -102,40 +109,61 @@ double HistoryModel::log_likelihood(int setting, double log_variance, const Vect
   return log_likelihood(settings_[setting], log_variance, t, gradient);
 }
 
-// With D = diag(t_s / p_s), B = I + D^1/2 G D^1/2 / sigma^2 and b = D^1/2 g:
-//   log |H'AH| = (N - Q) log sigma^2 + log |B|,   quadratic form = (y'y - b' B^-1 b / sigma^2) / sigma^2.
-// With r = B^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(B^-1)_ss - p_s]; it holds at t_s = 0 too.
-double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_variance, const VectorXd& t,
-                                    VectorXd* gradient) const {
-  const double precision = std::exp(-log_variance);
+// With D = diag(t_s / p_s), B = I + D^1/2 G D^1/2 / sigma^2 = LL' and b = D^1/2 g, columns with t_s > 0 only.
+struct HistoryModel::Factor {
   std::vector<Index> kept;
+  Eigen::LLT<MatrixXd, Eigen::Lower> root;  // L
+  VectorXd half;                            // L^-1 b
+};
+
+HistoryModel::Factor HistoryModel::factorise(const WhitenedData& whitened, double precision,
+                                             const VectorXd& t) const {
+  Factor out;
   for (std::size_t j = 0; j < data_.condition.size(); ++j) {
-    if (t[data_.condition[j]] > 0) kept.push_back(static_cast<Index>(j));
+    if (t[data_.condition[j]] > 0) out.kept.push_back(static_cast<Index>(j));
   }
-  const Index p = static_cast<Index>(kept.size());
+  const Index p = static_cast<Index>(out.kept.size());
   VectorXd root(p), b(p);
   for (Index j = 0; j < p; ++j) {
-    const int s = data_.condition[kept[j]];
+    const int s = data_.condition[out.kept[j]];
     root[j] = std::sqrt(t[s] / columns_[s]);
-    b[j] = root[j] * whitened.cross[kept[j]];
+    b[j] = root[j] * whitened.cross[out.kept[j]];
   }
   MatrixXd matrix(p, p);
   for (Index j = 0; j < p; ++j) {
     for (Index i = j; i < p; ++i)
-      matrix(i, j) = precision * root[i] * root[j] * whitened.gram(kept[i], kept[j]);
+      matrix(i, j) = precision * root[i] * root[j] * whitened.gram(out.kept[i], out.kept[j]);
     matrix(j, j) += 1.0;
   }
-  const Eigen::LLT<MatrixXd, Eigen::Lower> factor(matrix);
+  out.root.compute(matrix);
+  if (p > 0) out.half = out.root.matrixL().solve(b);
+  return out;
+}
+
+double HistoryModel::explained(const WhitenedData& whitened, double log_variance, const VectorXd& t) const {
+  if (!(whitened.square > 0)) return 0.0;
+  const double precision = std::exp(-log_variance);
+  return precision * factorise(whitened, precision, t).half.squaredNorm() / whitened.square;
+}
+
+//   log |H~'AH~| = (N - Q) log sigma^2 + log |B|,   quadratic form = (y'y - b' B^-1 b / sigma^2) / sigma^2.
+// With r = B^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(B^-1)_ss - p_s]; it holds at t_s = 0 too.
+double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_variance, const VectorXd& t,
+                                    VectorXd* gradient) const {
+  const double precision = std::exp(-log_variance);
+  const Factor factor = factorise(whitened, precision, t);
+  const std::vector<Index>& kept = factor.kept;
+  const VectorXd& half = factor.half;
+  const Index p = half.size();
   const double n = static_cast<double>(whitened.residual_dimension);
-  const double log_det = p == 0 ? 0.0 : 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-  const VectorXd half = p == 0 ? VectorXd() : VectorXd(factor.matrixL().solve(b));
+  const double log_det = p == 0 ? 0.0 : 2.0 * factor.root.matrixLLT().diagonal().array().log().sum();
   const double quadratic = precision * (whitened.square - precision * half.squaredNorm());
   const double value = whitened.log_det - 0.5 * (n * (kLogTwoPi + log_variance) + log_det + quadratic);
 
   if (gradient != nullptr) {
     gradient->setZero(1 + conditions_);
     MatrixXd root_inverse = MatrixXd::Identity(p, p);
-    if (p > 0) factor.matrixL().solveInPlace(root_inverse);
+    if (p > 0) factor.root.matrixL().solveInPlace(root_inverse);
     const VectorXd inverse_diagonal = root_inverse.colwise().squaredNorm().transpose();
     const VectorXd r = precision * (root_inverse.transpose() * half);
     for (Index j = 0; j < p; ++j) {

@@ -36,7 +36,7 @@ struct WhitenedData {
   Eigen::MatrixXd gram;                 ///< Phi' W' P W Phi, p x p
   Eigen::VectorXd cross;                ///< Phi' W' P W y, p
   double square = 0.0;                  ///< y' W' P W y
-  double log_det = 0.0;                 ///< log |W|
+  double log_det = 0.0;                 ///< -1/2 log|H'CH|, C = (W'W)^-1, H the complement of K
   Eigen::MatrixXd root;                 ///< R, Q x Q upper triangular
   Eigen::VectorXd estimate;             ///< R^-1 O' W y: generalised least squares coefficients of y on K
   Eigen::Index residual_dimension = 0;  ///< N - Q
@@ -45,18 +45,28 @@ struct WhitenedData {
 WhitenedData whiten(const HistoryData& data, const Eigen::VectorXd& correlation_times,
                     const Eigen::VectorXd& ratios);
 
+/// 1/2 log|K'K|, whatever the sizes of the columns.
+double log_volume(const Eigen::MatrixXd& basis);
+
 /// Discrepancy driven by the history of the boundary conditions,
 ///     v ~ N(0, sum_s t_s Phi_s Phi_s' / p_s),  p_s columns of condition s,
 /// seen with an error of ErrorModel's kind, in the complement of the simulation space under the metric of
-/// that error. In whitened coordinates this is the paper's split: the part of y inside the simulation space
-/// is independent of the part outside, and the two densities multiply to the density of y, with |R|^-1 as
-/// Jacobian.
+/// that error. In whitened coordinates this is the paper's split: the part of y inside the simulation space,
+/// the generalised least squares coefficients, is independent of the part outside.
+///
+/// What lies outside is seen through H'y, H the orthonormal complement of K, which no error setting and no w
+/// changes: with C the covariance of the error for sigma = 1, H~ the complement of W K,
+///     H'y ~ N(0, H'(sigma^2 C + Phi D Phi')H),  H~'W y = A H'y,
+///     |A| = |H'CH|^(-1/2) = |W| |K'K|^(1/2) / |R|.
+/// The density of H'y times |K'K|^(-1/2) times that of the coefficients is the density of y. |A| must stand
+/// here: |W| alone would compare error settings by densities of different statistics.
 class HistoryModel {
  public:
   HistoryModel(HistoryData data, HistoryPriors priors, const Context& context);
 
-  /// log density of the part of y outside the simulation space, given the error setting, log sigma^2 and the
-  /// t_s of the conditions (t_s = 0 leaves one out). The gradient is with respect to (log sigma^2, log t_1
+  /// log density of H'y, the part of y outside the simulation space, given the error setting, log sigma^2 and
+  /// the t_s of the conditions (t_s = 0 leaves one out). The gradient is with respect to (log sigma^2, log
+  /// t_1
   /// ... log t_S).
   double log_likelihood(int setting, double log_variance, const Eigen::VectorXd& t,
                         Eigen::VectorXd* gradient = nullptr) const;
@@ -66,6 +76,13 @@ class HistoryModel {
   /// Posterior mean of the coefficients of the (scaled) filter columns.
   Eigen::VectorXd coefficients(const WhitenedData& whitened, double log_variance,
                                const Eigen::VectorXd& t) const;
+
+  /// Share of y outside the simulation space that the conditions with t_s > 0 explain, in the metric of the
+  /// error:
+  ///     1 - sigma^2 v'(H'AH)^-1 v / v'(H'CH)^-1 v,  v = H'y,  A = sigma^2 C + sum_s t_s Phi_s Phi_s' / p_s.
+  /// The numerator is the response fitted by the conditions times v, so that for white error this is
+  /// cov(response, y) / var(y). Between 0 and 1; never less for more conditions.
+  double explained(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t) const;
 
   const HistoryData& data() const { return data_; }
   const HistoryPriors& priors() const { return priors_; }
@@ -77,6 +94,9 @@ class HistoryModel {
   const Eigen::RowVectorXd& scale() const { return scale_; }    ///< then divided by this
 
  private:
+  struct Factor;
+  Factor factorise(const WhitenedData& whitened, double precision, const Eigen::VectorXd& t) const;
+
   HistoryData data_;
   HistoryPriors priors_;
   int conditions_;
