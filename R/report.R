@@ -254,9 +254,11 @@ report <- function(x, file, quiet = TRUE) {
 
 # ---- what the templates are written with
 
-# Text as it is: nothing in it is markup, but 10^3 is set as a power.
+# Text as it is: nothing in it is markup, but 10^3 is set as a power. Brackets as entities: a backslash before one opens
+# a formula.
 markdown_text <- function(x) {
-  plain <- gsub("([\\\\`*_{}$^~|@#<>&\\[\\]])", "\\\\\\1", x, perl = TRUE)
+  plain <- gsub("([\\\\`*_{}$^~|@#<>&])", "\\\\\\1", x, perl = TRUE)
+  plain <- gsub("]", "&#93;", gsub("[", "&#91;", plain, fixed = TRUE), fixed = TRUE)
   gsub("([0-9]) %", "\\1\u00a0%", gsub("10\\\\\\^(-?[0-9]+)", "10^\\1^", plain, perl = TRUE))
 }
 

@@ -7,13 +7,13 @@
 #' @param x The summary.
 #' @param ... Not used.
 #' @return A list: `title`, `headline`, the sentences `evidence`, `remains`, `practice` and `doubts`, and the tables
-#'   `models` (evidence and attribution: the paper's table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5) and `method`.
+#'   `models` and `attribution` (the paper's table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5) and `method`.
 #' @export
 summary.amiss_comparison <- function(object, ...) {
   structure(list(title = object$title %||% object$study %||% object$measurements$name, headline = comparison_headline(object),
                  evidence = c(evidence_sentences(object), probability_sentences(object)), remains = remains_sentences(object),
                  practice = practice_sentences(object), doubts = doubt_sentences(object) %||% "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range.",
-                 models = models_words(object), parameters = compared_parameters_words(object), criteria = criteria_words(object),
+                 models = models_words(object), attribution = attribution_table_words(object), parameters = compared_parameters_words(object), criteria = criteria_words(object),
                  errors = errors_words(object), method = comparison_method_table(object), seed = object$seed), class = "summary.amiss_comparison")
 }
 
@@ -68,24 +68,26 @@ practice_sentences <- function(comparison) {
 
 interval_words <- function(lower, upper, digits = 3) paste0("[", short(lower, digits), ", ", short(upper, digits), "]")
 
-# Table 3a of the paper: a row for each model, a column for each condition.
+# Table 3a of the paper, in two: evidence, and attribution with a column for each condition.
 models_words <- function(comparison) {
   evidence <- comparison$tables$evidence
+  against <- ifelse(is.na(evidence$log10_bf), "", sprintf("%s %s against %s", signed(evidence$log10_bf), interval_words(evidence$bf_lower95, evidence$bf_upper95), evidence$against))
+  data.frame(model = evidence$model, "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence, evidence$lower95, evidence$upper95),
+             estimate = ifelse(evidence$trusted, "sound", "rough"), "log10 Bayes factor" = against, evidence = ifelse(is.na(evidence$word), "", evidence$word),
+             "log10 B against the first" = signed(evidence$log10_bf_first), probability = percent(evidence$probability), check.names = FALSE)
+}
+
+attribution_table_words <- function(comparison) {
   table <- comparison$tables$attribution
   cell <- if (comparison$method == "paper") {
     sprintf("%.3f [%.3f, %.3f]%s, rank %d", table$difference, table$lower95, table$upper95, ifelse(table$significant, " *", ""), table$rank)
   } else {
     sprintf("%s, p = %s%s", signed(table$log10_bf_dropped), format(round(table$p_value, 3)), ifelse(table$significant, " *", ""))
   }
-  conditions <- sapply(comparison$measurements$conditions, function(condition) {
-    cell[match(paste(evidence$model, condition), paste(table$model, table$boundary))]
-  }, simplify = FALSE)
-  data.frame(model = evidence$model, "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence, evidence$lower95, evidence$upper95),
-             estimate = ifelse(evidence$trusted, "sound", "rough"), "log10 B" = ifelse(is.na(evidence$log10_bf), "", paste(signed(evidence$log10_bf), "against", evidence$against)),
-             evidence = evidence$word %na% "", probability = percent(evidence$probability), conditions, check.names = FALSE)
+  models <- names(comparison$models)
+  columns <- sapply(comparison$measurements$conditions, function(condition) cell[match(paste(models, condition), paste(table$model, table$boundary))], simplify = FALSE)
+  data.frame(model = models, columns, check.names = FALSE)
 }
-
-`%na%` <- function(x, other) ifelse(is.na(x), other, x)
 
 # Table 3b: the parameters of every model, with the true value where it is known.
 compared_parameters_words <- function(comparison) {
