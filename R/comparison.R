@@ -170,6 +170,17 @@ disagreements <- function(comparison) {
 
 best_model <- function(comparison) with(comparison$tables$evidence, model[which.min(rank)])
 
+# For each criterion, the share of pairs of models that it puts in another order than the evidence does.
+pairs_otherwise <- function(comparison) {
+  ranks <- comparison$tables$ranking
+  if (nrow(ranks) < 2) return(numeric())
+  pairs <- utils::combn(nrow(ranks), 2)
+  order_of <- function(criterion) sign(ranks[[criterion]][pairs[1, ]] - ranks[[criterion]][pairs[2, ]])
+  others <- setdiff(names(ranks), c("model", "evidence"))
+  counts <- vapply(others, function(criterion) sum(order_of(criterion) * order_of("evidence") < 0), 0)
+  structure(counts[counts > 0], pairs = ncol(pairs))
+}
+
 # Where the likelihood ratio at 5 % prefers another model than the evidence does.
 ratio_disagreements <- function(comparison) {
   table <- comparison$tables$criteria
@@ -183,7 +194,12 @@ disagreement_sentences <- function(comparison) {
   best <- best_model(comparison)
   told <- vapply(split(names(first), first), function(criteria) listed(unname(criterion_names[criteria])), "")
   ratios <- ratio_disagreements(comparison)
+  pairs <- pairs_otherwise(comparison)
   c(if (length(first)) sprintf("%s would choose %s; the evidence chooses %s.", told, names(told), best),
+    if (length(pairs)) {
+      sprintf("Of %d pairs of models, %s in another order than the evidence.", attr(pairs, "pairs"),
+              listed(sprintf("%s puts %d", criterion_names[names(pairs)], as.integer(pairs))))
+    },
     if (nrow(ratios)) {
       sprintf("The likelihood ratio test %s %s to %s (p = %s); the log10 Bayes factor between them is %s.",
               ifelse(ratios$lr_p_value < 0.05, "prefers", "does not prefer"), ratios$model, ratios$nested, format.pval(ratios$lr_p_value, 2, eps = 1e-4), signed(ratios$log10_bf))
@@ -222,9 +238,9 @@ print.amiss_comparison <- function(x, ...) {
   criteria <- x$tables$criteria
   held_out <- !all(is.na(criteria$rmse_validation))
   table <- data.frame(model = evidence$model, log10_L = sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95, evidence$upper95, ifelse(evidence$trusted, "", " ?")),
-                      probability = percent(evidence$probability), k = criteria$k, RMSE = short(criteria$rmse_calibration, 3))
+                      P = sprintf("%.3f", evidence$probability), RMSE = short(criteria$rmse_calibration, 3))
   if (held_out) table$held_out <- short(criteria$rmse_validation, 3)
-  table <- cbind(table, AIC = round(criteria$aic, 1), BIC = round(criteria$bic, 1), LR_p = ifelse(is.na(criteria$lr_p_value), "", format.pval(criteria$lr_p_value, 2, eps = 1e-4)))
+  table <- cbind(table, AIC = round(criteria$aic), BIC = round(criteria$bic), LR_p = ifelse(is.na(criteria$lr_p_value), "", format.pval(criteria$lr_p_value, 2, eps = 1e-4)))
   cli::cli_text("{.strong Comparison} of {nrow(table)} model{?s} on {.val {x$measurements$name}} (method {x$method})")
   shown <- utils::head(order(evidence$rank), 6)
   print(table[sort(shown), ], row.names = FALSE)
@@ -259,7 +275,7 @@ check_models <- function(models, call = rlang::caller_env()) {
   check_input(checkmate::check_list(models, min.len = 1, names = "unique"), "models",
               "Give a named list of simulators, such as {.code list(M1 = zone(...), M2 = zone(...))}.", call = call)
   for (name in names(models)) {
-    rlang::try_fetch(check_simulator(models[[name]], call), amiss_error = function(e) {
+    rlang::try_fetch(check_simulator(models[[name]], call), amiss_error_input = function(e) {
       abort_input(c("Model {.val {name}} is no simulator but of class {.cls {class(models[[name]])}}.",
                     i = "Make it with {.fun zone} or {.fun function_simulator}."), call = call)
     })

@@ -66,7 +66,7 @@ figure_criteria <- function(comparison) {
   table$model <- factor(table$model, rev(names(comparison$models)))
   table$first <- factor(ifelse(table$rank == 1, "first", "not first"), c("first", "not first"))
   first <- disagreements(comparison)
-  title <- if (length(first)) paste("Not the choice of the evidence:", listed(unname(criterion_names[names(first)]))) else "All criteria choose the same model"
+  title <- if (length(first)) paste("Not the choice of the evidence:", listed(unname(criterion_names[names(first)]))) else "All criteria choose the same model first"
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$criterion, .data$model, fill = .data$first)) +
     ggplot2::geom_tile(colour = "white", linewidth = 2) +
     ggplot2::geom_text(ggplot2::aes(label = format(.data$rank), colour = .data$first), size = 5.2, fontface = "bold") +

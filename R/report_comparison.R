@@ -58,7 +58,7 @@ practice_sentences <- function(comparison) {
   disagree <- disagreement_sentences(comparison)
   correlated <- criteria[abs(criteria$autocorrelation) > 0.3, ]
   noted <- criteria[nzchar(criteria$lr_note) & !is.na(criteria$nested), ]
-  c(if (length(disagree)) disagree else "Every criterion chooses the model that the evidence chooses.",
+  c(if (!length(disagreements(comparison))) "Every criterion chooses the model that the evidence chooses.", disagree,
     if (nrow(correlated)) {
       sprintf("Likelihood, AIC, BIC and the likelihood ratio count errors as independent; those of %s are correlated from one step to the next (%s), so that these criteria overstate every difference.",
               listed(correlated$model), listed(sprintf("%.2f", correlated$autocorrelation)))
@@ -71,7 +71,7 @@ interval_words <- function(lower, upper, digits = 3) paste0("[", short(lower, di
 # Table 3a of the paper, in two: evidence, and attribution with a column for each condition.
 models_words <- function(comparison) {
   evidence <- comparison$tables$evidence
-  against <- ifelse(is.na(evidence$log10_bf), "", sprintf("%s %s against %s", signed(evidence$log10_bf), interval_words(evidence$bf_lower95, evidence$bf_upper95), evidence$against))
+  against <- ifelse(is.na(evidence$log10_bf), "", sprintf("%s [%s, %s] against %s", signed(evidence$log10_bf), signed(evidence$bf_lower95), signed(evidence$bf_upper95), evidence$against))
   data.frame(model = evidence$model, "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence, evidence$lower95, evidence$upper95),
              estimate = ifelse(evidence$trusted, "sound", "rough"), "log10 Bayes factor" = against, evidence = ifelse(is.na(evidence$word), "", evidence$word),
              "log10 B against the first" = signed(evidence$log10_bf_first), probability = percent(evidence$probability), check.names = FALSE)

@@ -80,11 +80,15 @@ test_that("scores are those of predictions, at calibration and held-out rows", {
 test_that("a disagreement between criteria and evidence is told", {
   x <- compared
   expect_length(disagreements(x), 0)
+  x$tables$ranking[-1] <- rep(list(c(2, 1, 3)), ncol(x$tables$ranking) - 1)
+  expect_length(disagreement_sentences(x), 0)
   x$tables$ranking$aic <- c(1, 2, 3)
   expect_identical(disagreements(x), c(aic = "blind"))
+  x$tables$ranking$bic <- c(3, 1, 2)
   expect_match(disagreement_sentences(x)[1], "AIC would choose blind; the evidence chooses sunny")
+  expect_match(disagreement_sentences(x)[2], "Of 3 pairs of models, AIC puts 1 and BIC puts 1 in another order")
   x$tables$criteria$lr_p_value[2] <- 0.3
-  expect_match(disagreement_sentences(x)[2], "does not prefer sunny to blind")
+  expect_match(disagreement_sentences(x)[3], "does not prefer sunny to blind")
 })
 
 test_that("what cannot be trusted is told", {
