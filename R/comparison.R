@@ -202,26 +202,34 @@ disagreement_sentences <- function(comparison) {
     },
     if (nrow(ratios)) {
       sprintf("The likelihood ratio test %s %s to %s (p = %s); the log10 Bayes factor between them is %s.",
-              ifelse(ratios$lr_p_value < 0.05, "prefers", "does not prefer"), ratios$model, ratios$nested, format.pval(ratios$lr_p_value, 2, eps = 1e-4), signed(ratios$log10_bf))
+              ifelse(ratios$lr_p_value < 0.05, "prefers", "does not prefer"), ratios$model, ratios$nested,
+              format.pval(ratios$lr_p_value, 2, eps = 1e-4), signed(ratios$log10_bf))
     })
 }
 
-# What keeps a result from being trusted: the sampler, the basis, the emulator, priors too narrow.
+# What keeps a result from being trusted: the sampler, the basis, the emulator, priors too narrow, the search.
 doubt_sentences <- function(comparison) {
-  doubts <- lapply(comparison$models, function(model) {
-    fit <- model$fit
-    noise <- fit$measurements$noise_sd
-    unit <- pretty_unit(fit$measurements$unit)
-    left_out <- fit$emulator$basis$discarded_rms
-    emulator_rmse <- fit$emulator$diagnostics$series_rmse
-    rows <- parameter_rows(fit)
-    c(if (!fit$trust$trusted) sprintf("%s: the evidence is rough (%s).", model$name, fit$trust$verdict),
-      if (left_out > 0.5 * noise) sprintf("%s: the basis is coarse: it leaves out %s %s of the runs beside a noise of %s %s, which looks like discrepancy.", model$name, short(left_out), unit, short(noise), unit),
-      if (emulator_rmse > 0.5 * noise) sprintf("%s: the emulator is rough: its error of %s %s (leave-one-out) is not small beside the noise of %s %s.", model$name, short(emulator_rmse), unit, short(noise), unit),
-      if (any(rows$at_edge)) sprintf("%s: %s at the edge of what was thought possible: widen the prior, or suspect that it makes up for something else.", model$name, listed(rows$label[rows$at_edge])),
-      if (!model$best$converged) sprintf("%s: the search for the least squares did not settle; its likelihood, AIC and BIC are lower bounds of what the model can do.", model$name))
-  })
-  unlist(doubts, use.names = FALSE)
+  unlist(lapply(comparison$models, function(model) {
+    doubts <- model_doubts(model)
+    if (length(doubts)) paste0(model$name, ": ", doubts)
+  }), use.names = FALSE)
+}
+
+model_doubts <- function(model) {
+  fit <- model$fit
+  emulator <- fit$emulator
+  noise <- fit$measurements$noise_sd
+  beside <- function(size) sprintf("%s beside a noise of %s %s", short(size), short(noise), pretty_unit(fit$measurements$unit))
+  rows <- parameter_rows(fit)
+  c(if (!fit$trust$trusted) sprintf("the evidence is rough (%s).", fit$trust$verdict),
+    if (emulator$basis$discarded_rms > 0.5 * noise) {
+      sprintf("the basis is coarse; what it leaves out of the runs (%s) looks like discrepancy.", beside(emulator$basis$discarded_rms))
+    },
+    if (emulator$diagnostics$series_rmse > 0.5 * noise) sprintf("the emulator is rough (leave-one-out error %s).", beside(emulator$diagnostics$series_rmse)),
+    if (any(rows$at_edge)) {
+      sprintf("%s at the edge of what was thought possible: widen the prior, or suspect that it makes up for something else.", listed(rows$label[rows$at_edge]))
+    },
+    if (!model$best$converged) "the search for the least squares did not settle; its likelihood is a lower bound, and with it AIC and BIC are upper ones.")
 }
 
 evidence_sentences <- function(comparison) {
@@ -237,10 +245,11 @@ print.amiss_comparison <- function(x, ...) {
   evidence <- x$tables$evidence
   criteria <- x$tables$criteria
   held_out <- !all(is.na(criteria$rmse_validation))
-  table <- data.frame(model = evidence$model, log10_L = sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95, evidence$upper95, ifelse(evidence$trusted, "", " ?")),
-                      P = sprintf("%.3f", evidence$probability), RMSE = short(criteria$rmse_calibration, 3))
+  interval <- sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95, evidence$upper95, ifelse(evidence$trusted, "", " ?"))
+  table <- data.frame(model = evidence$model, log10_L = interval, P = sprintf("%.3f", evidence$probability), RMSE = short(criteria$rmse_calibration, 3))
   if (held_out) table$held_out <- short(criteria$rmse_validation, 3)
-  table <- cbind(table, AIC = round(criteria$aic), BIC = round(criteria$bic), LR_p = ifelse(is.na(criteria$lr_p_value), "", format.pval(criteria$lr_p_value, 2, eps = 1e-4)))
+  p_value <- ifelse(is.na(criteria$lr_p_value), "", format.pval(criteria$lr_p_value, 2, eps = 1e-4))
+  table <- cbind(table, AIC = round(criteria$aic), BIC = round(criteria$bic), LR_p = p_value)
   cli::cli_text("{.strong Comparison} of {nrow(table)} model{?s} on {.val {x$measurements$name}} (method {x$method})")
   shown <- utils::head(order(evidence$rank), 6)
   print(table[sort(shown), ], row.names = FALSE)

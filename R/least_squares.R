@@ -30,8 +30,11 @@ least_squares <- function(fit, threads = 1L) {
     value <- sum(at(unit)$error^2) / (2 * scale)
     if (is.finite(value)) value else Inf
   }
-  found <- stats::nlminb(start_of_search(fit, lower, upper), objective, gradient = function(u) as.numeric(crossprod(slopes(u), at(u)$error)) / scale,
-                         hessian = function(u) crossprod(slopes(u)) / scale, lower = lower, upper = upper)
+  start <- start_of_search(fit, lower, upper)
+  # Where the simulator fails beside a point there are no slopes: the search ends at its start, not converged.
+  found <- tryCatch(stats::nlminb(start, objective, gradient = function(u) as.numeric(crossprod(slopes(u), at(u)$error)) / scale,
+                                  hessian = function(u) crossprod(slopes(u)) / scale, lower = lower, upper = upper),
+                    error = function(e) list(par = start, convergence = 1L))
   error <- at(found$par)$error
   values <- unit_to_values(t(found$par), parameters)[1, ]
   list(values = values, unit = stats::setNames(found$par, names(parameters)), error = error, rss = sum(error^2),

@@ -82,7 +82,7 @@ figure_criteria <- function(comparison) {
 attribution_words <- function(comparison) {
   named <- lapply(split(comparison$tables$attribution, factor(comparison$tables$attribution$model, names(comparison$models))), significant_conditions)
   best <- best_model(comparison)
-  sprintf("%s, of highest evidence, leaves %s", best, if (length(named[[best]])) paste("an error that answers to", listed(named[[best]])) else "an error that answers to no boundary condition")
+  sprintf("%s, of highest evidence, leaves an error that answers to %s", best, listed(named[[best]], "no boundary condition"))
 }
 
 condition_panels <- function(table, comparison, value) {
@@ -102,7 +102,8 @@ figure_index <- function(comparison) {
   figure <- condition_panels(comparison$tables$attribution, comparison, "difference") +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.3, show.legend = FALSE) +
     ggplot2::geom_point(size = 3.2, fill = "white", stroke = 1.1) +
-    figure_titles(attribution_words(comparison), "Share of the discrepancy's variance that one condition explains alone, less that of white noise; lines: 95 % highest-density intervals.",
+    figure_titles(attribution_words(comparison),
+                  "Share of the discrepancy's variance that one condition explains alone, less that of white noise; lines: 95 % highest-density intervals.",
                   x = "variance index", y = NULL)
   with_height(figure, panel_height(comparison))
 }
@@ -175,7 +176,8 @@ figure_models_parameters <- function(comparison) {
   known <- table[!is.na(table$true), ]
   inside <- known$lower95 <= known$true & known$true <= known$upper95
   best <- known$model == best_model(comparison)
-  title <- if (any(best)) sprintf("%s: %d of %d parameters have the truth inside their 95 %% interval", best_model(comparison), sum(inside[best]), sum(best)) else "What the measurements say of the parameters"
+  title <- if (!any(best)) "What the measurements say of the parameters"
+           else sprintf("%s: %d of %d parameters have the truth inside their 95 %% interval", best_model(comparison), sum(inside[best]), sum(best))
   figure <- ggplot2::ggplot(table, ggplot2::aes(y = .data$model, colour = .data$standing)) +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$prior_lower, xmax = .data$prior_upper), colour = "grey90", linewidth = 6) +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.4) +
@@ -186,7 +188,8 @@ figure_models_parameters <- function(comparison) {
     ggplot2::scale_y_discrete(NULL, limits = rev) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 3, scales = "free", labeller = ggplot2::label_wrap_gen(30)) +
     model_scales() +
-    figure_titles(title, paste("Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95 % intervals.", if (nrow(known)) "Crosses: true values.")) +
+    figure_titles(title, paste("Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95 % intervals.",
+                               if (nrow(known)) "Crosses: true values.")) +
     figure_theme() + ggplot2::theme(strip.text = ggplot2::element_text(size = 12.5))
   rows <- tapply(as.character(table$model), table$panel, function(x) length(unique(x)))
   with_height(figure, 1.9 + ceiling(nlevels(table$panel) / 3) * (0.7 + 0.23 * max(rows)))
@@ -208,15 +211,17 @@ figure_heat_loss <- function(comparison) {
   table <- mark_models(heat_loss_table(comparison), comparison)
   true <- true_heat_loss(comparison)
   best <- table$value[table$model == best_model(comparison)]
-  title <- if (length(best)) paste0(best_model(comparison), " finds a heat loss coefficient of ", short(mean(best), 3), " W/K", if (!is.na(true)) paste0("; the true one is ", short(true, 3), " W/K"))
-           else "Heat loss coefficients of the models"
+  title <- if (!length(best)) "Heat loss coefficients of the models"
+           else paste0(best_model(comparison), " finds a heat loss coefficient of ", short(mean(best), 3), " W/K",
+                       if (!is.na(true)) paste0("; the true one is ", short(true, 3), " W/K"))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$value, .data$model, colour = .data$standing, fill = .data$standing)) +
     (if (!is.na(true)) ggplot2::geom_vline(xintercept = true, colour = "black", linetype = "dashed", linewidth = 0.9)) +
     ggplot2::geom_violin(alpha = 0.35, scale = "width", width = 0.8) +
     ggplot2::stat_summary(fun = mean, geom = "point", size = 3, show.legend = FALSE) +
     ggplot2::scale_y_discrete(NULL, limits = rev) +
     model_scales() +
-    figure_titles(title, paste("Shapes: the posterior, from the simulator at its draws, in the steady state and the mean wind of the calibration. Points: means.", if (!is.na(true)) "Dashed: the truth."),
+    figure_titles(title, paste("Shapes: the posterior, from the simulator at its draws, in the steady state and the mean wind of the calibration.",
+                               "Points: means.", if (!is.na(true)) "Dashed: the truth."),
                   x = "heat loss coefficient [W/K]") +
     figure_theme()
   with_height(figure, 2.2 + 0.55 * nlevels(droplevels(table$model)))

@@ -10,10 +10,11 @@
 #'   `models` and `attribution` (the paper's table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5) and `method`.
 #' @export
 summary.amiss_comparison <- function(object, ...) {
+  no_doubt <- "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range."
   structure(list(title = object$title %||% object$study %||% object$measurements$name, headline = comparison_headline(object),
                  evidence = c(evidence_sentences(object), probability_sentences(object)), remains = remains_sentences(object),
-                 practice = practice_sentences(object), doubts = doubt_sentences(object) %||% "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range.",
-                 models = models_words(object), attribution = attribution_table_words(object), parameters = compared_parameters_words(object), criteria = criteria_words(object),
+                 practice = practice_sentences(object), doubts = doubt_sentences(object) %||% no_doubt, models = models_words(object),
+                 attribution = attribution_table_words(object), parameters = compared_parameters_words(object), criteria = criteria_words(object),
                  errors = errors_words(object), method = comparison_method_table(object), seed = object$seed), class = "summary.amiss_comparison")
 }
 
@@ -60,7 +61,8 @@ practice_sentences <- function(comparison) {
   noted <- criteria[nzchar(criteria$lr_note) & !is.na(criteria$nested), ]
   c(if (!length(disagreements(comparison))) "Every criterion chooses the model that the evidence chooses.", disagree,
     if (nrow(correlated)) {
-      sprintf("Likelihood, AIC, BIC and the likelihood ratio count errors as independent; those of %s are correlated from one step to the next (%s), so that these criteria overstate every difference.",
+      sprintf(paste("Likelihood, AIC, BIC and the likelihood ratio count errors as independent; those of %s are correlated from one",
+                    "step to the next (%s), so that these criteria overstate every difference."),
               listed(correlated$model), listed(sprintf("%.2f", correlated$autocorrelation)))
     },
     if (nrow(noted)) sprintf("Likelihood ratio of %s against %s: %s.", noted$model, noted$nested, noted$lr_note))
@@ -71,9 +73,9 @@ interval_words <- function(lower, upper, digits = 3) paste0("[", short(lower, di
 # Table 3a of the paper, in two: evidence, and attribution with a column for each condition.
 models_words <- function(comparison) {
   evidence <- comparison$tables$evidence
-  against <- ifelse(is.na(evidence$log10_bf), "", sprintf("%s [%s, %s] against %s", signed(evidence$log10_bf), signed(evidence$bf_lower95), signed(evidence$bf_upper95), evidence$against))
+  factor <- sprintf("%s [%s, %s] against %s", signed(evidence$log10_bf), signed(evidence$bf_lower95), signed(evidence$bf_upper95), evidence$against)
   data.frame(model = evidence$model, "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence, evidence$lower95, evidence$upper95),
-             estimate = ifelse(evidence$trusted, "sound", "rough"), "log10 Bayes factor" = against, evidence = ifelse(is.na(evidence$word), "", evidence$word),
+             estimate = ifelse(evidence$trusted, "sound", "rough"), "log10 Bayes factor" = ifelse(is.na(evidence$log10_bf), "", factor), evidence = ifelse(is.na(evidence$word), "", evidence$word),
              "log10 B against the first" = signed(evidence$log10_bf_first), probability = percent(evidence$probability), check.names = FALSE)
 }
 
@@ -94,18 +96,19 @@ compared_parameters_words <- function(comparison) {
   rows <- comparison$tables$parameters
   true <- true_values(comparison, rows$name)
   mean <- mapply(function(model, name) with(comparison$models[[model]]$fit, sum(weights * values[, name]) / sum(weights)), rows$model, rows$name)
+  holds <- ifelse(rows$lower95 <= true & true <= rows$upper95, "holds the truth", "misses the truth")
   table <- data.frame(model = rows$model, parameter = rows$label, unit = pretty_unit(rows$unit), prior = interval_words(rows$prior_lower, rows$prior_upper),
                       true = short(true, 3), mean = short(mean, 3), median = short(rows$median, 3), "95 % interval" = interval_words(rows$lower95, rows$upper95),
-                      note = paste0(ifelse(is.na(true), "", ifelse(rows$lower95 <= true & true <= rows$upper95, "holds the truth", "misses the truth")), ifelse(rows$at_edge, ", at the edge", "")),
-                      check.names = FALSE, row.names = NULL)
+                      note = paste0(ifelse(is.na(true), "", holds), ifelse(rows$at_edge, ", at the edge", "")), check.names = FALSE, row.names = NULL)
   table$note <- sub("^, ", "", table$note)
   if (all(is.na(true))) table[names(table) != "true"] else table
 }
 
 criteria_words <- function(comparison) {
   table <- comparison$tables$criteria
-  ratio <- ifelse(is.na(table$lr), table$lr_note,
-                  paste0(sprintf("%.1f against %s, p ", table$lr, table$nested), ifelse(is.na(table$lr_p_value), "not defined", format.pval(table$lr_p_value, 2, eps = 1e-4)), ifelse(nzchar(table$lr_note), paste0(" (", table$lr_note, ")"), "")))
+  p_value <- ifelse(is.na(table$lr_p_value), "not defined", format.pval(table$lr_p_value, 2, eps = 1e-4))
+  note <- ifelse(nzchar(table$lr_note), paste0(" (", table$lr_note, ")"), "")
+  ratio <- ifelse(is.na(table$lr), table$lr_note, paste0(sprintf("%.1f against %s, p ", table$lr, table$nested), p_value, note))
   data.frame(model = table$model, k = table$k, "RMSE of the best fit" = short(table$rmse_best, 3), "log likelihood" = sprintf("%.1f", table$log_likelihood),
              AIC = sprintf("%.1f", table$aic), BIC = sprintf("%.1f", table$bic), "likelihood ratio" = ratio,
              "correlation of errors at one step" = sprintf("%.2f", table$autocorrelation), check.names = FALSE)

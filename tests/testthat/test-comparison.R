@@ -59,6 +59,8 @@ test_that("evidence, Bayes factors and probabilities are those of the calibratio
   expect_identical(table$word[2], factor$word)
   expect_gt(table$log10_bf[2], 1)
   expect_identical(table$against[2], table$model[table$rank == 2])
+  expect_identical(table$against[table$rank == 2], "sunny")
+  expect_identical(table$against[table$rank == 3], table$model[table$rank == 2])
   expect_equal(table$log10_bf_first[1], 0)
   expect_equal(glance(compared)$model, "sunny")
   expect_identical(subset(tidy(compared, "attribution"), model == "sunny", -model)$boundary, alone$index$boundary)

@@ -169,7 +169,7 @@ test_that("a bad comparison study is refused", {
   both <- yaml::read_yaml(path)
   both$catalogue <- "catalogue.R"
   yaml::write_yaml(both, path)
-  expect_error(read_study(path), "catalogue.*models.*only|catalogue.*which goes", class = "amiss_error_input")
+  expect_error(read_study(path), "field.*catalogue.*which goes with", class = "amiss_error_input")
 })
 
 test_that("the paper's studies that ship can be read", {
