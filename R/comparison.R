@@ -209,10 +209,16 @@ disagreement_sentences <- function(comparison) {
 
 # What keeps a result from being trusted: the sampler, the basis, the emulator, priors too narrow, the search.
 doubt_sentences <- function(comparison) {
-  unlist(lapply(comparison$models, function(model) {
+  of_each <- unlist(lapply(comparison$models, function(model) {
     doubts <- model_doubts(model)
     if (length(doubts)) paste0(model$name, ": ", doubts)
   }), use.names = FALSE)
+  edge <- comparison$tables$parameters[comparison$tables$parameters$at_edge, ]
+  at_edge <- vapply(split(edge$label, factor(edge$model, unique(edge$model))), listed, "")
+  c(of_each, if (nrow(edge)) {
+    sprintf("At the edge of what was thought possible: %s. Widen these priors, or suspect that the parameters make up for something else.",
+            paste0(names(at_edge), ": ", at_edge, collapse = "; "))
+  })
 }
 
 model_doubts <- function(model) {
@@ -220,15 +226,11 @@ model_doubts <- function(model) {
   emulator <- fit$emulator
   noise <- fit$measurements$noise_sd
   beside <- function(size) sprintf("%s beside a noise of %s %s", short(size), short(noise), pretty_unit(fit$measurements$unit))
-  rows <- parameter_rows(fit)
   c(if (!fit$trust$trusted) sprintf("the evidence is rough (%s).", fit$trust$verdict),
     if (emulator$basis$discarded_rms > 0.5 * noise) {
       sprintf("the basis is coarse; what it leaves out of the runs (%s) looks like discrepancy.", beside(emulator$basis$discarded_rms))
     },
     if (emulator$diagnostics$series_rmse > 0.5 * noise) sprintf("the emulator is rough (leave-one-out error %s).", beside(emulator$diagnostics$series_rmse)),
-    if (any(rows$at_edge)) {
-      sprintf("%s at the edge of what was thought possible: widen the prior, or suspect that it makes up for something else.", listed(rows$label[rows$at_edge]))
-    },
     if (!model$best$converged) "the search for the least squares did not settle; its likelihood is a lower bound, and with it AIC and BIC are upper ones.")
 }
 

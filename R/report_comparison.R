@@ -7,7 +7,8 @@
 #' @param x The summary.
 #' @param ... Not used.
 #' @return A list: `title`, `headline`, the sentences `evidence`, `remains`, `practice` and `doubts`, and the tables
-#'   `models` and `attribution` (the paper's table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5) and `method`.
+#'   `models` and `attribution` (the paper's table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5),
+#'   `heat_loss` (of zones) and `method`.
 #' @export
 summary.amiss_comparison <- function(object, ...) {
   no_doubt <- "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range."
@@ -15,7 +16,7 @@ summary.amiss_comparison <- function(object, ...) {
                  evidence = c(evidence_sentences(object), probability_sentences(object)), remains = remains_sentences(object),
                  practice = practice_sentences(object), doubts = doubt_sentences(object) %||% no_doubt, models = models_words(object),
                  attribution = attribution_table_words(object), parameters = compared_parameters_words(object), criteria = criteria_words(object),
-                 errors = errors_words(object), method = comparison_method_table(object), seed = object$seed), class = "summary.amiss_comparison")
+                 errors = errors_words(object), heat_loss = heat_loss_words(object), method = comparison_method_table(object), seed = object$seed), class = "summary.amiss_comparison")
 }
 
 #' @rdname summary.amiss_comparison
@@ -32,7 +33,8 @@ comparison_headline <- function(comparison) {
   table <- comparison$tables$evidence
   best <- table[which.min(table$rank), ]
   if (nrow(table) < 2) return(sprintf("One model, %s, and nothing to compare it with.", best$model))
-  if (best$log10_bf >= 2 && best$bf_lower95 > 0) return(sprintf("The record is decisively for %s among %d models.", best$model, nrow(table)))
+  rough <- if (!all(table$trusted[table$rank <= 2])) ", though the numbers are rough" else ""
+  if (best$log10_bf >= 2 && best$bf_lower95 > 0) return(sprintf("The record is decisively for %s among %d models%s.", best$model, nrow(table), rough))
   sprintf("%s leads among %d models, but not decisively: %s is %s.", best$model, nrow(table), best$against,
           if (best$bf_lower95 <= 0) "not to be told from it" else paste("only", power_of_ten(best$log10_bf), "times less probable"))
 }
@@ -120,18 +122,22 @@ errors_words <- function(comparison) {
   score <- function(use, which) vapply(comparison$models, function(m) m$scores[[use]][[which]], 0)
   inside <- function(use) ifelse(is.na(score(use, "coverage95")), "", paste(round(100 * score(use, "coverage95")), "%"))
   table <- data.frame(model = names(comparison$models), calibration = short(score("calibrate", "rmse"), 3), inside = inside("calibrate"), row.names = NULL)
-  names(table)[2:3] <- c(paste0("RMSE in calibration [", unit, "]"), "in the 95 % band, calibration")
+  names(table)[2:3] <- c(paste0("RMSE, calibration [", unit, "]"), "in its 95 % band")
   if (validates(comparison)) {
-    table[[paste0("RMSE held out [", unit, "]")]] <- short(score("validate", "rmse"), 3)
-    table[["in the 95 % band, held out"]] <- inside("validate")
-  }
-  losses <- lapply(comparison$models, `[[`, "heat_loss")
-  if (any(lengths(losses))) {
-    table[["heat loss coefficient [W/K]"]] <- vapply(losses, function(x) {
-      if (is.null(x)) "" else paste(short(mean(x), 3), interval_words(stats::quantile(x, 0.025), stats::quantile(x, 0.975)))
-    }, "")
+    table[[paste0("RMSE, held out [", unit, "]")]] <- short(score("validate", "rmse"), 3)
+    table[["in the band, held out"]] <- inside("validate")
   }
   table
+}
+
+heat_loss_words <- function(comparison) {
+  losses <- Filter(length, lapply(comparison$models, `[[`, "heat_loss"))
+  if (!length(losses)) return(NULL)
+  limits <- vapply(losses, stats::quantile, c(0, 0), c(0.025, 0.975))
+  table <- data.frame(model = names(losses), "heat loss coefficient [W/K]" = short(vapply(losses, mean, 0), 3),
+                      "95 % interval" = interval_words(limits[1, ], limits[2, ]), check.names = FALSE, row.names = NULL)
+  true <- true_heat_loss(comparison)
+  if (is.na(true)) table else cbind(table, true = short(true, 3))
 }
 
 comparison_method_table <- function(comparison) {

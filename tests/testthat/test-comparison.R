@@ -98,11 +98,12 @@ test_that("what cannot be trusted is told", {
   x$models$sunny$fit$trust <- list(trusted = FALSE, verdict = "chains stick")
   x$models$sunny$fit$emulator$basis$discarded_rms <- 1
   told <- doubt_sentences(x)
+  expect_match(summary(x)$headline, "though the numbers are rough|not decisively")
   expect_match(told, "sunny: the evidence is rough .chains stick", all = FALSE)
   expect_match(told, "sunny: the basis is coarse", all = FALSE)
   narrow <- line(free("offset", uniform(20.5, 30)), gain, f = blind$f)
   narrow <- compare_linear(list(narrow = narrow, wide = sunny))
-  expect_match(doubt_sentences(narrow), "narrow: offset at the edge", all = FALSE)
+  expect_match(doubt_sentences(narrow), "edge of what was thought possible: narrow: offset", all = FALSE)
   expect_true(is.na(tidy(narrow, "criteria")$nested[2]))  # another prior: not nested
 })
 
