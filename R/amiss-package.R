@@ -3,7 +3,7 @@
 #' The way the data goes: [measurements()] and a simulator ([zone()], [function_simulator()]) give an ensemble
 #' ([simulate_design()], or [ensemble()] for runs made elsewhere); [train_emulator()], [calibrate()],
 #' [attribute_discrepancy()] follow. [upgrade_model()] runs the whole loop with a [catalogue()] of [mechanism()]s,
-#' [report()] writes it down, and [run_study()] does all of it from one file.
+#' [compare_models()] sets several simulators against each other, [report()] writes either down, and [run_study()] does all of it from one file.
 #'
 #' @useDynLib amiss, .registration = TRUE
 #' @importFrom Rcpp evalCpp

@@ -3,30 +3,73 @@
 #' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean of the
 #' coefficients, and the part of it that answers to the boundary conditions, with a 95 % band.
 #'
-#' @param fit A calibration ([calibrate()]).
+#' Of a calibration as in the paper the discrepancy is that of equation 8, at the same time step; its band takes the
+#' fictitious condition, which explains nothing, for constant.
+#'
+#' @param fit A calibration ([calibrate()], [calibrate_paper()]).
 #' @return An object of class `amiss_discrepancy`: `series`, a data frame with the columns `time`, `observed`,
-#'   `simulated`, `residual`, `discrepancy`, `lower95` and `upper95`; `responses`, one column for each condition.
+#'   `simulated`, `residual`, `discrepancy`, `lower95` and `upper95`; `responses`, one column for each condition (`NULL`
+#'   for the paper's, which has no sum of responses).
 #' @export
 discrepancy <- function(fit) {
-  check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
+  check_input(checkmate::check_multi_class(fit, c("amiss_calibration", "amiss_paper_calibration")), "fit")
+  if (inherits(fit, "amiss_paper_calibration")) return(paper_discrepancy(fit))
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   outside <- function(x) as.matrix(stats::lm.fit(data$basis, x)$residuals)
   phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
   draws <- outside(phi %*% fit$coefficients)
-  simulated <- simulated_mean(fit)
   responses <- condition_responses(fit, data)
   colnames(responses) <- fit$measurements$conditions
+  limits <- apply(draws, 1, stats::quantile, c(0.025, 0.975))
+  new_discrepancy(fit, rowMeans(draws), limits[1, ], limits[2, ], responses)
+}
+
+new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
   m <- fit$measurements
+  simulated <- simulated_mean(fit)
   series <- data.frame(time = m$time[fit$rows], observed = m$y[fit$rows], simulated = simulated,
-                       residual = m$y[fit$rows] - simulated, discrepancy = rowMeans(draws),
-                       lower95 = apply(draws, 1, stats::quantile, 0.025), upper95 = apply(draws, 1, stats::quantile, 0.975))
+                       residual = m$y[fit$rows] - simulated, discrepancy = mean, lower95 = lower95, upper95 = upper95)
   structure(list(format_version = format_version, series = series, responses = responses, segment = m$segment[fit$rows],
                  target = m$target, unit = m$unit), class = "amiss_discrepancy")
 }
 
+# Mean and variance over posterior draws of the hyper-parameters, by the law of total variance. With P the projection
+# outside the simulation space and B = A^-1 - A^-1 K (K'A^-1 K)^-1 K'A^-1, the covariance of H v' given a draw is
+# (P - B / lambda) / lambda.
+paper_discrepancy <- function(fit, draws = 24) {
+  own <- fit$hyperparameters
+  picked <- systematic_draws(own$weights, draws)
+  means <- paper_discrepancy_(paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
+                              list(alpha = own$alpha[picked, , drop = FALSE], t2 = own$t2[picked], lambda = own$lambda[picked]))
+  x <- scaled_conditions(fit$measurements, fit$rows)
+  basis <- qr.Q(qr(fit$emulator$basis$vectors))
+  within <- vapply(picked, function(i) conditional_variance(x, basis, own$alpha[i, ], own$t2[i], own$lambda[i]), numeric(nrow(x)))
+  mean <- rowMeans(means)
+  sd <- sqrt(rowMeans(within) + rowMeans((means - mean)^2))
+  new_discrepancy(fit, mean, mean - 1.96 * sd, mean + 1.96 * sd)
+}
+
+# Columns of each condition over the largest of their ranges.
+scaled_conditions <- function(measurements, rows) {
+  x <- measurements$boundary[rows, , drop = FALSE]
+  width <- tapply(apply(x, 2, function(v) diff(range(v))), measurements$condition, max)[measurements$condition]
+  structure(sweep(x, 2, width, "/"), condition = measurements$condition)
+}
+
+conditional_variance <- function(x, basis, alpha, t2, lambda) {
+  decay <- -4 * log(pmax(alpha[attr(x, "condition")], .Machine$double.xmin))
+  left <- x %*% diag(2 * decay, ncol(x)) %*% t(x)
+  squares <- 0.5 * diag(left)
+  covariance <- (1 - t2) / t2 * exp(left - outer(squares, squares, "+"))
+  inverse <- chol2inv(chol(covariance + diag(1 / lambda, nrow(x))))
+  weighted <- inverse %*% basis
+  outside <- diag(inverse) - rowSums((weighted %*% solve(crossprod(basis, weighted))) * weighted)
+  pmax(0, 1 - rowSums(basis^2) - outside / lambda) / lambda
+}
+
 # Simulation at the posterior mean of the basis coefficients.
 simulated_mean <- function(fit) {
-  w <- predict_emulator_(fit$emulator$processes, fit$posterior$unit)$mean
+  w <- predict_emulator_(fit$emulator$processes, posterior_unit(fit))$mean
   as.numeric(fit$emulator$basis$vectors %*% crossprod(w, fit$weights))
 }
 
@@ -35,6 +78,12 @@ fitted.amiss_calibration <- function(object, ...) simulated_mean(object)
 
 #' @export
 residuals.amiss_calibration <- function(object, ...) object$measurements$y[object$rows] - simulated_mean(object)
+
+#' @export
+fitted.amiss_paper_calibration <- function(object, ...) simulated_mean(object)
+
+#' @export
+residuals.amiss_paper_calibration <- residuals.amiss_calibration
 
 #' @export
 print.amiss_discrepancy <- function(x, ...) {

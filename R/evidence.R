@@ -3,11 +3,16 @@
 #' Both evidences are densities of the same measured record, so that models with different bases may be compared.
 #' The words are those of Monari (2022), table 1.
 #'
-#' @param model,reference Calibrations ([calibrate()]) on the same measurements.
+#' @param model,reference Calibrations on the same measurements by the same method ([calibrate()] or [calibrate_paper()]).
 #' @return A one-row data frame: `log10_bf` in favour of `model`, its 95 % interval `lower95`, `upper95`, and `word`.
 #' @export
 bayes_factor <- function(model, reference) {
-  for (fit in list(model, reference)) check_input(checkmate::check_class(fit, "amiss_calibration"), "model")
+  fits <- list(model = model, reference = reference)
+  for (name in names(fits)) check_input(checkmate::check_multi_class(fits[[name]], c("amiss_calibration", "amiss_paper_calibration")), name)
+  if (class(model) != class(reference)) {
+    abort_input(c("{.arg model} and {.arg reference} were calibrated by different methods; their evidences cannot be compared.",
+                  i = "Use {.fun calibrate} for both, or {.fun calibrate_paper}."))
+  }
   if (!identical(model$measurements$y[model$rows], reference$measurements$y[reference$rows])) {
     abort_input(c("The two models were calibrated on different records; their evidences cannot be compared.",
                   i = "Calibrate both on the same measurements."))

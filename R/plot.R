@@ -10,7 +10,9 @@ stage_colours <- c("before" = "#D55E00", "after" = "#0072B2", "the model" = "#00
 #' @param x,object An object of this package.
 #' @param which Which figure of an upgrade: `"fit"` (measured and simulated), `"attribution"` (what the error answers
 #'   to), `"candidates"` (mechanisms tried), `"parameters"`, `"discrepancy"` (over time), `"response"` (error against
-#'   the leading boundary condition), `"gain"` (scores before and after) or `"mean_day"`.
+#'   the leading boundary condition), `"gain"` (scores before and after) or `"mean_day"`. Of a comparison: `"evidence"`,
+#'   `"criteria"` (ranks by each), `"attribution"`, `"fit"` (measured and simulated), `"discrepancy"` (over time), `"parameters"`,
+#'   `"heat_loss"` (of zones) or `"held_out"` (where rows validate).
 #' @param ... Not used.
 #' @return A ggplot.
 #' @examples
@@ -78,10 +80,16 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
     mean_day = figure_mean_day(upgrade))
 }
 
+# Names of the figures that an object has.
+figures_of <- function(x) UseMethod("figures_of")
+
+#' @export
+figures_of.amiss_upgrade <- function(x) figure_names
+
 # Writes every figure as a PNG; returns the paths.
-save_figures <- function(upgrade, folder, width = 9, dpi = 120) {
-  vapply(figure_names, function(which) {
-    figure <- upgrade_figure(upgrade, which)
+save_figures <- function(x, folder, width = 9, dpi = 120) {
+  vapply(figures_of(x), function(which) {
+    figure <- ggplot2::autoplot(x, which)
     path <- file.path(folder, paste0(which, ".png"))
     ggplot2::ggsave(path, figure, width = width, height = figure_height(figure), dpi = dpi, bg = "white")
     path

@@ -3,7 +3,7 @@
 #' The simulator itself is run at draws of the posterior (no emulator error); errors as large
 #' as those that calibration left widen the band.
 #'
-#' @param object A calibration ([calibrate()]) of an ensemble that knows its simulator.
+#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both.
 #' @param draws Number of posterior draws.
 #' @inheritParams calibrate
@@ -62,3 +62,7 @@ prediction_scores <- function(prediction) {
   }
   list(calibrate = score("calibrate"), validate = score("validate"))
 }
+
+#' @rdname predict.amiss_calibration
+#' @export
+predict.amiss_paper_calibration <- predict.amiss_calibration

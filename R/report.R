@@ -224,32 +224,58 @@ method_table <- function(upgrade) {
         as.data.frame(columns, optional = TRUE))
 }
 
-#' Write the report of an upgrade
+#' Write the report of an upgrade or a comparison
 #'
-#' A self-contained HTML file: first the diagnosis in plain words, then the figures and tables behind it. The R
-#' Markdown template is also offered by RStudio (*Diagnosis of a simulation*).
+#' A self-contained HTML file: first what was found in plain words, then the figures and tables behind it. The R
+#' Markdown templates are also offered by RStudio (*Diagnosis of a simulation*, *Comparison of models*).
 #'
-#' @param upgrade An upgrade ([upgrade_model()]).
+#' @param x An upgrade ([upgrade_model()]) or a comparison ([compare_models()]).
 #' @param file Name of the HTML file; its folder must exist. The file appears only when it is complete.
 #' @param quiet No messages of R Markdown.
 #' @return `file`, invisibly.
-#' @seealso [summary.amiss_upgrade()] for the words alone, [figures] for the figures alone.
+#' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the figures alone.
 #' @export
-report <- function(upgrade, file, quiet = TRUE) {
-  check_input(checkmate::check_class(upgrade, "amiss_upgrade"), "upgrade", "It is made by {.fun upgrade_model}.")
+report <- function(x, file, quiet = TRUE) {
+  check_input(checkmate::check_multi_class(x, c("amiss_upgrade", "amiss_comparison")), "x", "It is made by {.fun upgrade_model} or {.fun compare_models}.")
   check_report_file(file)
   check_report_tools()
   work <- tempfile("amiss-report-")
   dir.create(work)
   on.exit(unlink(work, recursive = TRUE))
-  template <- system.file("rmarkdown", "templates", "diagnosis", "skeleton", "skeleton.Rmd", package = "amiss", mustWork = TRUE)
+  upgraded <- inherits(x, "amiss_upgrade")
+  template <- system.file("rmarkdown", "templates", if (upgraded) "diagnosis" else "comparison", "skeleton", "skeleton.Rmd", package = "amiss", mustWork = TRUE)
   source <- file.path(work, "report.Rmd")
   file.copy(template, source)
-  made <- rmarkdown::render(source, output_file = "report.html", output_dir = work, intermediates_dir = work, params = list(upgrade = upgrade),
-                            envir = new.env(parent = globalenv()), quiet = quiet)
+  made <- rmarkdown::render(source, output_file = "report.html", output_dir = work, intermediates_dir = work,
+                            params = stats::setNames(list(x), if (upgraded) "upgrade" else "comparison"), envir = new.env(parent = globalenv()), quiet = quiet)
   move_into_place(made, file)
   invisible(file)
 }
+
+# ---- what the templates are written with
+
+# Text as it is: nothing in it is markup, but 10^3 is set as a power. Brackets as entities: a backslash before one opens
+# a formula.
+markdown_text <- function(x) {
+  plain <- gsub("([\\\\`*_{}$^~|@#<>&])", "\\\\\\1", x, perl = TRUE)
+  plain <- gsub("]", "&#93;", gsub("[", "&#91;", plain, fixed = TRUE), fixed = TRUE)
+  gsub("([0-9]) %", "\\1\u00a0%", gsub("10\\\\\\^(-?[0-9]+)", "10^\\1^", plain, perl = TRUE))
+}
+
+markdown_items <- function(x) cat("\n", paste0("- ", markdown_text(x), "\n"), "\n", sep = "")
+
+markdown_paragraphs <- function(x) cat("\n", paste0(markdown_text(x), "\n\n"), sep = "")
+
+html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
+  cell <- function(x, tag) paste0("<", tag, ">", htmltools::htmlEscape(as.character(x)), "</", tag, ">", collapse = "")
+  rows <- vapply(seq_len(nrow(table)), function(i) {
+    paste0("<tr", if (bold[i]) " class=\"adopted\"", ">", cell(unlist(lapply(table[i, ], as.character)), "td"), "</tr>")
+  }, "")
+  cat("\n```{=html}\n<div class=\"scroll\"><table><thead><tr>", cell(names(table), "th"), "</tr></thead><tbody>\n", paste(rows, collapse = "\n"),
+      "\n</tbody></table></div>\n```\n", sep = "")
+}
+
+html_tile <- function(value, words) paste0("<div><b>", htmltools::htmlEscape(value), "</b>", words, "</div>")
 
 check_report_file <- function(file, call = rlang::caller_env()) {
   check_input(checkmate::check_string(file, min.chars = 1), "file", call = call)

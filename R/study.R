@@ -1,17 +1,23 @@
 study_fields <- list(
-  needed = c("study", "data", "time", "target", "boundary", "model", "catalogue"),
+  needed = c("study", "data", "time", "target", "boundary"),
+  upgrade = c("model", "catalogue"),
+  comparison = c("models", "method", "truth"),
   optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "runs", "seed", "control", "title"))
 
 #' Run a study from its file
 #'
-#' A study is a YAML file: what was measured, which rows calibrate and validate, the model and the catalogue (R files
-#' that return them), and the control. `read_study()` checks it and prepares the pieces; `run_study()` runs the loop
-#' of [upgrade_model()] and writes the results. Paths in the file are relative to the file.
+#' A study is a YAML file: what was measured, which rows calibrate and validate, what is to be done with which models
+#' (R files that return them), and the control. `read_study()` checks it and prepares the pieces; `run_study()` does the
+#' work and writes the results. Paths in the file are relative to the file.
 #'
-#' The fields are `study` (name), `data` (CSV file), `time`, `target`, `boundary` (list; `circular(Wd)` for degrees),
-#' `model`, `catalogue` (R files), and, if wanted, `title`, `unit` (of the target), `noise_sd`, `average_h`, `warmup_h`
-#' (hours), `calibrate`, `validate` (expressions in the columns of the data), `runs`, `seed` and `control` (as in
-#' [upgrade_model()]).
+#' A study that names a `model` and a `catalogue` runs the loop of [upgrade_model()]; one that names `models` (an R file
+#' whose value is a named list of simulators) compares them by [compare_models()], with `method` (`paper` or `history`)
+#' and, where the record is synthetic, `truth` (an R file whose value is a list of a `simulator` and its `values`).
+#'
+#' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
+#' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`, `average_h`,
+#' `warmup_h` (hours), `calibrate`, `validate` (expressions in the columns of the data), `runs`, `seed` and `control` (as in
+#' [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It is
@@ -20,7 +26,8 @@ study_fields <- list(
 #' @param seed Overrides the seed of the file.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
-#' @return `run_study()`: the [upgrade_model()] result, invisibly; `read_study()`: a list of its pieces.
+#' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], invisibly; `read_study()`: a list of the
+#'   study's pieces.
 #' @examples
 #' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
 #' @export
@@ -33,16 +40,21 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE)
   }
   seed <- pick_seed(seed %||% study$seed)
   stages <- if (!is.null(out)) file.path(out, "stages")
-  upgrade <- upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
-                           seed = seed, threads = threads, quiet = quiet, checkpoint = stages)
-  upgrade$study <- study$study
-  upgrade$title <- study$title
-  upgrade$wall_s <- proc.time()[["elapsed"]] - started
+  result <- if (is.null(study$models)) {
+    upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
+                  seed = seed, threads = threads, quiet = quiet, checkpoint = stages)
+  } else {
+    compare_models(study$models, study$measurements, study$method, runs = study$runs, control = study$control,
+                   seed = seed, threads = threads, quiet = quiet, checkpoint = stages, truth = study$truth)
+  }
+  result$study <- study$study
+  result$title <- study$title
+  result$wall_s <- proc.time()[["elapsed"]] - started
   if (!is.null(out)) {
-    write_study(upgrade, out, quiet)
+    write_study(result, out, quiet)
     unlink(stages, recursive = TRUE)
   }
-  invisible(upgrade)
+  invisible(result)
 }
 
 #' @rdname run_study
@@ -52,31 +64,67 @@ read_study <- function(path, quiet = TRUE) {
   study <- tryCatch(yaml::read_yaml(path), error = function(e) {
     abort_input(c("The study file {.file {path}} cannot be read as YAML.", x = "{conditionMessage(e)}"))
   })
-  if (!is.list(study)) abort_input("The study file {.file {path}} holds no fields.")
-  absent <- setdiff(study_fields$needed, names(study))
-  if (length(absent)) abort_input("The study file {.file {path}} lacks {cli::qty(absent)}field{?s} {.field {absent}}.")
-  unknown <- setdiff(names(study), unlist(study_fields))
-  if (length(unknown)) {
-    abort_input(c("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",
-                  i = "Known fields: {.field {unlist(study_fields, use.names = FALSE)}}."))
-  }
+  check_study_fields(study, path)
   folder <- dirname(normalizePath(path))
-  data_file <- study_path(study$data, folder, "data")
-  data <- tryCatch(utils::read.csv(data_file, stringsAsFactors = FALSE, check.names = FALSE), error = function(e) {
-    abort_input(c("The data file {.file {data_file}} cannot be read.", x = "{conditionMessage(e)}"))
-  })
+  data <- study_data(study_path(study$data, folder, "data"))
   measure <- function() {
     measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
                  noise_sd = study$noise_sd, average = study$average_h, calibrate = study$calibrate, validate = study$validate,
                  warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "")
   }
-  model <- source_value(study_path(study$model, folder, "model"), "model")
-  check_simulator(model)
-  catalogue <- source_value(study_path(study$catalogue, folder, "catalogue"), "catalogue")
-  check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
-  list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150,
-       control = study$control, model = model, catalogue = catalogue,
-       measurements = if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure())
+  pieces <- if (is.null(study$models)) upgrade_pieces(study, folder) else comparison_pieces(study, folder)
+  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150, control = study$control),
+    pieces, list(measurements = if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure()))
+}
+
+check_study_fields <- function(study, path, call = rlang::caller_env()) {
+  if (!is.list(study)) abort_input("The study file {.file {path}} holds no fields.", call = call)
+  unknown <- setdiff(names(study), unlist(study_fields))
+  if (length(unknown)) {
+    abort_input(c("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",
+                  i = "Known fields: {.field {unlist(study_fields, use.names = FALSE)}}."), call = call)
+  }
+  compares <- "models" %in% names(study)
+  foreign <- intersect(names(study), if (compares) study_fields$upgrade else study_fields$comparison)
+  if (length(foreign)) {
+    partner <- if (compares) "catalogue" else "models"
+    abort_input(c("The study file {.file {path}} has {cli::qty(foreign)}field{?s} {.field {foreign}}, which {?goes/go} with {.field {partner}} only.",
+                  i = "Name either {.field model} and {.field catalogue}, or {.field models}."), call = call)
+  }
+  absent <- setdiff(c(study_fields$needed, if (!compares) study_fields$upgrade), names(study))
+  if (length(absent)) {
+    abort_input(c("The study file {.file {path}} lacks {cli::qty(absent)}field{?s} {.field {absent}}.",
+                  i = if (any(absent %in% study_fields$upgrade)) "Or name {.field models}, to compare several."), call = call)
+  }
+}
+
+study_data <- function(path, call = rlang::caller_env()) {
+  if (grepl("\\.[rR]$", path)) {
+    data <- source_value(path, "data", call)
+    check_input(checkmate::check_data_frame(data), "data", "Let the R file end with a data frame.", call = call)
+    return(data)
+  }
+  tryCatch(utils::read.csv(path, stringsAsFactors = FALSE, check.names = FALSE), error = function(e) {
+    abort_input(c("The data file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
+  })
+}
+
+upgrade_pieces <- function(study, folder, call = rlang::caller_env()) {
+  model <- source_value(study_path(study$model, folder, "model", call), "model", call)
+  check_simulator(model, call)
+  catalogue <- source_value(study_path(study$catalogue, folder, "catalogue", call), "catalogue", call)
+  check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue", call = call)
+  list(model = model, catalogue = catalogue)
+}
+
+comparison_pieces <- function(study, folder, call = rlang::caller_env()) {
+  models <- source_value(study_path(study$models, folder, "models", call), "models", call)
+  check_models(models, call)
+  method <- study$method %||% "paper"
+  check_input(checkmate::check_choice(method, comparison_methods), "method", call = call)
+  truth <- if (!is.null(study$truth)) source_value(study_path(study$truth, folder, "truth", call), "truth", call)
+  check_truth(truth, call)
+  list(models = models, method = method, truth = truth)
 }
 
 study_path <- function(path, folder, field, call = rlang::caller_env()) {
@@ -89,7 +137,8 @@ study_path <- function(path, folder, field, call = rlang::caller_env()) {
   full
 }
 
-# The value of the last expression of an R file, evaluated where it sees the package and nothing of the session.
+# The value of the last expression of an R file, evaluated in its folder, where it sees the package and nothing of the
+# session.
 source_value <- function(path, field, call = rlang::caller_env()) {
   tryCatch(sys.source_value(path), error = function(e) {
     if (inherits(e, "amiss_error")) stop(e)
@@ -98,7 +147,7 @@ source_value <- function(path, field, call = rlang::caller_env()) {
 }
 
 sys.source_value <- function(path) {
-  source(path, local = new.env(parent = new.env(parent = asNamespace("amiss"))))$value
+  source(path, local = new.env(parent = new.env(parent = asNamespace("amiss"))), chdir = TRUE)$value
 }
 
 check_out <- function(out, call = rlang::caller_env()) {
@@ -113,17 +162,17 @@ check_out <- function(out, call = rlang::caller_env()) {
 }
 
 # Everything is made elsewhere, copied into the folder and renamed when complete: nothing half-written stays.
-write_study <- function(upgrade, out, quiet = FALSE) {
+write_study <- function(result, out, quiet = FALSE) {
   work <- tempfile("amiss-")
   dir.create(file.path(work, "figures"), recursive = TRUE)
   dir.create(out, recursive = TRUE, showWarnings = FALSE)
   staging <- file.path(out, basename(work))
   on.exit(unlink(c(work, staging), recursive = TRUE))
-  save_figures(upgrade, file.path(work, "figures"))
-  saveRDS(upgrade, file.path(work, "result.rds"))
-  jsonlite::write_json(result_list(upgrade), file.path(work, "result.json"), auto_unbox = TRUE, digits = NA,
+  save_figures(result, file.path(work, "figures"))
+  saveRDS(result, file.path(work, "result.rds"))
+  jsonlite::write_json(result_list(result), file.path(work, "result.json"), auto_unbox = TRUE, digits = NA,
                        null = "null", na = "null", pretty = TRUE)
-  report(upgrade, file.path(work, "report.html"))
+  report(result, file.path(work, "report.html"))
   if (!file.copy(work, out, recursive = TRUE)) abort_input("The results could not be copied into {.file {out}}.")
   for (name in dir(work)) {
     unlink(file.path(out, name), recursive = TRUE)
@@ -133,8 +182,12 @@ write_study <- function(upgrade, out, quiet = FALSE) {
 }
 
 # The result as plain lists, with the fields of result.json.
-result_list <- function(upgrade) {
-  table_rows <- function(table) lapply(seq_len(nrow(table)), function(i) as.list(table[i, , drop = FALSE]))
+result_list <- function(x) UseMethod("result_list")
+
+table_rows <- function(table) lapply(seq_len(NROW(table)), function(i) as.list(table[i, , drop = FALSE]))
+
+#' @export
+result_list.amiss_upgrade <- function(x) {
   model_list <- function(model) {
     fit <- model$fit
     list(name = model$name, parent = model$parent, mechanism = model$mechanism, Q = ncol(fit$emulator$basis$vectors),
@@ -147,13 +200,13 @@ result_list <- function(upgrade) {
          attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")]))
   }
   candidate_list <- function(i) {
-    row <- upgrade$candidates[i, ]
+    row <- x$candidates[i, ]
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
          probability = row$probability, trusted = row$trusted, parameters = table_rows(row$parameters[[1]]))
   }
-  cause <- upgrade$named_cause
+  cause <- x$named_cause
   if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
-  list(schema = 1L, study = upgrade$study %||% upgrade$measurements$name, seed = upgrade$seed, wall_s = upgrade$wall_s,
-       diagnosis = diagnosis_verdict(upgrade), models = lapply(upgrade$models, model_list), candidates = lapply(seq_len(NROW(upgrade$candidates)), candidate_list),
-       named_cause = cause, gain = upgrade$gain, stopped_because = upgrade$stopped_because)
+  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s,
+       diagnosis = diagnosis_verdict(x), models = lapply(x$models, model_list), candidates = lapply(seq_len(NROW(x$candidates)), candidate_list),
+       named_cause = cause, gain = x$gain, stopped_because = x$stopped_because)
 }

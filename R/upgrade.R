@@ -29,9 +29,9 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  say <- if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
+  say <- progress(quiet)
 
-  settings <- list(measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
+  settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   say("Calibrating the base model")
   current <- measured_model(fit_model(simulator, "base", settings), "base", NULL, NULL, settings)
@@ -68,13 +68,18 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
                  measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
 }
 
-# Every model of a study is drawn on the same design seed: differences between models are not the design's.
+# A model simulated, trained and calibrated by `settings$calibrate`. Every model of a study is drawn on the same design
+# seed: differences between models are not the design's.
 fit_model <- function(simulator, name, settings) settings$keep(list("fit", name, plain(simulator)), {
   control <- settings$control
   ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
   emulator <- train_emulator(ensemble, settings$measurements, control$emulator, threads = settings$threads)
-  calibrate(emulator, settings$measurements, control$calibration, seed = settings$seed, threads = settings$threads)
+  settings$calibrate(emulator, settings$measurements, control$calibration, seed = settings$seed, threads = settings$threads)
 })
+
+progress <- function(quiet) {
+  if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
+}
 
 # A function that returns a value kept under a key, or evaluates and keeps it. What is kept belongs to one set of
 # arguments only: its hash is part of the file's name.

@@ -114,3 +114,75 @@ test_that("a folder that cannot be used is refused before anything is computed",
   run_study(study, out, quiet = TRUE)
   expect_true(file.exists(file.path(out, "report.html")))
 })
+
+write_comparison_study <- function(folder, ...) {
+  writeLines('offset <- free("offset", uniform(10, 30), "K")
+    list(level = function_simulator(function(values, drivers) values[["offset"]] + 0 * drivers[, "Te"] + 0.4 * values[["a"]] * drivers[, "Gv"],
+                                    offset, free("a", uniform(0, 0.01)), boundary = c("Te", "Gv")),
+         line = function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+                                   offset, free("gain", uniform(0, 1)), boundary = "Te"))', file.path(folder, "models.R"))
+  writeLines('source("values.R", local = TRUE)$value', file.path(folder, "made.R"))
+  writeLines('data.frame(hour = 1:80, Te = 10 + 5 * sin(1:80 / 4), Gv = pmax(0, 300 * sin(1:80 / 5)), Ti = 24 + 2 * sin(1:80 / 4) + with_seed(3, rnorm(80, 0, 0.1)))',
+             file.path(folder, "values.R"))
+  write_study_file(folder, data = "made.R", models = "models.R", calibrate = "hour <= 60", validate = "hour > 60", runs = 12,
+                   control = list(calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 12, importance_draws = 200))), ...,
+                   drop = c("model", "catalogue"))
+}
+
+test_that("a comparison study writes its files with the agreed fields", {
+  folder <- withr::local_tempdir()
+  writeLines('list(simulator = source("models.R", local = TRUE)$value$line, values = c(offset = 20, gain = 0.4))', file.path(folder, "truth.R"))
+  path <- write_comparison_study(folder, truth = "truth.R")
+  out <- file.path(folder, "out")
+  comparison <- run_study(path, out, quiet = TRUE)
+  expect_s3_class(comparison, "amiss_comparison")
+  expect_setequal(list.files(out), c("report.html", "figures", "result.rds", "result.json"))
+  expect_setequal(list.files(file.path(out, "figures")), paste0(figures_of(comparison), ".png"))
+  json <- jsonlite::read_json(file.path(out, "result.json"))
+  expect_true(all(c("schema", "study", "seed", "wall_s", "method", "best", "models", "disagreements", "doubts", "truth") %in% names(json)))
+  expect_equal(json$best, "line")
+  expect_equal(json$truth$values, list(offset = 20, gain = 0.4))
+  model <- json$models[[2]]
+  expect_true(all(c("log10_evidence", "log10_evidence_interval", "log10_bf", "against", "word", "probability", "criteria", "parameters", "attribution") %in% names(model)))
+  expect_true(all(c("aic", "bic", "lr", "rmse_validation", "k") %in% names(model$criteria)))
+  expect_equal(vapply(model$attribution, `[[`, "", "boundary"), comparison$models$line$attribution$boundary)
+  html <- paste(readLines(file.path(out, "report.html"), warn = FALSE), collapse = "\n")
+  expect_match(html, "The record is decisively for line among 2 models", fixed = TRUE)
+  links <- regmatches(html, gregexpr("(src|href)=\"[^\"]{0,20}", html))[[1]]
+  expect_true(all(grepl("=\"(data:|#)", links)))
+})
+
+test_that("a bad comparison study is refused", {
+  folder <- withr::local_tempdir()
+  refuse <- function(pattern, ...) expect_error(read_study(write_comparison_study(folder, ...)), pattern, class = "amiss_error_input")
+  refuse("does not exist", models = "none.R")
+  refuse("method", method = "guess")
+  refuse("method", method = 3)
+  expect_error(read_study(write_study_file(folder, truth = "model.R")), "models.*only", class = "amiss_error_input")
+  expect_error(read_study(write_study_file(folder, drop = "catalogue")), "lacks field.*catalogue", class = "amiss_error_input")
+  path <- write_comparison_study(folder)
+  writeLines("list(a = 1)", file.path(folder, "models.R"))
+  expect_error(read_study(path), "Model \"a\" is no simulator", class = "amiss_error_input")
+  path <- write_comparison_study(folder)
+  writeLines("1:3", file.path(folder, "made.R"))
+  expect_error(read_study(path), "data", class = "amiss_error_input")
+  both <- yaml::read_yaml(path)
+  both$catalogue <- "catalogue.R"
+  yaml::write_yaml(both, path)
+  expect_error(read_study(path), "field.*catalogue.*which goes with", class = "amiss_error_input")
+})
+
+test_that("the paper's studies that ship can be read", {
+  for (name in c("paper_synthetic", "paper_real_like")) {
+    study <- read_study(system.file("studies", paste0(name, ".yml"), package = "amiss"))
+    m <- study$measurements
+    expect_identical(sum(m$use == "calibrate"), 384L)
+    expect_identical(m$conditions, c("Te", "Gv", "Ws", "Wd", "RHP"))
+    expect_true(all(names(study$truth$values) %in% names(free_parameters(study$truth$simulator))))
+    rows <- m$use == "calibrate"
+    noise <- m$y[rows] - m$raw$drivers[rows, "Ti_clean"]
+    # Standard deviation of 384 normal values: 3.6 % standard error.
+    expect_equal(stats::sd(noise), m$noise_sd, tolerance = 0.12)
+    if (name == "paper_synthetic") expect_equal(m$noise_sd^2, 0.01 * stats::var(m$raw$drivers[rows, "Ti_clean"]), tolerance = 0.01)
+  }
+})
