@@ -49,7 +49,7 @@ figure_evidence <- function(comparison) {
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.4) +
     ggplot2::geom_point(size = 4) +
     ggplot2::geom_text(ggplot2::aes(label = .data$label, x = pmax(.data$log10_evidence, .data$upper95)), hjust = 0, size = 4.6, show.legend = FALSE) +
-    ggplot2::scale_x_continuous("log10 evidence", expand = ggplot2::expansion(mult = c(0.05, 0.45))) +
+    ggplot2::scale_x_continuous("log10 evidence", expand = ggplot2::expansion(mult = c(0.05, 0.6))) +
     ggplot2::scale_y_discrete(NULL, limits = rev) +
     model_scales() +
     figure_titles(sub(":.*", "", evidence_sentences(comparison)[1]),
