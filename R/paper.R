@@ -1,4 +1,4 @@
-paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1), t2 = c(1, 1), fictitious_seed = NULL,
+paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1), t2 = c(1, 1), fictitious_seed = 1,
                       probability = 0.95, ais = list())
 
 #' Calibrate a simulator as in the paper
@@ -27,7 +27,8 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' @inheritParams calibrate
 #' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
 #'   `shared_lambda` (one noise precision for all basis vectors; `FALSE`), `alpha` and `t2` (the two shapes of their
-#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `fictitious_seed` (of the white noise; default the seed), `probability` of
+#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `fictitious_seed` (of the white noise, which is
+#'   part of the data; 1), `probability` of
 #'   the highest-density intervals (0.95), and `ais`, a list for the sampler as in [calibrate()].
 #' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of the parameters),
 #'   `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of equations 5 and 6 and the total),
@@ -51,7 +52,7 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
   rows <- emulated_rows(emulator, measurements)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  control <- fill_paper_control(control, length(rows), seed)
+  control <- fill_paper_control(control, length(rows))
   data <- paper_data(emulator, measurements, rows, control)
   priors <- list(alpha = control$alpha, t2 = control$t2, noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence)
   result <- call_engine(calibrate_paper_(data, priors, emulator$processes, control, engine_context(seed, threads)))
@@ -71,11 +72,10 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
                  inside = inside, outside = outside), class = "amiss_paper_calibration")
 }
 
-fill_paper_control <- function(control, n, seed, call = rlang::caller_env()) {
+fill_paper_control <- function(control, n, call = rlang::caller_env()) {
   control <- merge_control(paper_control, control, call = call)
   control$ais <- fill_ais_control(control$ais, "control$ais", call = call)
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
-  if (is.null(control$fictitious_seed)) control["fictitious_seed"] <- seed
   check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
   check_input(checkmate::check_flag(control$shared_lambda), "control$shared_lambda", call = call)

@@ -7,19 +7,13 @@
 # package is installed. Writes JSON, one row a quantity: case, quantity, draws, p_value and holds (p-values adjusted by
 # Holm's method over all rows stay above 0.05, so that a right implementation fails in one of twenty seeds).
 
-arguments <- commandArgs(trailingOnly = TRUE)
-option <- function(name, default = NULL) {
-  at <- match(paste0("--", name), arguments)
-  if (is.na(at)) return(default)
-  if (at == length(arguments)) stop("--", name, " needs a value", call. = FALSE)
-  arguments[at + 1]
-}
+here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
+source(file.path(here, "options.R"))
 out <- option("out", "calibration.json")
 draws <- as.integer(option("draws", "200"))
 first <- 1e5 * as.integer(option("seed", "1"))
 workers <- as.integer(option("workers", "2"))
 figure <- option("figure", sub("(\\.json)?$", ".png", out))
-here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 suppressPackageStartupMessages(library(amiss))
 for (part in c("world", "prior_predictive", "ranks", "figure", "model_probability", "bridge")) {
   sys.source(file.path(here, "calibration", paste0(part, ".R")), globalenv())
@@ -51,7 +45,7 @@ rows <- rbind(rows, bridge[names(rows)])
 said(if (is.null(bridge)) "bridge sampling left out: its package is not installed" else "bridge sampling")
 
 rows$holds <- stats::p.adjust(rows$p_value, "holm") > 0.05
-jsonlite::write_json(rows, out, digits = 5, pretty = TRUE)
+write_rows(rows, out)
 print(rows, digits = 3)
 cat(sprintf("%d of %d rows hold; trusted by the sampler itself: %s\n", sum(rows$holds), nrow(rows),
             paste(sprintf("%s %.1f %%", vapply(parts, `[[`, "", 1), 100 * trusted), collapse = ", ")))

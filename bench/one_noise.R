@@ -6,9 +6,8 @@
 # discrepancy (as in the paper), with one for all basis vectors (shared_lambda), and with one for all, by ais() on the
 # joint posterior written down with dense matrices. The table stands in the vignette "What the engine computes".
 
-arguments <- commandArgs(trailingOnly = TRUE)
-option <- function(name, default) if (is.na(at <- match(paste0("--", name), arguments))) default else arguments[at + 1]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
+source(file.path(here, "options.R"))
 suppressPackageStartupMessages(library(amiss))
 for (part in c("world", "prior_predictive", "bridge")) sys.source(file.path(here, "calibration", paste0(part, ".R")), globalenv())
 the_world <- sbc_world()
@@ -17,11 +16,11 @@ one_noise <- function(seed, confidence, noise, world = the_world) {
   m <- world$measurements
   k <- world$emulator$basis$vectors
   control <- list(alpha = c(1, 1), confidence = confidence, ais = sbc_ais)
-  full <- amiss:::fill_paper_control(control, sbc_steps, seed)
+  full <- amiss:::fill_paper_control(control, sbc_steps)
   set.seed(seed)
   priors <- list(noise_sd = m$noise_sd, noise_shape = sbc_steps * confidence)
   lambda <- if (is.null(noise)) draw_precision(1, priors) else 1 / noise^2
-  x <- cbind(m$boundary, amiss:::fictitious_condition_(sbc_steps, seed))
+  x <- cbind(m$boundary, amiss:::fictitious_condition_(sbc_steps, full$fictitious_seed))
   w <- coefficients_at(world$emulator, stats::runif(2))
   s <- length(m$conditions) + 1
   zeta <- kernel_covariance(x, c(m$condition, s), stats::runif(s), stats::runif(1))
@@ -56,4 +55,4 @@ rows <- do.call(rbind, lapply(cases, function(case) {
              highest = apply(difference, 2, max), records = nrow(values), row.names = NULL)
 }))
 print(rows, digits = 2)
-jsonlite::write_json(rows, option("out", "one_noise.json"), digits = 4, pretty = TRUE)
+write_rows(rows, option("out", "one_noise.json"))

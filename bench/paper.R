@@ -5,13 +5,8 @@
 # out? K seeds of the sampler on one record (10): how far does the evidence scatter? Each finished fit is kept in
 # FILE.fits/, so that a stopped run goes on where it was. FILE gets rows of name, value, required, holds.
 
-arguments <- commandArgs(trailingOnly = TRUE)
-option <- function(name, default = NULL) {
-  at <- match(paste0("--", name), arguments)
-  if (is.na(at)) return(default)
-  if (at == length(arguments)) stop("--", name, " needs a value", call. = FALSE)
-  arguments[at + 1]
-}
+here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
+source(file.path(here, "options.R"))
 noise_seeds <- seq_len(as.integer(option("seeds", "20")))
 rivals <- utils::head(noise_seeds, as.integer(option("rivals", length(noise_seeds))))
 sampler_seeds <- seq_len(as.integer(option("samplers", "10")))
@@ -81,7 +76,7 @@ as_row <- function(row, most = FALSE) {
   list(name = row[[1]], value = row[[2]], required = row[[3]], holds = if (most) row[[2]] < row[[3]] else row[[2]] >= row[[3]])
 }
 rows <- c(lapply(rows, as_row), lapply(scattered, as_row, most = TRUE))
-jsonlite::write_json(rows, out, auto_unbox = TRUE, digits = NA, pretty = TRUE)
+write_rows(rows, out)
 for (row in rows) cat(sprintf("%-75s %8.3f  required %5.2f  %s\n", row$name, row$value, row$required, if (row$holds) "holds" else "FAILS"))
 cat(sprintf("mean log10 L: M1 %.1f, M2 %.1f, M3 %.1f; fits with a trusted evidence: %d of %d\n", mean(evidence[, 1]), mean(evidence[, 2]),
             mean(evidence[, 3]), sum(vapply(fits, `[[`, NA, "trusted")), length(fits)))

@@ -41,8 +41,8 @@ bridge <- function(draws, weights, log_posterior, data, size = 400) {
 # lies above 0.999, and a quantity so close to 1 does not come back from R as the coordinate it was.
 bridge_one <- function(world, seed) {
   control <- list(alpha = c(1, 1), ais = sbc_ais)
-  full <- amiss:::fill_paper_control(control, sbc_steps, seed)
-  fictitious <- amiss:::fictitious_condition_(sbc_steps, seed)
+  full <- amiss:::fill_paper_control(control, sbc_steps)
+  fictitious <- amiss:::fictitious_condition_(sbc_steps, full$fictitious_seed)
   set.seed(seed)
   y <- draw_paper(world, full, fictitious)$y
   m <- observed(world$measurements, y)

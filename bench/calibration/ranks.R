@@ -25,7 +25,7 @@ uniformity <- function(rank) {
 sbc_one <- list(
   paper = function(world, control, seed) {
     control <- utils::modifyList(list(ais = sbc_ais), control)
-    full <- amiss:::fill_paper_control(control, sbc_steps, seed)
+    full <- amiss:::fill_paper_control(control, sbc_steps)
     drawn <- draw_paper(world, full, amiss:::fictitious_condition_(sbc_steps, full$fictitious_seed))
     fit <- amiss::calibrate_paper(world$emulator, observed(world$measurements, drawn$y), control, seed = seed)
     h <- fit$hyperparameters
