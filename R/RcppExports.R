@@ -33,8 +33,8 @@ shapley_shares_ <- function(data, priors, draws, context_list) {
     .Call(`_amiss_shapley_shares_`, data, priors, draws, context_list)
 }
 
-attribute_ <- function(data, priors, error_settings, control, context_list) {
-    .Call(`_amiss_attribute_`, data, priors, error_settings, control, context_list)
+attribute_ <- function(data, priors, drop, error_settings, control, context_list) {
+    .Call(`_amiss_attribute_`, data, priors, drop, error_settings, control, context_list)
 }
 
 calibrate_paper_ <- function(data, priors, emulator_list, control, context_list) {

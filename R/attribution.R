@@ -31,19 +31,35 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   full_setting <- fit$history$setting[which.max(fit$history$log_likelihood)]
   settings <- unique(c(full_setting, fit$null_setting))
-  result <- call_engine(attribute_(data, fit$priors, settings, control, engine_context(seed, threads)))
   conditions <- fit$measurements$conditions
-  log10_bf <- (fit$history$log_evidence - result$log_evidence_dropped) / log(10)
-  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf,
-                      standard_error = sqrt(fit$history$standard_error^2 + result$standard_error^2) / log(10),
+  lost <- evidence_lost(fit)
+  again <- which(!lost$standard_error <= control$ais$precision)
+  result <- call_engine(attribute_(data, fit$priors, again - 1L, settings, control, engine_context(seed, threads)))
+  lost$value[again] <- fit$history$log_evidence - result$log_evidence_dropped
+  lost$standard_error[again] <- sqrt(fit$history$standard_error^2 + result$standard_error^2)
+  lost$trusted[again] <- fit$history$trusted & result$trusted
+  log10_bf <- lost$value / log(10)
+  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf, standard_error = lost$standard_error / log(10),
                       share = variance_shares(fit, data, seed, threads), p_value = result$adjusted, p_value_single = result$p_value,
                       significant = result$adjusted <= control$level & log10_bf >= control$least_log10_bf,
-                      trusted = result$trusted & fit$history$trusted)
+                      trusted = lost$trusted)
   table <- table[order(-table$log10_bf_dropped), ]
   rownames(table) <- NULL
   structure(list(format_version = format_version, table = table, surrogates = nrow(result$null_statistics),
                  statistic = stats::setNames(result$statistic, conditions), null_statistics = result$null_statistics,
                  control = control, seed = seed), class = "amiss_attribution")
+}
+
+# Log evidence lost without each condition, from the posterior's own draws: with independent priors the model without
+# condition s is the one with t_s = 0, so that Z_-s / Z = P(t_s = 0 | y) / P(t_s = 0) (Savage and Dickey). Its error is
+# that of a share among as many independent draws as the effective size; a share of none has none.
+evidence_lost <- function(fit) {
+  history <- fit$history
+  off <- colSums(history$weights * (history$t == 0))
+  prior_off <- 1 - fit$priors$inclusion
+  value <- if (prior_off > 0) log(prior_off) - log(off) else rep(NA_real_, length(off))
+  error <- sqrt(pmax(0, 1 - off) / (off * history$ess))
+  list(value = value, standard_error = ifelse(is.finite(value), error, Inf), trusted = rep(history$trusted, length(off)))
 }
 
 check_attribution_control <- function(control, call = rlang::caller_env()) {

@@ -112,8 +112,10 @@ simulate_measured <- function(simulator, values, measurements, uses, threads, ca
   }
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
   out <- matrix(NaN, length(measurements$y), nrow(values))
+  wanted <- which(measurements$block %in% rows)
   for (segment in unique(measurements$segment[rows])) {
     own <- which(raw$segment == segment)
+    own <- own[own <= max(intersect(own, wanted))]  # what comes later changes nothing
     for (column in needed) {
       bad <- own[!is.finite(raw$drivers[own, column])]
       if (length(bad)) {

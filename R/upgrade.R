@@ -1,4 +1,5 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibration = list(), attribution = list())
+upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibration = list(), attribution = list(), margin = 3,
+                        screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
 #'
@@ -6,12 +7,17 @@ upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibrat
 #' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
 #' and the loop begins again with the extended model. Held-out rows only measure; they decide nothing.
 #'
+#' Mechanisms are calibrated twice: first with a coarse sampler (`screening`), then, as well as the base model is, those that
+#' come within `margin` of the best, if any comes within `margin` of being decisive. Candidates that stay behind keep their
+#' coarse evidence; `candidates$screened` says which, and their intervals say how coarse.
+#'
 #' @param simulator The base model.
 #' @param measurements The [measurements()].
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model.
 #' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism must earn, with
-#'   its interval above zero; 2), and lists `emulator`, `calibration` and `attribution` for the stages.
+#'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
+#'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (3, in decades).
 #' @param quiet No progress messages.
 #' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
@@ -27,6 +33,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   control <- merge_control(upgrade_control, control)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps")
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
+  check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin")
+  if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening")
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   say <- progress(quiet)
@@ -70,12 +78,26 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
 
 # A model simulated, trained and calibrated by `settings$calibrate`. Every model of a study is drawn on the same design
 # seed: differences between models are not the design's.
-fit_model <- function(simulator, name, settings) settings$keep(list("fit", name, plain(simulator)), {
-  control <- settings$control
-  ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
-  emulator <- train_emulator(ensemble, settings$measurements, control$emulator, threads = settings$threads)
-  settings$calibrate(emulator, settings$measurements, control$calibration, seed = settings$seed, threads = settings$threads)
-})
+fit_model <- function(simulator, name, settings, calibration = settings$control$calibration) {
+  settings$keep(list("fit", name, plain(simulator), calibration), {
+    ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
+    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
+    settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
+  })
+}
+
+# The coarse calibration of a candidate, and the full one that follows it.
+screen_model <- function(simulator, name, settings) {
+  coarse <- settings$control$calibration
+  coarse$ais <- utils::modifyList(as.list(settings$control$screening), as.list(coarse$ais))
+  fit_model(simulator, name, settings, coarse)
+}
+
+calibrate_fully <- function(fit, name, settings) {
+  settings$keep(list("full", name, plain(fit$emulator$simulator)), {
+    settings$calibrate(fit$emulator, settings$measurements, settings$control$calibration, seed = settings$seed, threads = settings$threads)
+  })
+}
 
 progress <- function(quiet) {
   if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
@@ -130,24 +152,47 @@ trial_order <- function(catalogue, attribution) {
 }
 
 try_mechanisms <- function(current, catalogue, settings, say) {
+  screening <- !is.null(settings$control$screening)
   fits <- list()
-  rows <- list()
   for (name in names(catalogue)) {
-    fit <- rlang::try_fetch(fit_model(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings),
-                            amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
-    bf <- bayes_factor(fit, current$fit)
-    say("  {name}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
-    fits[[name]] <- fit
-    rows[[name]] <- data.frame(from = current$name, mechanism = name, bf, trusted = fit$trust$trusted)
-    rows[[name]]$parameters <- list(added_parameters(fit, current$fit))
+    first <- if (screening) screen_model else fit_model
+    fits[[name]] <- rlang::try_fetch(first(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings),
+                                     amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
+    report_candidate(name, fits[[name]], current, say)
   }
+  full <- if (screening) contenders(fits, current$fit, settings$control) else names(fits)
+  if (screening) for (name in full) {
+    fits[[name]] <- calibrate_fully(fits[[name]], paste(current$name, "+", name), settings)
+    report_candidate(paste(name, "in full"), fits[[name]], current, say)
+  }
+  list(fits = fits, table = candidate_table(fits, current, screened = !names(fits) %in% full))
+}
+
+report_candidate <- function(what, fit, current, say) {
+  bf <- bayes_factor(fit, current$fit)
+  say("  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
+}
+
+# Candidates whose coarse evidence, within three standard errors, comes near the best, if any comes near adoption.
+contenders <- function(fits, reference, control) {
+  bf <- do.call(rbind, lapply(fits, bayes_factor, reference))
+  reach <- bf$log10_bf + 3 * (bf$upper95 - bf$log10_bf) / 1.96 + control$margin
+  names(fits)[reach >= max(bf$log10_bf, control$decisive)]
+}
+
+candidate_table <- function(fits, current, screened) {
+  rows <- lapply(names(fits), function(name) {
+    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], current$fit), trusted = fits[[name]]$trust$trusted)
+    row$parameters <- list(added_parameters(fits[[name]], current$fit))
+    row
+  })
   table <- do.call(rbind, rows)
-  rownames(table) <- NULL
+  table$screened <- screened
   # Equal prior probability for no change and for each mechanism.
   log_odds <- c(0, table$log10_bf) * log(10)
   probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))
   table$probability <- probability[-1]
-  list(fits = fits, table = table)
+  table
 }
 
 # Estimates of the parameters that a mechanism brought with it.

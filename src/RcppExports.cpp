@@ -121,17 +121,18 @@ BEGIN_RCPP
 END_RCPP
 }
 // attribute_
-Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::IntegerVector& error_settings, const Rcpp::List& control, const Rcpp::List& context_list);
-RcppExport SEXP _amiss_attribute_(SEXP dataSEXP, SEXP priorsSEXP, SEXP error_settingsSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
+Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const std::vector<int>& drop, const Rcpp::IntegerVector& error_settings, const Rcpp::List& control, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_attribute_(SEXP dataSEXP, SEXP priorsSEXP, SEXP dropSEXP, SEXP error_settingsSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const std::vector<int>& >::type drop(dropSEXP);
     Rcpp::traits::input_parameter< const Rcpp::IntegerVector& >::type error_settings(error_settingsSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
-    rcpp_result_gen = Rcpp::wrap(attribute_(data, priors, error_settings, control, context_list));
+    rcpp_result_gen = Rcpp::wrap(attribute_(data, priors, drop, error_settings, control, context_list));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -216,7 +217,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
     {"_amiss_history_coefficients_", (DL_FUNC) &_amiss_history_coefficients_, 3},
     {"_amiss_shapley_shares_", (DL_FUNC) &_amiss_shapley_shares_, 4},
-    {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
+    {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 6},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
     {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},

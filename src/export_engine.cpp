@@ -158,7 +158,7 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   const CalibrationTarget target(
       history, StudentTMixture::fit(outside.draws, outside.weights, options.max_components, 8.0, stream),
       emulator);
-  const AisResult joint = sample_ais(target, options, second);
+  const AisResult joint = sample_calibration(target, outside, options, second);
 
   Rcpp::List outside_list = convert::ais_list(outside), joint_list = convert::ais_list(joint);
   add_history_draws(
@@ -205,25 +205,25 @@ Eigen::MatrixXd shapley_shares_(const Rcpp::List& data, const Rcpp::List& priors
   return shapley_shares(model, points, ShapleyOptions(), context);
 }
 
-// Evidence without each of the given conditions (0-based), and the surrogate test.
+// Evidence without each of the given conditions (0-based), and the surrogate test of all.
 // [[Rcpp::export]]
-Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors,
+Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const std::vector<int>& drop,
                       const Rcpp::IntegerVector& error_settings, const Rcpp::List& control,
                       const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
   const HistoryModel model = make_history_model(data, priors, context);
   const AisOptions options = convert::ais_options(control["ais"]);
-  const int conditions = model.conditions();
-  std::vector<AisResult> dropped(static_cast<std::size_t>(conditions));
+  const int drops = static_cast<int>(drop.size());
+  std::vector<AisResult> dropped(drop.size());
   Context inner = context;  // conditions share the threads; each has its own seed
   inner.threads = 1;
   inner.poll = nullptr;
-  parallel_for(conditions, context, [&](int s) {
+  parallel_for(drops, context, [&](int i) {
     std::vector<int> active = all_conditions(model);
-    active.erase(active.begin() + s);
+    active.erase(active.begin() + drop[i]);
     Context own = inner;
-    own.seed = context.seed + 1 + static_cast<std::uint64_t>(s);
-    dropped[s] = sample_ais(HistoryTarget(model, active), options, own);
+    own.seed = context.seed + 1 + static_cast<std::uint64_t>(drop[i]);
+    dropped[i] = sample_ais(HistoryTarget(model, active), options, own);
   });
   SurrogateOptions surrogates;
   surrogates.surrogates = control["surrogates"];
@@ -231,12 +231,12 @@ Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors,
   surrogates.error_settings = Rcpp::as<std::vector<int>>(error_settings);
   const SurrogateTest test = surrogate_test(model, surrogates, context);
 
-  VectorXd log_evidence(conditions), standard_error(conditions);
-  std::vector<bool> trusted(static_cast<std::size_t>(conditions));
-  for (int s = 0; s < conditions; ++s) {
-    log_evidence[s] = dropped[s].log_evidence;
-    standard_error[s] = dropped[s].standard_error;
-    trusted[s] = dropped[s].trusted;
+  VectorXd log_evidence(drops), standard_error(drops);
+  std::vector<bool> trusted(drop.size());
+  for (int i = 0; i < drops; ++i) {
+    log_evidence[i] = dropped[i].log_evidence;
+    standard_error[i] = dropped[i].standard_error;
+    trusted[i] = dropped[i].trusted;
   }
   using Rcpp::_;
   return Rcpp::List::create(_["log_evidence_dropped"] = log_evidence, _["standard_error"] = standard_error,

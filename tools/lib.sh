@@ -18,13 +18,13 @@ install_package() {
   find "$copy" -mindepth 1 -maxdepth 1 ! -name src ! -name .state -exec rm -rf {} +
   tar -C "$root" -c --exclude='*.o' --exclude='*.so' --exclude=./{build,demo,.git,tests,tools,bench} . |
     tar -C "$copy" -x
-  state="$(cd "$copy" && { R --version; g++ --version; cat DESCRIPTION src/Makevars;
+  state="$(cd "$copy" && { R --version; g++ --version; cat DESCRIPTION src/Makevars "$root/tools/Makevars";
     find src -name '*.hpp' | sort | xargs cat; } | sha256sum)"
   if [[ "$(cat "$copy/.state" 2>/dev/null)" != "$state" ]]; then
     find "$copy/src" -name '*.o' -delete
     printf '%s\n' "$state" > "$copy/.state"
   fi
   rm -rf "$library/00LOCK-package"
-  MAKEFLAGS="${MAKEFLAGS:--j2}" R CMD INSTALL --no-multiarch --library="$library" "$copy" > "$root/build/install.log" 2>&1 ||
+  MAKEFLAGS="${MAKEFLAGS:--j2}" R_MAKEVARS_USER="${R_MAKEVARS_USER:-$root/tools/Makevars}" R CMD INSTALL --no-multiarch --library="$library" "$copy" > "$root/build/install.log" 2>&1 ||
     { cat "$root/build/install.log" >&2; fail "the package could not be installed"; }
 }

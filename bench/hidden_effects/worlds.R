@@ -104,7 +104,7 @@ draw_world <- function(seed, kind = NULL, strength = NULL) {
   drawn_strength <- sample(c(0.5, 1, 2, 4, 8), 1)
   kind <- if (is.null(kind)) drawn_kind else kind
   strength <- if (kind == "none") 0 else if (is.null(strength)) drawn_strength else strength
-  days <- sample(5:14, 1)
+  days <- sample(4:14, 1)
   data <- draw_weather(days)
   noise <- exp(stats::runif(1, log(0.02), log(0.3)))
   ar1 <- sample(c(0, 0, 0.5, 0.8), 1)

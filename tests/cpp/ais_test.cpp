@@ -4,6 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "engine/ais/DefensiveTarget.hpp"
 #include "engine/ais/Sampler.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "helpers.hpp"
@@ -349,6 +350,77 @@ TEST(SampleAis, CountsEveryEvaluationWithGradients) {
   };
   const Counting target(model, count);
   EXPECT_EQ(sample_ais(target, {}, seeded(25)).evaluations, count);
+}
+
+TEST(DefensiveTarget, ReferenceTimesLikelihoodIsTheSamePosterior) {
+  const LinearGaussian model(4, 0.3);
+  const GradientTarget target(model, 1.0);
+  const StudentTMixture close({StudentT(model.mean().tail(3), 0.3 * MatrixXd::Identity(3, 3), 8.0)}, {1.0});
+  const DefensiveTarget closer(target, close, 1, 0.2);
+  const MatrixXd x = normal_matrix(4, 6, 71);
+  const VectorXd own = target.log_likelihood(x), other = closer.log_likelihood(x);
+  MatrixXd slope, closer_slope;
+  target.log_likelihood(x, slope);
+  closer.log_likelihood(x, closer_slope);
+  for (Index i = 0; i < 6; ++i) {
+    const VectorXd at = x.col(i);
+    EXPECT_NEAR(other[i] + closer.log_reference(at), own[i] + target.log_reference(at), 1e-10 * std::abs(own[i]));
+    const VectorXd sum = closer_slope.col(i) + closer.reference_gradient(at);
+    EXPECT_NEAR((sum - slope.col(i) - target.reference_gradient(at)).norm(), 0.0, 1e-10 * slope.norm());
+    for (Index j = 0; j < 4; ++j) {
+      VectorXd up = at, down = at;
+      up[j] += 1e-5;
+      down[j] -= 1e-5;
+      const double difference = (closer.log_reference(up) - closer.log_reference(down)) / 2e-5;
+      EXPECT_NEAR(closer.reference_gradient(at)[j], difference, 1e-6 * (1 + std::abs(difference)));
+    }
+  }
+}
+
+// Independent draws of the reference, weighted by posterior over reference: their mean is the evidence.
+TEST(DefensiveTarget, DrawsHaveTheStatedDensity) {
+  const LinearGaussian model(3, 1.0);
+  const FunctionTarget target = model.target();
+  const StudentTMixture close({StudentT(model.mean(), 0.4 * MatrixXd::Identity(3, 3), 8.0)}, {1.0});
+  const DefensiveTarget closer(target, close);
+  Stream stream(1, 2, 3);
+  MatrixXd x(3, 20000);
+  for (Index i = 0; i < x.cols(); ++i) x.col(i) = closer.draw_reference(stream);
+  const VectorXd log_w = closer.log_likelihood(x);
+  const double se = std::sqrt(normalised_exp(log_w).squaredNorm() - 1.0 / 20000);
+  EXPECT_LT(se, 0.05);
+  EXPECT_NEAR(log_mean_exp(log_w), model.log_evidence(), 4 * se);
+}
+
+// Where the close distribution is wrong, the share of the prior is what the annealing lives on.
+TEST(DefensiveTarget, AWrongGuessDoesNotMoveTheEvidence) {
+  const LinearGaussian model(3, 0.3);
+  const FunctionTarget target = model.target();
+  const StudentTMixture wrong({StudentT(model.mean().array() + 2.0, 0.1 * MatrixXd::Identity(3, 3), 8.0)}, {1.0});
+  const AisResult result = sample_ais(DefensiveTarget(target, wrong), {}, seeded(26));
+  EXPECT_TRUE(result.trusted) << result.verdict;
+  expect_evidence(result, model.log_evidence());
+}
+
+TEST(DefensiveTarget, AGoodGuessSavesEvaluations) {
+  const LinearGaussian model(10, 0.1);
+  const FunctionTarget target = model.target();
+  const Eigen::LLT<MatrixXd> root(model.covariance());
+  const StudentTMixture close({StudentT(model.mean(), root.matrixL(), 8.0)}, {1.0});
+  const AisResult from_prior = sample_ais(target, {}, seeded(27));
+  const AisResult result = sample_ais(DefensiveTarget(target, close), {}, seeded(27));
+  expect_evidence(result, model.log_evidence());
+  EXPECT_LT(4 * result.ladder.size(), from_prior.ladder.size());
+  EXPECT_LT(2 * result.evaluations, from_prior.evaluations);
+}
+
+TEST(DefensiveTarget, RefusesAShareThatIsNone) {
+  const LinearGaussian model(3, 0.3);
+  const FunctionTarget target = model.target();
+  const StudentTMixture close({StudentT(model.mean(), MatrixXd::Identity(3, 3), 8.0)}, {1.0});
+  EXPECT_THROW(DefensiveTarget(target, close, 0, 0.0), std::invalid_argument);
+  EXPECT_THROW(DefensiveTarget(target, close, 0, 1.0), std::invalid_argument);
+  EXPECT_THROW(StudentTMixture({}, {}), std::invalid_argument);
 }
 
 // Two thin shells: no Student-t mixture comes close, and the chains move slowly at the cold end.

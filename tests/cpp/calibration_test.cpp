@@ -4,6 +4,8 @@
 
 #include "engine/ais/Sampler.hpp"
 #include "engine/calibration/Calibration.hpp"
+#include "engine/calibration/ParameterModes.hpp"
+#include "engine/linalg/log_sum_exp.hpp"
 #include "helpers.hpp"
 
 namespace amiss {
@@ -189,6 +191,47 @@ TEST(CalibrationTarget, UnitsOfTheBasisDoNotMatter) {
   const MatrixXd x = normal_matrix(6, 5, 89);
   const VectorXd a = joint.target().log_likelihood(x), b = other.log_likelihood(x);
   for (Index i = 0; i < 5; ++i) EXPECT_NEAR(a[i], b[i], 1e-7 * (1 + std::abs(a[i])));
+}
+
+// One parameter: modes and their scales are seen on a fine grid.
+TEST(ParameterModes, AreThoseOfAFineGrid) {
+  const Emulator emulator = make_emulator(1);
+  const HistoryModel model = make_model({});
+  const HistoryTarget history(model, {});
+  const CalibrationTarget target(history, make_reference(1, 1.0), emulator);
+  const HistoryParameters point = history.parameters(VectorXd::Zero(1));
+  const MatrixXd grid = Eigen::RowVectorXd::LinSpaced(4001, -4.0, 4.0);
+  MatrixXd mean, variance;
+  emulator.predict(target.unit((MatrixXd(2, 4001) << MatrixXd::Zero(1, 4001), grid).finished()), mean, variance);
+  VectorXd exact(4001), fitted(4001);
+  Stream stream(1, 2, 3);
+  long evaluations = 0;
+  const StudentTMixture modes = parameter_modes(target, {point}, {}, stream, evaluations);
+  EXPECT_GT(evaluations, 256);
+  for (Index i = 0; i < 4001; ++i) {
+    exact[i] = target.log_density_inside(point, mean.row(i), variance.row(i)) - 0.5 * grid(0, i) * grid(0, i);
+    fitted[i] = modes.log_density(grid.col(i));
+  }
+  const VectorXd p = normalised_exp(exact), q = normalised_exp(fitted);
+  // The weights p / q have a second moment of 1 / (effective share); the widened t gives up a few tenths.
+  EXPECT_LT((p.array().square() / q.array()).sum(), 1.6);
+}
+
+TEST(CalibrationTarget, AnnealingFromTheModesGivesTheSameEvidenceForLess) {
+  const Joint joint;
+  const AisResult outside = sample_ais(joint.history, {}, Context());
+  Stream stream(1, 1, 1);
+  const CalibrationTarget target(
+      joint.history, StudentTMixture::fit(outside.draws, outside.weights, 3, 8.0, stream), joint.emulator);
+  const AisResult plain = sample_ais(target, {}, Context());
+  const AisResult closer = sample_calibration(target, outside, {}, Context());
+  const double error = std::hypot(plain.standard_error, closer.standard_error);
+  EXPECT_LT(std::abs(plain.log_evidence - closer.log_evidence), 4 * error);
+  EXPECT_LT(error, 0.15);
+  EXPECT_LT(closer.ladder.size(), plain.ladder.size());
+  // Likelihoods are told as seen from the target's own reference.
+  const VectorXd again = target.log_likelihood(closer.draws.leftCols(20));
+  for (Index i = 0; i < 20; ++i) EXPECT_NEAR(closer.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
 }
 
 }  // namespace

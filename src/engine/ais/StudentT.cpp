@@ -148,6 +148,12 @@ VectorXd StudentT::step(const VectorXd& x, double s, Stream& stream) const {
   return location_ + root_.triangularView<Eigen::Lower>() * moved;
 }
 
+StudentTMixture::StudentTMixture(std::vector<StudentT> components, std::vector<double> weights)
+    : weights_(std::move(weights)), components_(std::move(components)) {
+  if (components_.empty() || components_.size() != weights_.size())
+    throw std::invalid_argument("Student-t mixture: one weight is needed for each component");
+}
+
 StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights, int max_components,
                                      double dof, Stream& stream) {
   GaussianMixture best;
@@ -155,11 +161,10 @@ StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights,
     GaussianMixture candidate = fit_gaussian_mixture(x, weights, k, stream);
     if (k == 1 || candidate.bic < best.bic) best = std::move(candidate);
   }
-  StudentTMixture mixture;
-  mixture.weights_ = best.weights;
+  std::vector<StudentT> components;
   for (std::size_t k = 0; k < best.means.size(); ++k)
-    mixture.components_.emplace_back(best.means[k], best.roots[k], dof);
-  return mixture;
+    components.emplace_back(best.means[k], best.roots[k], dof);
+  return StudentTMixture(std::move(components), std::move(best.weights));
 }
 
 VectorXd StudentTMixture::log_parts(const VectorXd& x) const {

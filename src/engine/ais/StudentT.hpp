@@ -1,8 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "engine/linalg/Eigen.hpp"
-#include "engine/random/Stream.hpp"
+#include "engine/ais/Distribution.hpp"
 
 namespace amiss {
 
@@ -35,16 +34,19 @@ class StudentT {
 };
 
 /// Mixture of Student t's; for importance sampling of posteriors with more than one mode.
-class StudentTMixture {
+class StudentTMixture : public Distribution {
  public:
+  /// Weights sum to 1, one for each component.
+  StudentTMixture(std::vector<StudentT> components, std::vector<double> weights);
+
   /// Gaussian mixtures of 1 ... max_components components are fitted by expectation-maximisation; the one
   /// with the least BIC gives locations and scales.
   static StudentTMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components,
                              double dof, Stream& stream);
 
-  double log_density(const Eigen::VectorXd& x) const;
-  Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  ///< of log_density
-  Eigen::VectorXd draw(Stream& stream) const;
+  double log_density(const Eigen::VectorXd& x) const override;
+  Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override;
+  Eigen::VectorXd draw(Stream& stream) const override;
   std::size_t size() const { return components_.size(); }
 
  private:

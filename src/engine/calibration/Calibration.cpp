@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/ais/DefensiveTarget.hpp"
+#include "engine/calibration/ParameterModes.hpp"
 #include "engine/linalg/constants.hpp"
 #include "engine/random/transform.hpp"
 
@@ -50,17 +52,21 @@ double CalibrationTarget::log_reference(const VectorXd& x) const {
          log_standard_normal(x.tail(emulator_.n_inputs()));
 }
 
-double CalibrationTarget::log_density_inside(const HistoryParameters& point, const VectorXd& mean,
-                                             const VectorXd& variance) const {
-  const WhitenedData& data = history_.model().whitened(point.setting);
+MatrixXd CalibrationTarget::covariance_inside(const HistoryParameters& point, const VectorXd& variance) const {
   MatrixXd covariance = point.variance * unit_covariance_[point.setting];
   covariance.diagonal() += variance;
+  return covariance;
+}
+
+double CalibrationTarget::log_density_inside(const HistoryParameters& point, const VectorXd& mean,
+                                             const VectorXd& variance) const {
+  MatrixXd covariance = covariance_inside(point, variance);
   // The coefficients differ by orders of magnitude: factorise the correlation.
   const VectorXd scale = covariance.diagonal().cwiseSqrt();
   covariance.array() /= (scale * scale.transpose()).array();
   const Eigen::LLT<MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
-  const VectorXd z = factor.matrixL().solve((data.estimate - mean).cwiseQuotient(scale));
+  const VectorXd z = factor.matrixL().solve((estimate(point) - mean).cwiseQuotient(scale));
   const double half_log_det = factor.matrixLLT().diagonal().array().log().sum() + scale.array().log().sum();
   return log_jacobian_ - half_log_det -
          0.5 * (static_cast<double>(mean.size()) * kLogTwoPi + z.squaredNorm());
@@ -77,6 +83,40 @@ VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {
     values[i] += log_density_inside(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose());
   }
   return values;
+}
+
+namespace {
+
+constexpr std::uint64_t kReference = 64;  // purpose of the streams below; the sampler's are smaller
+constexpr int kHistoryPoints = 4;         // at which the modes of the parameters are sought
+
+// n points of equal weight, evenly spread over weighted ones.
+std::vector<HistoryParameters> spread_points(const HistoryTarget& target, const AisResult& result, int n) {
+  std::vector<HistoryParameters> points;
+  double cumulative = 0.0;
+  for (Index i = 0; i < result.weights.size(); ++i) {
+    cumulative += result.weights[i];
+    while (static_cast<int>(points.size()) < n &&
+           cumulative * n > static_cast<double>(points.size()) + 0.5)
+      points.push_back(target.parameters(result.draws.col(i)));
+  }
+  return points;
+}
+
+}  // namespace
+
+AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history, const AisOptions& options,
+                             const Context& context) {
+  Stream stream(context.seed, kReference, 0);
+  long evaluations = 0;
+  const StudentTMixture modes = parameter_modes(target, spread_points(target.history_target(), history, kHistoryPoints),
+                                                ModeOptions(), stream, evaluations);
+  const DefensiveTarget closer(target, modes, target.history_target().dimension());
+  AisResult result = sample_ais(closer, options, context);
+  result.evaluations += evaluations;
+  for (Index i = 0; i < result.log_likelihood.size(); ++i)  // as seen from the target's own reference
+    result.log_likelihood[i] += closer.log_ratio(result.draws.col(i));
+  return result;
 }
 
 }  // namespace amiss

@@ -1,4 +1,5 @@
 #pragma once
+#include "engine/ais/Sampler.hpp"
 #include "engine/ais/StudentT.hpp"
 #include "engine/ais/Target.hpp"
 #include "engine/discrepancy/HistoryModel.hpp"
@@ -37,6 +38,14 @@ class CalibrationTarget : public Target {
   double log_density_inside(const HistoryParameters& point, const Eigen::VectorXd& mean,
                             const Eigen::VectorXd& variance) const;
 
+  /// S + sigma^2 (R'R)^-1 and the generalised least squares coefficients, for one point.
+  Eigen::MatrixXd covariance_inside(const HistoryParameters& point, const Eigen::VectorXd& variance) const;
+  const Eigen::VectorXd& estimate(const HistoryParameters& point) const {
+    return history_.model().whitened(point.setting).estimate;
+  }
+  const Emulator& emulator() const { return emulator_; }
+  const HistoryTarget& history_target() const { return history_; }
+
  private:
   const HistoryTarget& history_;
   StudentTMixture reference_;
@@ -44,5 +53,9 @@ class CalibrationTarget : public Target {
   double log_jacobian_;                           // -1/2 log|K'K|
   std::vector<Eigen::MatrixXd> unit_covariance_;  // (R'R)^-1 of each error setting
 };
+
+/// The joint posterior, annealed from the history posterior times the modes of the parameters (parameter_modes()).
+AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history, const AisOptions& options,
+                             const Context& context);
 
 }  // namespace amiss

@@ -1,0 +1,160 @@
+#include "engine/calibration/ParameterModes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "engine/linalg/log_sum_exp.hpp"
+#include "engine/random/transform.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kDifference = 1e-4;  // of the emulated means, in standard deviations of the prior
+constexpr double kSettled = 1e-2;     // gain in nats at which a search ends
+constexpr double kSame = 1.0;         // distance between modes, in standard deviations, that counts as none
+
+struct Mode {
+  VectorXd location;
+  MatrixXd precision;
+  double log_mass = 0.0;  // of the Gaussian that touches the density at the mode
+};
+
+// The density of the parameters for one point of the history posterior.
+class Conditional {
+ public:
+  Conditional(const CalibrationTarget& target, const HistoryParameters& point, long& evaluations)
+      : target_(target), point_(point), evaluations_(evaluations) {}
+
+  VectorXd log_density(const MatrixXd& x) const {
+    MatrixXd mean, variance;
+    predict(x, mean, variance);
+    VectorXd values(x.cols());
+    for (Index i = 0; i < x.cols(); ++i) values[i] = at(x.col(i), mean.row(i), variance.row(i));
+    return values;
+  }
+
+  // Value, gradient (central differences) and Gauss-Newton precision at x.
+  double expand(const VectorXd& x, VectorXd& gradient, MatrixXd& precision) const {
+    const Index d = x.size();
+    MatrixXd points(d, 2 * d + 1), mean, variance;
+    points.colwise() = x;
+    points.leftCols(d).diagonal().array() += kDifference;
+    points.middleCols(d, d).diagonal().array() -= kDifference;
+    predict(points, mean, variance);
+    gradient.resize(d);
+    for (Index i = 0; i < d; ++i) {
+      gradient[i] = (at(points.col(i), mean.row(i), variance.row(i)) -
+                     at(points.col(d + i), mean.row(d + i), variance.row(d + i))) /
+                    (2.0 * kDifference);
+    }
+    const MatrixXd slope = (mean.topRows(d) - mean.middleRows(d, d)).transpose() / (2.0 * kDifference);  // Q x d
+    const MatrixXd covariance = target_.covariance_inside(point_, variance.row(2 * d));
+    const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::LLT<MatrixXd> factor(scale.asDiagonal() * covariance * scale.asDiagonal());
+    const MatrixXd white = factor.matrixL().solve(scale.asDiagonal() * slope);
+    precision = white.transpose() * white;
+    precision.diagonal().array() += 1.0;
+    return at(x, mean.row(2 * d), variance.row(2 * d));
+  }
+
+  Mode climb(VectorXd x, int max_iterations) const {
+    VectorXd gradient;
+    MatrixXd precision;
+    double value = expand(x, gradient, precision), damping = 1e-2;
+    for (int iteration = 0; iteration < max_iterations && damping < 1e8; ++iteration) {
+      MatrixXd damped = precision;
+      damped.diagonal() *= 1.0 + damping;
+      const VectorXd moved = (x + damped.llt().solve(gradient)).cwiseMax(-kFarthest).cwiseMin(kFarthest);
+      const double there = log_density(moved)[0];
+      if (!(there > value)) {
+        damping *= 10.0;
+        continue;
+      }
+      const bool settled = there - value < kSettled;
+      x = moved;
+      damping = std::max(1e-6, 0.1 * damping);
+      value = expand(x, gradient, precision);
+      if (settled) break;
+    }
+    const Eigen::LLT<MatrixXd> factor(precision);
+    return {x, precision, value - factor.matrixLLT().diagonal().array().log().sum()};
+  }
+
+ private:
+  static constexpr double kFarthest = 6.0;  // in standard deviations of the prior
+
+  void predict(const MatrixXd& x, MatrixXd& mean, MatrixXd& variance) const {
+    target_.emulator().predict(x.transpose().unaryExpr(&normal_cdf), mean, variance);
+    evaluations_ += x.cols();
+  }
+  double at(const VectorXd& x, const VectorXd& mean, const VectorXd& variance) const {
+    return target_.log_density_inside(point_, mean, variance) - 0.5 * x.squaredNorm();
+  }
+
+  const CalibrationTarget& target_;
+  const HistoryParameters& point_;
+  long& evaluations_;
+};
+
+bool same(const Mode& a, const Mode& b) {
+  const VectorXd apart = a.location - b.location;
+  return apart.dot(a.precision * apart) < kSame * kSame;
+}
+
+}  // namespace
+
+StudentTMixture parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
+                                const ModeOptions& options, Stream& stream, long& evaluations) {
+  const MatrixXd starts = stream.normals(target.emulator().n_inputs(), options.starts);
+  std::vector<Mode> modes;
+  std::vector<double> shares;
+  for (const HistoryParameters& point : points) {
+    const Conditional conditional(target, point, evaluations);
+    const VectorXd values = conditional.log_density(starts);
+    std::vector<Index> order(static_cast<std::size_t>(options.starts));
+    std::iota(order.begin(), order.end(), Index{0});
+    std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a] > values[b]; });
+    std::vector<Mode> found;
+    for (int k = 0; k < options.searches; ++k) {
+      Mode mode = conditional.climb(starts.col(order[static_cast<std::size_t>(k)]), options.max_iterations);
+      if (!std::isfinite(mode.log_mass)) continue;
+      if (std::none_of(found.begin(), found.end(), [&](const Mode& other) { return same(other, mode); }))
+        found.push_back(std::move(mode));
+    }
+    VectorXd log_mass(static_cast<Index>(found.size()));
+    for (std::size_t k = 0; k < found.size(); ++k) log_mass[static_cast<Index>(k)] = found[k].log_mass;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      const double share = normalised_exp(log_mass)[static_cast<Index>(k)] / static_cast<double>(points.size());
+      const auto known = std::find_if(modes.begin(), modes.end(), [&](const Mode& m) { return same(m, found[k]); });
+      if (known != modes.end()) {
+        shares[static_cast<std::size_t>(known - modes.begin())] += share;
+      } else {
+        modes.push_back(found[k]);
+        shares.push_back(share);
+      }
+    }
+  }
+  std::vector<StudentT> components;
+  std::vector<double> weights;
+  const double total = std::accumulate(shares.begin(), shares.end(), 0.0);
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    const Eigen::LLT<MatrixXd> covariance(
+        options.inflation * modes[k].precision.llt().solve(MatrixXd::Identity(starts.rows(), starts.rows())));
+    components.emplace_back(modes[k].location, covariance.matrixL(), options.dof);
+    weights.push_back(0.5 * shares[k] / total + 0.5 / static_cast<double>(modes.size()));
+  }
+  if (components.empty()) {  // nowhere is the record possible: the prior stands
+    components.emplace_back(VectorXd::Zero(starts.rows()), MatrixXd::Identity(starts.rows(), starts.rows()), options.dof);
+    weights.push_back(1.0);
+  }
+  return StudentTMixture(std::move(components), std::move(weights));
+}
+
+}  // namespace amiss
