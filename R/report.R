@@ -43,7 +43,8 @@ last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$a
 significant_conditions <- function(table) table$boundary[table$significant]
 
 # A cause is named outright when it holds at least 95 % of the probability among all that was tried, when its estimate
-# is sound or decisive even at its lower end, and when data held out do not speak against it.
+# is sound or decisive even at its lower end, when data held out do not speak against it, and when it leaves less than it
+# takes away.
 diagnosis_verdict <- function(upgrade) {
   cause <- upgrade$named_cause
   if (is.null(cause)) {
@@ -51,6 +52,12 @@ diagnosis_verdict <- function(upgrade) {
     if (length(answers)) {
       return(list(verdict = "unexplained", tag = "Unexplained",
                   headline = sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.", listed(answers))))
+    }
+    remainder <- remaining_error(upgrade$models[[1]], upgrade$measurements)
+    if (remainder$large) {
+      return(list(verdict = "unexplained", tag = "Unexplained",
+                  headline = sprintf("Something is missing from the model that no mechanism of the catalogue explains: an error %s times as large as the stated noise remains; %s.",
+                                     short(remainder$ratio), remainder$pattern %||% "it answers to no boundary condition that was measured")))
     }
     return(list(verdict = "nothing", tag = "Nothing decisive",
                 headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition."))
@@ -65,7 +72,15 @@ cause_doubts <- function(upgrade) {
   rough <- !(best$trusted && upgrade$models[[1]]$fit$trust$trusted)
   c(if (best$probability < 0.95) "others are possible",
     if (rough && best$lower95 < upgrade$control$decisive) "the estimate is rough",
-    if (!improves_held_out(upgrade)) "not confirmed by held-out data")
+    if (!improves_held_out(upgrade)) "not confirmed by held-out data",
+    if (most_remains(upgrade)) "most of the error remains")
+}
+
+# TRUE where the last model's error is still large and the mechanisms took away less than half of what exceeds the noise.
+most_remains <- function(upgrade) {
+  ends <- lapply(upgrade$models[c(1, length(upgrade$models))], remaining_error, upgrade$measurements)
+  excess <- vapply(ends, function(e) e$ratio^2 - 1, 0)
+  ends[[2]]$large && excess[2] > 0.5 * excess[1]
 }
 
 # FALSE where data were held out and the change does not lower their error by at least 3 %.
@@ -174,7 +189,10 @@ remaining_sentences <- function(upgrade) {
   answers <- significant_conditions(last_attribution(upgrade))
   rows <- parameter_rows(upgrade$models[[length(upgrade$models)]]$fit)
   edge <- rows$label[rows$at_edge]
+  last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
   c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers)) else "The remaining error answers to no boundary condition.",
+    if (last$large) sprintf("It is %s times the stated noise%s: either the noise is stated too small, or something else is missing.", short(last$ratio),
+                            if (is.null(last$pattern)) "" else paste0(", and ", last$pattern)),
     if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that they make up for something else.", listed(edge))
     else "No parameter is at the edge of its range.",
     sprintf("The search stopped because %s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because)))

@@ -9,11 +9,12 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
   wall <- proc.time()[["elapsed"]] - started
   adopted <- vapply(upgrade$models[-1], `[[`, "", "mechanism")
   attributed <- attributed_condition(upgrade)
+  verdict <- amiss:::diagnosis_verdict(upgrade)
   row <- list(seed = world$seed, kind = world$kind, strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1,
               days = world$days, true_boundary = unique(unlist(true_boundary[world$kinds], use.names = FALSE)),
               true_mechanism = intersect(world$kinds, catalogue_kinds), condition = told_condition(upgrade, attributed),
               attributed_condition = attributed, mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
-              verdict = amiss:::diagnosis_verdict(upgrade)$verdict, unexplained = !is.na(attributed) && !length(adopted),
+              verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
               log10_bf = if (length(adopted)) upgrade$named_cause$log10_bf else max(upgrade$candidates$log10_bf),
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
               rmse = vapply(upgrade$models, function(m) m$scores$calibrate[["rmse"]], 0), wall_s = wall)
@@ -105,7 +106,7 @@ score_rates <- function(rows) {
   list(right_mechanism = rate(flags(strong, named_right)), right_condition = rate(flags(strong, condition_right)),
        detection_at_1 = rate(flags(one, named_right)), parameter_covered = rate(flags(strong, function(r) r$covered)),
        false_condition = rate(flags(none, function(r) !is.na(r$condition))), false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
-       outside_blamed = rate(flags(outside, function(r) !is.na(r$mechanism))), outside_unexplained = rate(flags(outside, function(r) r$unexplained)),
+       outside_blamed = rate(flags(outside, function(r) r$verdict == "named")), outside_unexplained = rate(flags(outside, function(r) r$unexplained)),
        both_found = rate(flags(both, function(r) all(r$true_mechanism %in% r$adopted))),
        correlation_condition = rate(flags(strong, function(r) condition_right(r, "correlation_condition"))),
        forest_condition = rate(flags(strong, function(r) condition_right(r, "forest_condition"))),

@@ -90,21 +90,22 @@ draw_noise <- function(n, sd, ar1) {
   sd * as.numeric(stats::filter(c(stats::rnorm(1), sqrt(1 - ar1^2) * stats::rnorm(n - 1)), ar1, "recursive"))
 }
 
-# The size at which the effect's RMS, once the parameters have adapted, is `wanted`; NA if it is not reached.
+# The size at which the effect's RMS, once the parameters have adapted, is `wanted`; 1 if it is not reached.
 find_size <- function(rms_at, wanted) {
-  if (rms_at(1) < wanted) return(NA)
+  if (rms_at(1) <= wanted) return(1)
   stats::uniroot(function(s) rms_at(s) - wanted, c(1e-4, 1), tol = 1e-3)$root
 }
 
 #' @param seed Everything follows from it.
-#' @param kind,strength To fix these; drawn if NULL. Strength is the ratio of the adapted effect's RMS to the noise.
-draw_world <- function(seed, kind = NULL, strength = NULL) {
+#' @param kind,strength,days To fix these; drawn if NULL. Strength is the ratio of the adapted effect's RMS to the noise.
+draw_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
   set.seed(seed, kind = "Mersenne-Twister", normal.kind = "Inversion", sample.kind = "Rejection")
   drawn_kind <- sample(c(rep("none", 4), rep(catalogue_kinds, 2), rep("two effects", 2), outside_kinds), 1)
   drawn_strength <- sample(c(0.5, 1, 2, 4, 8), 1)
   kind <- if (is.null(kind)) drawn_kind else kind
   strength <- if (kind == "none") 0 else if (is.null(strength)) drawn_strength else strength
-  days <- sample(4:14, 1)
+  drawn_days <- sample(4:14, 1)
+  days <- if (is.null(days)) drawn_days else days
   data <- draw_weather(days)
   noise <- exp(stats::runif(1, log(0.02), log(0.3)))
   ar1 <- sample(c(0, 0, 0.5, 0.8), 1)
@@ -115,18 +116,20 @@ draw_world <- function(seed, kind = NULL, strength = NULL) {
   rows <- which(calibrate & data$hour > 24)
   clean <- plain <- simulate_truth(base, values, data)
   sensitivity <- base_sensitivity(base, values, data, rows)
+  rms_at <- function(k, size) adapted_rms((effect_output(k, base, values, data, size) - plain)[rows], sensitivity)
+  # Where an effect cannot be strong enough, the noise is lowered, to 0.02 K at the least.
+  for (k in kinds) noise <- min(noise, max(0.02, rms_at(k, 1) / strength))
   effects <- list()
   for (k in kinds) {
-    rms_at <- function(size) adapted_rms((effect_output(k, base, values, data, size) - plain)[rows], sensitivity)
-    size <- find_size(rms_at, strength * noise)
-    if (is.na(size)) {
-      size <- 1
-      noise <- max(0.02, min(noise, rms_at(1) / strength))
-    }
+    size <- find_size(function(size) rms_at(k, size), strength * noise)
     effects[[k]] <- c(if (k %in% catalogue_kinds) effect_zone(k, base, size)$value, size = size)
-    clean <- clean + effect_output(k, base, values, data, size) - plain
   }
   if (length(kinds) == 1) clean <- effect_output(kinds, base, values, data, effects[[1]][["size"]])
+  if (length(kinds) == 2) {
+    both <- Reduce(function(zone, k) amiss::box_catalogue(columns)[[k]]$edit(zone), kinds, base)
+    own <- unlist(lapply(unname(effects), function(e) e[setdiff(names(e), "size")]))
+    clean <- simulate_truth(both, c(values, own)[names(amiss::zone_parameters(both))], data)
+  }
   achieved <- if (length(kinds)) adapted_rms((clean - plain)[rows], sensitivity) / noise else 0
   data$Ti <- clean + draw_noise(nrow(data), noise, ar1)
   average <- c(0.25, 0.5, 1)[findInterval(sum(calibrate) - 96, c(0, 500, 1000))]

@@ -36,3 +36,18 @@ test_that("one boundary condition is enough", {
   expect_equal(attribute_discrepancy(fit, list(surrogates = 19), seed = 1)$table$boundary, "Te")
   expect_error(attribute_discrepancy(fit, list(level = 5)), "level", class = "amiss_error_input")
 })
+
+test_that("evidence lost by the posterior's own draws is that of sampling again without the condition", {
+  data <- linear_data()
+  data$Ti <- data$Ti + 0.00037 * data$Gv  # too weak to be certain: a part of the draws leaves it out
+  fit <- linear_fit(linear_measurements(data))
+  own <- amiss:::evidence_lost(fit)
+  expect_true(all(own$standard_error < 0.2))
+  inside <- amiss:::history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  control <- list(surrogates = 1, smallest_shift = 0.05, ais = fit$control$ais)
+  again <- amiss:::attribute_(inside, fit$priors, 0:1, fit$null_setting, control, list(seed = 9, threads = 1))
+  difference <- own$value - (fit$history$log_evidence - again$log_evidence_dropped)
+  # Four standard errors of both.
+  expect_true(all(abs(difference) < 4 * sqrt(own$standard_error^2 + fit$history$standard_error^2 + again$standard_error^2)))
+  expect_gt(diff(range(own$value)), 0.2)  # the two conditions do differ
+})

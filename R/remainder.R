@@ -1,0 +1,50 @@
+# What a model leaves of the calibration record, beside the stated noise, and whether the calendar shows in it: a pattern
+# that no boundary condition carries is of the clock (something at fixed hours) or of time itself (a drift).
+
+large_remainder <- 1.5  # times the stated noise: autocorrelated noise of the stated size stays below it
+
+remaining_error <- function(model, measurements) {
+  p <- model$prediction[model$prediction$use == "calibrate", ]
+  r <- p$observed - p$mean
+  # As in error_sd(): fitted coefficients do not count as agreement.
+  q <- ncol(model$fit$emulator$basis$vectors)
+  ratio <- sqrt(sum(r^2) / max(1, length(r) - q)) / measurements$noise_sd
+  list(ratio = ratio, large = ratio > large_remainder,
+       pattern = if (ratio > large_remainder) remainder_pattern(r, model$fit$rows, measurements))
+}
+
+# In words; NULL if the calendar explains less than half.
+remainder_pattern <- function(r, rows, measurements) {
+  hours <- measurements$hours[rows]
+  clock <- clock_hour(measurements$time[rows])
+  shares <- c(drift = drift_share(r, hours), daily = daily_share(r, hours, clock))
+  best <- which.max(shares)
+  if (!shares[best] > 0.5) return(NULL)
+  if (names(shares)[best] == "drift") {
+    ends <- stats::fitted(stats::lm(r ~ stats::poly(hours, 2)))[c(1, length(r))]
+    return(sprintf("it drifts, by %s %s from the first to the last step", signed(unname(diff(ends))), pretty_unit(measurements$unit)))
+  }
+  profile <- tapply(r, clock, mean) - mean(r)
+  peak <- as.numeric(names(profile)[which.max(abs(profile))])
+  sprintf("it comes back every day, most of it around %02d:%02d", floor(peak), round(60 * (peak %% 1)))
+}
+
+# Hour of the day as the record's own clock shows it.
+clock_hour <- function(time) {
+  if (!inherits(time, "POSIXct")) return(round(as.numeric(time) %% 24, 4))
+  parts <- as.POSIXlt(time)
+  round(parts$hour + parts$min / 60, 4)
+}
+
+# Share of the sum of squares about the mean that a parabola in time explains.
+drift_share <- function(r, hours) {
+  if (length(r) < 10) return(0)
+  summary(stats::lm(r ~ stats::poly(hours, 2)))$r.squared
+}
+
+# Share of the variance that a profile over the day explains, adjusted for its number of values; three days at least.
+daily_share <- function(r, hours, clock) {
+  bin <- factor(clock)
+  if (diff(range(hours)) < 72 || nlevels(bin) < 4 || length(r) <= 2 * nlevels(bin)) return(0)
+  summary(stats::lm(r ~ bin))$adj.r.squared
+}
