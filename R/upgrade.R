@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibration = list(), attribution = list(), margin = 3,
+upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
@@ -17,7 +17,7 @@ upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibrat
 #' @param runs Runs of the simulator for each model.
 #' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
-#'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (3, in decades).
+#'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
 #' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
@@ -165,7 +165,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
     fits[[name]] <- calibrate_fully(fits[[name]], paste(current$name, "+", name), settings)
     report_candidate(paste(name, "in full"), fits[[name]], current, say)
   }
-  list(fits = fits, table = candidate_table(fits, current, screened = !names(fits) %in% full))
+  list(fits = fits, table = trial_table(fits, current, screened = !names(fits) %in% full))
 }
 
 report_candidate <- function(what, fit, current, say) {
@@ -180,7 +180,7 @@ contenders <- function(fits, reference, control) {
   names(fits)[reach >= max(bf$log10_bf, control$decisive)]
 }
 
-candidate_table <- function(fits, current, screened) {
+trial_table <- function(fits, current, screened) {
   rows <- lapply(names(fits), function(name) {
     row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], current$fit), trusted = fits[[name]]$trust$trusted)
     row$parameters <- list(added_parameters(fits[[name]], current$fit))

@@ -364,7 +364,8 @@ TEST(DefensiveTarget, ReferenceTimesLikelihoodIsTheSamePosterior) {
   closer.log_likelihood(x, closer_slope);
   for (Index i = 0; i < 6; ++i) {
     const VectorXd at = x.col(i);
-    EXPECT_NEAR(other[i] + closer.log_reference(at), own[i] + target.log_reference(at), 1e-10 * std::abs(own[i]));
+    EXPECT_NEAR(other[i] + closer.log_reference(at), own[i] + target.log_reference(at),
+                1e-10 * std::abs(own[i]));
     const VectorXd sum = closer_slope.col(i) + closer.reference_gradient(at);
     EXPECT_NEAR((sum - slope.col(i) - target.reference_gradient(at)).norm(), 0.0, 1e-10 * slope.norm());
     for (Index j = 0; j < 4; ++j) {
@@ -396,7 +397,8 @@ TEST(DefensiveTarget, DrawsHaveTheStatedDensity) {
 TEST(DefensiveTarget, AWrongGuessDoesNotMoveTheEvidence) {
   const LinearGaussian model(3, 0.3);
   const FunctionTarget target = model.target();
-  const StudentTMixture wrong({StudentT(model.mean().array() + 2.0, 0.1 * MatrixXd::Identity(3, 3), 8.0)}, {1.0});
+  const StudentTMixture wrong({StudentT(model.mean().array() + 2.0, 0.1 * MatrixXd::Identity(3, 3), 8.0)},
+                              {1.0});
   const AisResult result = sample_ais(DefensiveTarget(target, wrong), {}, seeded(26));
   EXPECT_TRUE(result.trusted) << result.verdict;
   expect_evidence(result, model.log_evidence());

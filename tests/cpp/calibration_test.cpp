@@ -202,19 +202,48 @@ TEST(ParameterModes, AreThoseOfAFineGrid) {
   const HistoryParameters point = history.parameters(VectorXd::Zero(1));
   const MatrixXd grid = Eigen::RowVectorXd::LinSpaced(4001, -4.0, 4.0);
   MatrixXd mean, variance;
-  emulator.predict(target.unit((MatrixXd(2, 4001) << MatrixXd::Zero(1, 4001), grid).finished()), mean, variance);
+  emulator.predict(target.unit((MatrixXd(2, 4001) << MatrixXd::Zero(1, 4001), grid).finished()), mean,
+                   variance);
   VectorXd exact(4001), fitted(4001);
   Stream stream(1, 2, 3);
-  long evaluations = 0;
-  const StudentTMixture modes = parameter_modes(target, {point}, {}, stream, evaluations);
-  EXPECT_GT(evaluations, 256);
+  const ParameterModes modes = parameter_modes(target, {point}, {}, stream);
+  EXPECT_GT(modes.evaluations, 256);
   for (Index i = 0; i < 4001; ++i) {
     exact[i] = target.log_density_inside(point, mean.row(i), variance.row(i)) - 0.5 * grid(0, i) * grid(0, i);
-    fitted[i] = modes.log_density(grid.col(i));
+    fitted[i] = modes.mixture.log_density(grid.col(i));
   }
   const VectorXd p = normalised_exp(exact), q = normalised_exp(fitted);
   // The weights p / q have a second moment of 1 / (effective share); the widened t gives up a few tenths.
   EXPECT_LT((p.array().square() / q.array()).sum(), 1.6);
+}
+
+TEST(ParameterModes, TellWhereTheRecordContradictsTheHistoryPosterior) {
+  const Emulator emulator = make_emulator(1);
+  const HistoryModel model = make_model({});
+  const HistoryTarget history(model, {});
+  const CalibrationTarget target(history, make_reference(1, 1.0), emulator);
+  const HistoryParameters point = history.parameters(VectorXd::Zero(1));
+  Stream stream(1, 2, 3);
+  const ParameterModes near = parameter_modes(target, {point}, {}, stream);
+  EXPECT_LT(near.misfit, 3.0);
+  // Misfit at the mode, written down: one parameter, two coefficients.
+  MatrixXd mean, variance;
+  double least = 0.0, best = -1e300;
+  for (double x = -4.0; x <= 4.0; x += 0.002) {
+    emulator.predict(MatrixXd::Constant(1, 1, cdf_normal(x)), mean, variance);
+    const double density = target.log_density_inside(point, mean.row(0), variance.row(0)) - 0.5 * x * x;
+    if (density <= best) continue;
+    best = density;
+    const VectorXd apart = target.estimate(point) - mean.row(0).transpose();
+    least = apart.dot(target.covariance_inside(point, variance.row(0)).llt().solve(apart)) / 2.0;
+  }
+  EXPECT_NEAR(near.misfit, least, 0.05 * (1.0 + least));
+  HistoryData far = make_data();
+  far.y.array() += 100.0;  // no parameter reaches there
+  const HistoryModel other(far, model.priors(), Context());
+  const HistoryTarget elsewhere(other, {});
+  const CalibrationTarget lost(elsewhere, make_reference(1, 1.0), emulator);
+  EXPECT_GT(parameter_modes(lost, {point}, {}, stream).misfit, 100.0);
 }
 
 TEST(CalibrationTarget, AnnealingFromTheModesGivesTheSameEvidenceForLess) {
@@ -231,7 +260,8 @@ TEST(CalibrationTarget, AnnealingFromTheModesGivesTheSameEvidenceForLess) {
   EXPECT_LT(closer.ladder.size(), plain.ladder.size());
   // Likelihoods are told as seen from the target's own reference.
   const VectorXd again = target.log_likelihood(closer.draws.leftCols(20));
-  for (Index i = 0; i < 20; ++i) EXPECT_NEAR(closer.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
+  for (Index i = 0; i < 20; ++i)
+    EXPECT_NEAR(closer.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
 }
 
 }  // namespace

@@ -52,7 +52,8 @@ double CalibrationTarget::log_reference(const VectorXd& x) const {
          log_standard_normal(x.tail(emulator_.n_inputs()));
 }
 
-MatrixXd CalibrationTarget::covariance_inside(const HistoryParameters& point, const VectorXd& variance) const {
+MatrixXd CalibrationTarget::covariance_inside(const HistoryParameters& point,
+                                              const VectorXd& variance) const {
   MatrixXd covariance = point.variance * unit_covariance_[point.setting];
   covariance.diagonal() += variance;
   return covariance;
@@ -89,6 +90,7 @@ namespace {
 
 constexpr std::uint64_t kReference = 64;  // purpose of the streams below; the sampler's are smaller
 constexpr int kHistoryPoints = 4;         // at which the modes of the parameters are sought
+constexpr double kContradiction = 3.0;    // misfit per basis vector from which the modes mislead
 
 // n points of equal weight, evenly spread over weighted ones.
 std::vector<HistoryParameters> spread_points(const HistoryTarget& target, const AisResult& result, int n) {
@@ -96,8 +98,7 @@ std::vector<HistoryParameters> spread_points(const HistoryTarget& target, const 
   double cumulative = 0.0;
   for (Index i = 0; i < result.weights.size(); ++i) {
     cumulative += result.weights[i];
-    while (static_cast<int>(points.size()) < n &&
-           cumulative * n > static_cast<double>(points.size()) + 0.5)
+    while (static_cast<int>(points.size()) < n && cumulative * n > static_cast<double>(points.size()) + 0.5)
       points.push_back(target.parameters(result.draws.col(i)));
   }
   return points;
@@ -105,15 +106,19 @@ std::vector<HistoryParameters> spread_points(const HistoryTarget& target, const 
 
 }  // namespace
 
-AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history, const AisOptions& options,
-                             const Context& context) {
+AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history,
+                             const AisOptions& options, const Context& context) {
   Stream stream(context.seed, kReference, 0);
-  long evaluations = 0;
-  const StudentTMixture modes = parameter_modes(target, spread_points(target.history_target(), history, kHistoryPoints),
-                                                ModeOptions(), stream, evaluations);
-  const DefensiveTarget closer(target, modes, target.history_target().dimension());
+  const ParameterModes modes = parameter_modes(
+      target, spread_points(target.history_target(), history, kHistoryPoints), ModeOptions(), stream);
+  if (!(modes.misfit < kContradiction)) {
+    AisResult result = sample_ais(target, options, context);
+    result.evaluations += modes.evaluations;
+    return result;
+  }
+  const DefensiveTarget closer(target, modes.mixture, target.history_target().dimension());
   AisResult result = sample_ais(closer, options, context);
-  result.evaluations += evaluations;
+  result.evaluations += modes.evaluations;
   for (Index i = 0; i < result.log_likelihood.size(); ++i)  // as seen from the target's own reference
     result.log_likelihood[i] += closer.log_ratio(result.draws.col(i));
   return result;

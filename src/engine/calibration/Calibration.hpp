@@ -54,8 +54,9 @@ class CalibrationTarget : public Target {
   std::vector<Eigen::MatrixXd> unit_covariance_;  // (R'R)^-1 of each error setting
 };
 
-/// The joint posterior, annealed from the history posterior times the modes of the parameters (parameter_modes()).
-AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history, const AisOptions& options,
-                             const Context& context);
+/// The joint posterior, annealed from the history posterior times the modes of the parameters
+/// (parameter_modes()); from their prior where no parameters agree with the history posterior.
+AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history,
+                             const AisOptions& options, const Context& context);
 
 }  // namespace amiss

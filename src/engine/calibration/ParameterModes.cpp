@@ -24,6 +24,7 @@ struct Mode {
   VectorXd location;
   MatrixXd precision;
   double log_mass = 0.0;  // of the Gaussian that touches the density at the mode
+  double misfit = 0.0;    // (estimate - w')'C^-1 (estimate - w')
 };
 
 // The density of the parameters for one point of the history posterior.
@@ -40,8 +41,8 @@ class Conditional {
     return values;
   }
 
-  // Value, gradient (central differences) and Gauss-Newton precision at x.
-  double expand(const VectorXd& x, VectorXd& gradient, MatrixXd& precision) const {
+  // Value, gradient (central differences), Gauss-Newton precision and misfit at x.
+  double expand(const VectorXd& x, VectorXd& gradient, MatrixXd& precision, double& misfit) const {
     const Index d = x.size();
     MatrixXd points(d, 2 * d + 1), mean, variance;
     points.colwise() = x;
@@ -54,20 +55,23 @@ class Conditional {
                      at(points.col(d + i), mean.row(d + i), variance.row(d + i))) /
                     (2.0 * kDifference);
     }
-    const MatrixXd slope = (mean.topRows(d) - mean.middleRows(d, d)).transpose() / (2.0 * kDifference);  // Q x d
+    const MatrixXd slope =
+        (mean.topRows(d) - mean.middleRows(d, d)).transpose() / (2.0 * kDifference);  // Q x d
     const MatrixXd covariance = target_.covariance_inside(point_, variance.row(2 * d));
     const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::LLT<MatrixXd> factor(scale.asDiagonal() * covariance * scale.asDiagonal());
     const MatrixXd white = factor.matrixL().solve(scale.asDiagonal() * slope);
     precision = white.transpose() * white;
     precision.diagonal().array() += 1.0;
+    const VectorXd apart = target_.estimate(point_) - mean.row(2 * d).transpose();
+    misfit = factor.matrixL().solve(scale.cwiseProduct(apart)).squaredNorm();
     return at(x, mean.row(2 * d), variance.row(2 * d));
   }
 
   Mode climb(VectorXd x, int max_iterations) const {
     VectorXd gradient;
     MatrixXd precision;
-    double value = expand(x, gradient, precision), damping = 1e-2;
+    double misfit = 0.0, damping = 1e-2, value = expand(x, gradient, precision, misfit);
     for (int iteration = 0; iteration < max_iterations && damping < 1e8; ++iteration) {
       MatrixXd damped = precision;
       damped.diagonal() *= 1.0 + damping;
@@ -80,11 +84,11 @@ class Conditional {
       const bool settled = there - value < kSettled;
       x = moved;
       damping = std::max(1e-6, 0.1 * damping);
-      value = expand(x, gradient, precision);
+      value = expand(x, gradient, precision, misfit);
       if (settled) break;
     }
     const Eigen::LLT<MatrixXd> factor(precision);
-    return {x, precision, value - factor.matrixLLT().diagonal().array().log().sum()};
+    return {x, precision, value - factor.matrixLLT().diagonal().array().log().sum(), misfit};
   }
 
  private:
@@ -110,8 +114,10 @@ bool same(const Mode& a, const Mode& b) {
 
 }  // namespace
 
-StudentTMixture parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
-                                const ModeOptions& options, Stream& stream, long& evaluations) {
+ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
+                               const ModeOptions& options, Stream& stream) {
+  long evaluations = 0;
+  double misfit = 0.0;
   const MatrixXd starts = stream.normals(target.emulator().n_inputs(), options.starts);
   std::vector<Mode> modes;
   std::vector<double> shares;
@@ -129,10 +135,15 @@ StudentTMixture parameter_modes(const CalibrationTarget& target, const std::vect
         found.push_back(std::move(mode));
     }
     VectorXd log_mass(static_cast<Index>(found.size()));
+    double least = std::numeric_limits<double>::infinity();
+    for (const Mode& mode : found) least = std::min(least, mode.misfit);
+    misfit += least / static_cast<double>(points.size() * target.emulator().n_outputs());
     for (std::size_t k = 0; k < found.size(); ++k) log_mass[static_cast<Index>(k)] = found[k].log_mass;
     for (std::size_t k = 0; k < found.size(); ++k) {
-      const double share = normalised_exp(log_mass)[static_cast<Index>(k)] / static_cast<double>(points.size());
-      const auto known = std::find_if(modes.begin(), modes.end(), [&](const Mode& m) { return same(m, found[k]); });
+      const double share =
+          normalised_exp(log_mass)[static_cast<Index>(k)] / static_cast<double>(points.size());
+      const auto known =
+          std::find_if(modes.begin(), modes.end(), [&](const Mode& m) { return same(m, found[k]); });
       if (known != modes.end()) {
         shares[static_cast<std::size_t>(known - modes.begin())] += share;
       } else {
@@ -151,10 +162,11 @@ StudentTMixture parameter_modes(const CalibrationTarget& target, const std::vect
     weights.push_back(0.5 * shares[k] / total + 0.5 / static_cast<double>(modes.size()));
   }
   if (components.empty()) {  // nowhere is the record possible: the prior stands
-    components.emplace_back(VectorXd::Zero(starts.rows()), MatrixXd::Identity(starts.rows(), starts.rows()), options.dof);
+    components.emplace_back(VectorXd::Zero(starts.rows()), MatrixXd::Identity(starts.rows(), starts.rows()),
+                            options.dof);
     weights.push_back(1.0);
   }
-  return StudentTMixture(std::move(components), std::move(weights));
+  return {StudentTMixture(std::move(components), std::move(weights)), misfit, evaluations};
 }
 
 }  // namespace amiss

@@ -15,8 +15,16 @@ struct ModeOptions {
 ///     log N(estimate; w'(z), C) + log N(x; 0, I),   C = S(z) + sigma^2 (R'R)^-1,  z = Phi(x),
 /// by the Levenberg-Marquardt method, each with the Gauss-Newton covariance (W'C^-1 W + I)^-1, W = dw'/dx.
 /// A Student-t mixture with one component for each distinct mode; weights half from the Laplace
-/// approximation of its mass, half equal. `evaluations` counts the emulated points.
-StudentTMixture parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
-                                const ModeOptions& options, Stream& stream, long& evaluations);
+/// approximation of its mass, half equal.
+struct ParameterModes {
+  StudentTMixture mixture;
+  /// (estimate - w')'C^-1 (estimate - w') / Q at the best mode, mean over the points. Far above one, the
+  /// record contradicts the history posterior whatever the parameters: the joint posterior lies elsewhere.
+  double misfit;
+  long evaluations;  ///< emulated points
+};
+
+ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
+                               const ModeOptions& options, Stream& stream);
 
 }  // namespace amiss
