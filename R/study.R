@@ -202,7 +202,7 @@ result_list.amiss_upgrade <- function(x) {
   candidate_list <- function(i) {
     row <- x$candidates[i, ]
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
-         probability = row$probability, trusted = row$trusted, parameters = table_rows(row$parameters[[1]]))
+         probability = row$probability, trusted = row$trusted, screened = row$screened, parameters = table_rows(row$parameters[[1]]))
   }
   cause <- x$named_cause
   if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
