@@ -1,7 +1,8 @@
 #!/usr/bin/env Rscript
 # Hidden-effect benchmark: Rscript bench/hidden_effects.R --worlds N --seed S --out FILE [--workers N]
-# Worlds S, S+1, ... are drawn, scored and written as JSON. Each finished world is kept in FILE.worlds/, so that a
-# stopped run goes on where it was. Work goes through the user's future plan if --workers is not given.
+# Worlds S, S+1, ... are drawn, scored and written as JSON, with two figures beside it (FILE-detection.png and
+# FILE-confusion.png). Each finished world is kept in FILE.worlds/, so that a stopped run goes on where it was; worlds
+# that failed are tried again. Work goes through the user's future plan if --workers is not given.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -13,9 +14,10 @@ suppressPackageStartupMessages(library(amiss))
 
 keep <- paste0(out, ".worlds")
 dir.create(keep, showWarnings = FALSE, recursive = TRUE)
-one_world <- function(seed, here, keep) {
+one_world <- function(seed, here, keep, worlds) {
   file <- file.path(keep, sprintf("%09d.rds", seed))
-  if (file.exists(file)) return(readRDS(file))
+  kept <- if (file.exists(file)) readRDS(file)
+  if (!is.null(kept) && is.null(kept$error)) return(kept)
   suppressPackageStartupMessages(library(amiss))
   scope <- new.env(parent = globalenv())
   for (part in c("worlds.R", "score.R")) sys.source(file.path(here, "hidden_effects", part), scope)
@@ -23,17 +25,20 @@ one_world <- function(seed, here, keep) {
   part <- tempfile("part-", keep)
   saveRDS(row, part)
   file.rename(part, file)
-  message(sprintf("world %d: %s x%g, named %s", seed, row$kind, row$strength, row$mechanism))
+  said <- if (is.null(row$error)) sprintf("%s x%g: %s %s", row$kind, row$strength, row$verdict, row$mechanism) else row$error
+  message(sprintf("%d of %d, world %d, %s", length(list.files(keep, "rds$")), worlds, seed, said))
   row
 }
 
 if (!is.null(workers)) future::plan(future::multisession, workers = as.integer(workers))
 seeds <- first + seq_len(worlds) - 1L
-rows <- future.apply::future_lapply(seeds, one_world, here = normalizePath(here), keep = normalizePath(keep), future.seed = NULL, future.scheduling = Inf)
+rows <- future.apply::future_lapply(seeds, one_world, here = normalizePath(here), keep = normalizePath(keep), worlds = worlds, future.seed = NULL, future.scheduling = Inf)
 scope <- new.env(parent = globalenv())
-for (part in c("worlds.R", "score.R")) sys.source(file.path(here, "hidden_effects", part), scope)
+for (part in c("worlds.R", "score.R", "figures.R")) sys.source(file.path(here, "hidden_effects", part), scope)
 failed <- Filter(function(r) !is.null(r$error), rows)
-rates <- scope$score_rates(Filter(function(r) is.null(r$error), rows))
-write_rows(list(worlds = rows, failed = length(failed), rates = rates), out)
+scored <- Filter(function(r) is.null(r$error), rows)
+rates <- scope$score_rates(scored)
+write_rows(list(worlds = rows, failed = length(failed), rates = rates, means = scope$score_means(scored)), out)
+if (length(scored)) scope$write_figures(scored, out)
 for (name in names(rates)) cat(sprintf("%-22s %5.1f %% of %d [%.0f, %.0f]\n", name, 100 * rates[[name]]$rate, rates[[name]]$n, 100 * rates[[name]]$lower95, 100 * rates[[name]]$upper95))
 if (length(failed)) cat(length(failed), "worlds failed:", failed[[1]]$error, "\n")

@@ -103,12 +103,26 @@ score_rates <- function(rows) {
   none <- pick(function(r) r$kind == "none")
   outside <- pick(function(r) r$kind %in% outside_kinds)
   both <- pick(function(r) r$kind == "two effects" && r$achieved >= 1.95)
-  list(right_mechanism = rate(flags(strong, named_right)), right_condition = rate(flags(strong, condition_right)),
-       detection_at_1 = rate(flags(one, named_right)), parameter_covered = rate(flags(strong, function(r) r$covered)),
-       false_condition = rate(flags(none, function(r) !is.na(r$condition))), false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
-       outside_blamed = rate(flags(outside, function(r) r$verdict == "named")), outside_unexplained = rate(flags(outside, function(r) r$unexplained)),
-       both_found = rate(flags(both, function(r) all(r$true_mechanism %in% r$adopted))),
-       correlation_condition = rate(flags(strong, function(r) condition_right(r, "correlation_condition"))),
-       forest_condition = rate(flags(strong, function(r) condition_right(r, "forest_condition"))),
-       ard_condition = rate(flags(strong, function(r) condition_right(r, "ard_condition"))))
+  weak <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved < 0.8)
+  rivals <- c("condition", "attributed_condition", "paper_condition", "correlation_condition", "forest_condition", "ard_condition")
+  right <- lapply(stats::setNames(rivals, paste0("right_", rivals)), function(rule) rate(flags(strong, function(r) condition_right(r, rule))))
+  c(list(right_mechanism = rate(flags(strong, named_right))), right,
+    list(detection_at_1 = rate(flags(one, named_right)), detection_below_1 = rate(flags(weak, named_right)),
+         parameter_covered = rate(flags(strong, function(r) r$covered)),
+         false_condition = rate(flags(none, function(r) !is.na(r$condition))), false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
+         false_paper_condition = rate(flags(none, function(r) !is.na(r$paper_condition))),
+         outside_blamed = rate(flags(outside, function(r) r$verdict == "named")),
+         outside_unexplained = rate(flags(Filter(function(r) r$achieved >= 1.95, outside), function(r) r$unexplained)),
+         both_found = rate(flags(both, function(r) all(r$true_mechanism %in% r$adopted)))))
+}
+
+# Means, with their standard errors: held-out error removed, as a share of what knowing the truth would remove, and time.
+score_means <- function(rows) {
+  strong <- Filter(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95, rows)
+  of <- function(rows, field) {
+    v <- vapply(rows, function(r) as.numeric(r[[field]]), 0)
+    v <- v[is.finite(v)]
+    list(mean = mean(v), standard_error = stats::sd(v) / sqrt(length(v)), median = stats::median(v), n = length(v))
+  }
+  list(gain_share = of(strong, "gain_share"), wall_s = of(rows, "wall_s"))
 }
