@@ -43,8 +43,8 @@ last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$a
 significant_conditions <- function(table) table$boundary[table$significant]
 
 # A cause is named outright when it holds at least 95 % of the probability among all that was tried, when its estimate
-# is sound or decisive even at its lower end, when data held out do not speak against it, and when it leaves less than it
-# takes away.
+# is sound or decisive even at its lower end, when data held out do not speak against it, and when little is left of
+# what it is to explain.
 diagnosis_verdict <- function(upgrade) {
   cause <- upgrade$named_cause
   if (is.null(cause)) {
@@ -73,14 +73,15 @@ cause_doubts <- function(upgrade) {
   c(if (best$probability < 0.95) "others are possible",
     if (rough && best$lower95 < upgrade$control$decisive) "the estimate is rough",
     if (!improves_held_out(upgrade)) "not confirmed by held-out data",
-    if (most_remains(upgrade)) "most of the error remains")
+    if (much_remains(upgrade)) "a good part of the error remains")
 }
 
-# TRUE where the last model's error is still large and the mechanisms took away less than half of what exceeds the noise.
-most_remains <- function(upgrade) {
+# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The mechanism
+# that made the error leaves nothing; one that imitates it does.
+much_remains <- function(upgrade) {
   ends <- lapply(upgrade$models[c(1, length(upgrade$models))], remaining_error, upgrade$measurements)
   excess <- vapply(ends, function(e) e$ratio^2 - 1, 0)
-  ends[[2]]$large && excess[2] > 0.5 * excess[1]
+  ends[[2]]$large && excess[2] > 0.1 * excess[1]
 }
 
 # FALSE where data were held out and the change does not lower their error by at least 3 %.

@@ -53,13 +53,13 @@ test_that("a large error that answers to nothing makes the verdict unexplained",
   expect_equal(amiss:::diagnosis_verdict(upgrade)$verdict, "nothing")
 })
 
-test_that("a cause that leaves most of the error is only likely", {
+test_that("a cause that leaves a good part of the error is only likely", {
   upgrade <- small_upgrade()
   p <- upgrade$models[[2]]$prediction
   # Both models as they were, plus an error that neither explains.
   extra <- withr::with_seed(1, rnorm(nrow(p), 0, 5))
   for (k in 1:2) upgrade$models[[k]]$prediction$observed <- upgrade$models[[k]]$prediction$observed + extra
-  expect_true(amiss:::most_remains(upgrade))
-  expect_false(amiss:::most_remains(small_upgrade()))
-  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "most of the error remains")
+  expect_true(amiss:::much_remains(upgrade))
+  expect_false(amiss:::much_remains(small_upgrade()))
+  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a good part of the error remains")
 })
