@@ -38,7 +38,11 @@ for (part in c("worlds.R", "score.R", "figures.R")) sys.source(file.path(here, "
 failed <- Filter(function(r) !is.null(r$error), rows)
 scored <- Filter(function(r) is.null(r$error), rows)
 rates <- scope$score_rates(scored)
-write_rows(list(worlds = rows, failed = length(failed), rates = rates, means = scope$score_means(scored)), out)
+as_arrays <- function(row) {  # also where there is one value, or none
+  for (name in intersect(names(row), c("true_boundary", "true_mechanism", "adopted", "rmse"))) row[[name]] <- as.list(row[[name]])
+  row
+}
+write_rows(list(worlds = lapply(rows, as_arrays), failed = length(failed), rates = rates, means = scope$score_means(scored)), out)
 if (length(scored)) scope$write_figures(scored, out)
-for (name in names(rates)) cat(sprintf("%-22s %5.1f %% of %d [%.0f, %.0f]\n", name, 100 * rates[[name]]$rate, rates[[name]]$n, 100 * rates[[name]]$lower95, 100 * rates[[name]]$upper95))
+for (name in names(rates)) cat(sprintf("%-28s %5.1f %% of %d [%.0f, %.0f]\n", name, 100 * rates[[name]]$rate, rates[[name]]$n, 100 * rates[[name]]$lower95, 100 * rates[[name]]$upper95))
 if (length(failed)) cat(length(failed), "worlds failed:", failed[[1]]$error, "\n")

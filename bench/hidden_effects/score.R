@@ -11,7 +11,7 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
   attributed <- attributed_condition(upgrade)
   verdict <- amiss:::diagnosis_verdict(upgrade)
   row <- list(seed = world$seed, kind = world$kind, strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1,
-              days = world$days, true_boundary = unique(unlist(true_boundary[world$kinds], use.names = FALSE)),
+              days = world$days, true_boundary = as.character(unique(unlist(true_boundary[world$kinds], use.names = FALSE))),
               true_mechanism = intersect(world$kinds, catalogue_kinds), condition = told_condition(upgrade, attributed),
               attributed_condition = attributed, mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
               verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
