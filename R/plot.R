@@ -171,7 +171,11 @@ short_axis <- function(x) {
   else format_each(x)
 }
 
-percent <- function(x) ifelse(is.na(x), "\u2013", ifelse(x > 0.999, "over 99.9 %", ifelse(x < 0.001, "below 0.1 %", paste(formatC(100 * x, digits = 2, format = "fg"), "%"))))
+percent <- function(x) {
+  digits <- trimws(formatC(100 * x, digits = 2, format = "fg"))
+  text <- ifelse(x > 0.999, "over 99.9 %", ifelse(x > 0.99, "over 99 %", ifelse(x < 0.001, "below 0.1 %", paste(digits, "%"))))
+  ifelse(is.na(x), "\u2013", text)
+}
 
 listed <- function(x, none = "nothing") {
   if (!length(x)) none else if (length(x) == 1) x else paste(paste(x[-length(x)], collapse = ", "), "and", x[length(x)])
@@ -426,8 +430,9 @@ leading_layer <- function(leading, table, panels) {
   ggplot2::geom_line(ggplot2::aes(y = .data$value, group = .data$part), series, colour = "grey25", linewidth = 0.7)
 }
 
-response_title <- function(binned, name) {
+response_title <- function(binned, name, noise) {
   swing <- vapply(split(binned$residual, binned$stage), function(r) diff(range(r)), 0)
+  if (all(swing < 2 * noise)) return(paste("The error hardly depends on", name))
   if (length(swing) < 2) return(paste("How the error changes with", name))
   if (swing[2] < 0.7 * swing[1]) paste("The error depends on", name, "before the change, and less after it")
   else paste("The error depends on", name, "about as much after the change as before")
@@ -448,7 +453,7 @@ figure_response <- function(upgrade, classes = 10) {
     ggplot2::geom_line(linewidth = 1.2) +
     ggplot2::geom_point(size = 3.6) +
     stage_scales() +
-    figure_titles(response_title(binned, leading$name), paste0("Small points: every time step. Large points: means over classes of ", leading$name, "."),
+    figure_titles(response_title(binned, leading$name, m$noise_sd), paste0("Small points: every time step. Large points: means over classes of ", leading$name, "."),
                   x = leading$name, y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 5)
@@ -501,11 +506,12 @@ figure_gain <- function(upgrade) {
   with_height(figure, 5)
 }
 
-mean_day_title <- function(binned, unit) {
+mean_day_title <- function(binned, unit, noise) {
   stages <- split(binned[binned$use == "calibration", ], binned$stage[binned$use == "calibration"])
   worst <- stages[[1]][which.max(abs(stages[[1]]$residual)), ]
+  if (abs(worst$residual) < noise) return("No time of day stands out from the noise")
   told <- function(r) paste(short(abs(r)), pretty_unit(unit), if (r > 0) "too low" else "too high")
-  title <- sprintf("Around %02d:30 the simulation is on average %s", floor(worst$hour), told(worst$residual))
+  title <- sprintf("In calibration, around %02d:30, the simulation is on average %s", floor(worst$hour), told(worst$residual))
   if (length(stages) < 2) return(title)
   after <- stages[[2]]$residual[stages[[2]]$hour == worst$hour]
   paste0(title, " before, ", told(after), " after")
@@ -525,7 +531,7 @@ figure_mean_day <- function(upgrade) {
     ggplot2::scale_x_continuous(breaks = seq(0, 24, 6), limits = c(0, 24)) +
     ggplot2::facet_wrap(ggplot2::vars(.data$use)) +
     stage_scales() +
-    figure_titles(mean_day_title(binned, m$unit), "Lines: mean of all days. Bands: eight days of ten.", x = "hour of day",
+    figure_titles(mean_day_title(binned, m$unit, m$noise_sd), "Lines: mean of all days. Bands: eight days of ten.", x = "hour of day",
                   y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 4.6)

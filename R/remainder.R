@@ -13,20 +13,25 @@ remaining_error <- function(model, measurements) {
        pattern = if (ratio > large_remainder) remainder_pattern(r, model$fit$rows, measurements))
 }
 
-# In words; NULL if the calendar explains less than half.
+# What it is and where to look, in words; NULL if the calendar explains less than half.
 remainder_pattern <- function(r, rows, measurements) {
   hours <- measurements$hours[rows]
   clock <- clock_hour(measurements$time[rows])
+  unit <- pretty_unit(measurements$unit)
   shares <- c(drift = drift_share(r, hours), daily = daily_share(r, hours, clock))
   best <- which.max(shares)
   if (!shares[best] > 0.5) return(NULL)
   if (names(shares)[best] == "drift") {
     ends <- stats::fitted(stats::lm(r ~ stats::poly(hours, 2)))[c(1, length(r))]
-    return(sprintf("it drifts, by %s %s from the first to the last step", signed(unname(diff(ends))), pretty_unit(measurements$unit)))
+    return(list(what = sprintf("it drifts, by %s %s from the beginning to the end of the calibration", signed(unname(diff(ends))), unit),
+                where = "Suspect a drifting sensor, or something slow that the inputs do not hold."))
   }
-  profile <- tapply(r, clock, mean) - mean(r)
-  peak <- as.numeric(names(profile)[which.max(abs(profile))])
-  sprintf("it comes back every day, most of it around %02d:%02d", floor(peak), round(60 * (peak %% 1)))
+  profile <- tapply(r, clock, mean)
+  peak <- which.max(abs(profile - mean(r)))
+  hour <- as.numeric(names(profile)[peak])
+  list(what = sprintf("every day around %02d:%02d the measured %s is on average %s %s %s than simulated", floor(hour), round(60 * (hour %% 1)),
+                      measurements$target, short(abs(profile[[peak]])), unit, if (profile[[peak]] > 0) "higher" else "lower"),
+       where = "Look for something that follows the clock and is not among the inputs: a heat gain, a schedule, a door.")
 }
 
 # Hour of the day as the record's own clock shows it.

@@ -56,15 +56,21 @@ diagnosis_verdict <- function(upgrade) {
     remainder <- remaining_error(upgrade$models[[1]], upgrade$measurements)
     if (remainder$large) {
       return(list(verdict = "unexplained", tag = "Unexplained",
-                  headline = sprintf("Something is missing from the model that no mechanism of the catalogue explains: an error %s times as large as the stated noise remains; %s.",
-                                     short(remainder$ratio), remainder$pattern %||% "it answers to no boundary condition that was measured")))
+                  headline = sprintf("Something is missing from the model that no mechanism of the catalogue explains: its error is %s times the stated noise; %s.",
+                                     short(remainder$ratio), remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
     }
     return(list(verdict = "nothing", tag = "Nothing decisive",
                 headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition."))
   }
   doubts <- cause_doubts(upgrade)
-  if (!length(doubts)) return(list(verdict = "named", tag = "Cause named", headline = cause$sentence))
-  list(verdict = "likely", tag = paste("Likely cause, but", listed(doubts)), headline = paste("Most likely:", cause$sentence))
+  if (!length(doubts)) return(list(verdict = "named", tag = if (length(upgrade$models) > 2) "Causes named" else "Cause named", headline = cause_headline(upgrade)))
+  list(verdict = "likely", tag = paste("Likely cause, but", listed(doubts)), headline = paste("Most likely:", cause_headline(upgrade)))
+}
+
+# The sentences of all mechanisms adopted.
+cause_headline <- function(upgrade) {
+  told <- vapply(adopted_models(upgrade), function(m) upgrade$catalogue[[m$mechanism]]$sentence, "")
+  paste(c(told[1], if (length(told) > 1) paste("Also:", told[-1])), collapse = " ")
 }
 
 cause_doubts <- function(upgrade) {
@@ -98,17 +104,37 @@ format_each_comma <- function(x) vapply(x, format, "", big.mark = ",", scientifi
 odds <- function(x) paste(power_of_ten(abs(x)), if (x >= 0) "to 1 in favour" else "to 1 against")
 
 evidence_sentence <- function(row) {
-  interval <- c(row$lower95, row$upper95)
-  told <- if (interval[1] >= 0) paste(power_of_ten(interval), collapse = " to ") else paste("log10 of the odds from", paste(signed(interval), collapse = " to "))
-  sprintf("The evidence for %s is %s: odds of %s (95 %% interval: %s).", row$mechanism, row$word, odds(row$log10_bf), told)
+  sprintf("The evidence for %s is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf), odds_interval(c(row$lower95, row$upper95)))
+}
+
+# Left out where both ends read the same.
+odds_interval <- function(interval) {
+  ends <- power_of_ten(abs(interval))
+  if (ends[1] == ends[2]) return("")
+  told <- if (interval[1] >= 0) paste(ends, collapse = " to ")
+  else if (interval[2] <= 0) paste(paste(rev(ends), collapse = " to "), "to 1 against")
+  else paste(ends[1], "to 1 against, to", ends[2], "to 1 in favour")
+  sprintf(" (95 %% interval: %s)", told)
 }
 
 sure_sentences <- function(upgrade) {
   if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
   trials <- first_trials(upgrade)
   best <- trials[1, ]
-  needed <- sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval above zero.", sub(" in favour", "", odds(upgrade$control$decisive)))
-  c(evidence_sentence(best), if (is.null(upgrade$named_cause)) needed, probability_sentence(trials), trust_sentence(upgrade, best))
+  needed <- sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no doubt who gains.", sub(" in favour", "", odds(upgrade$control$decisive)))
+  if (is.null(upgrade$named_cause)) {
+    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed, trust_sentence(upgrade, best)))
+  }
+  later <- vapply(adopted_models(upgrade)[-1], function(m) {
+    evidence_sentence(upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ])
+  }, "")
+  c(evidence_sentence(best), later, probability_sentence(trials), trust_sentence(upgrade, best))
+}
+
+# Only where the size of the error itself says that something is missing.
+missing_sentence <- function(upgrade) {
+  left <- remaining_error(upgrade$models[[1]], upgrade$measurements)
+  if (left$large) sprintf("That something is missing is plain: the error is %s times the stated noise. What it is stays open.", short(left$ratio))
 }
 
 probability_sentence <- function(trials) {
@@ -140,12 +166,13 @@ size_note <- function(upgrade) {
   unit <- pretty_unit(m$unit)
   noise <- sprintf("the stated measurement noise is %s %s", short(m$noise_sd), unit)
   if (length(seen) < 2) return(sprintf("The model's typical error is %s %s; %s.", short(seen), unit, noise))
+  change <- if (length(upgrade$models) > 2) "changes" else "change"
   if (!improves_held_out(upgrade)) {
-    return(sprintf("The change does not improve predictions of data the model has not seen (typical error %s %s before, %s after; %s). Take it as a hint, not as a repair.",
-                   short(held[1]), unit, short(held[2]), noise))
+    return(sprintf("The %s not improve predictions of data the model has not seen (typical error %s %s before, %s after; %s). Take it as a hint, not as a repair.",
+                   if (length(upgrade$models) > 2) "changes do" else "change does", short(held[1]), unit, short(held[2]), noise))
   }
-  if (anyNA(held)) sprintf("With the change the typical error %s; %s.", change_words(seen[1], seen[2], m$unit), noise)
-  else sprintf("With the change the typical error on data the model has not seen %s; %s.", change_words(held[1], held[2], m$unit), noise)
+  if (anyNA(held)) sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit), noise)
+  else sprintf("With the %s the typical error on data the model has not seen %s; %s.", change, change_words(held[1], held[2], m$unit), noise)
 }
 
 adopted_models <- function(upgrade) upgrade$models[-1]
@@ -183,7 +210,16 @@ gain_sentences <- function(upgrade) {
   c(paste0("The typical error (RMSE) ", told(seen), " in calibration", if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
     if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
     sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside, if (anyNA(held)) "calibration" else "held-out",
-            if (inside < 88) ": the band is too narrow" else if (inside == 100) ": the band is rather wide" else ""))
+            if (inside < 88) paste0(": ", narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
+}
+
+# Too few measurements in the band: because the simulation lies to one side of them, or all round.
+narrow_words <- function(upgrade) {
+  p <- upgrade$models[[length(upgrade$models)]]$prediction
+  p <- p[p$use == if (has_validation(upgrade)) "validate" else "calibrate", ]
+  bias <- mean(p$observed - p$mean)
+  if (abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
+  sprintf("the simulation is on average %s %s too %s there", short(abs(bias)), pretty_unit(upgrade$measurements$unit), if (bias > 0) "low" else "high")
 }
 
 remaining_sentences <- function(upgrade) {
@@ -192,11 +228,13 @@ remaining_sentences <- function(upgrade) {
   edge <- rows$label[rows$at_edge]
   last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
   c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers)) else "The remaining error answers to no boundary condition.",
-    if (last$large) sprintf("It is %s times the stated noise%s: either the noise is stated too small, or something else is missing.", short(last$ratio),
-                            if (is.null(last$pattern)) "" else paste0(", and ", last$pattern)),
+    if (last$large) sprintf("In calibration it is %s times the stated noise%s", short(last$ratio),
+                            if (is.null(last$pattern)) ": either the noise is stated too small, or something else is missing."
+                            else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
     if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that they make up for something else.", listed(edge))
     else "No parameter is at the edge of its range.",
-    sprintf("The search stopped because %s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because)))
+    sprintf("The search stopped because %s%s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
+            if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))
 }
 
 scores_table <- function(upgrade) {

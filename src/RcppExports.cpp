@@ -27,12 +27,12 @@ BEGIN_RCPP
 END_RCPP
 }
 // make_basis_
-Rcpp::List make_basis_(const Eigen::Map<Eigen::MatrixXd> outputs, const Rcpp::List& control);
+Rcpp::List make_basis_(const Eigen::MatrixXd& outputs, const Rcpp::List& control);
 RcppExport SEXP _amiss_make_basis_(SEXP outputsSEXP, SEXP controlSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Eigen::Map<Eigen::MatrixXd> >::type outputs(outputsSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type outputs(outputsSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     rcpp_result_gen = Rcpp::wrap(make_basis_(outputs, control));
     return rcpp_result_gen;
@@ -65,12 +65,12 @@ BEGIN_RCPP
 END_RCPP
 }
 // filter_bank_
-Eigen::MatrixXd filter_bank_(const Eigen::Map<Eigen::MatrixXd> x, const Eigen::VectorXd& time_constants, const Eigen::VectorXd& time, const std::vector<bool>& new_segment);
+Eigen::MatrixXd filter_bank_(const Eigen::MatrixXd& x, const Eigen::VectorXd& time_constants, const Eigen::VectorXd& time, const std::vector<bool>& new_segment);
 RcppExport SEXP _amiss_filter_bank_(SEXP xSEXP, SEXP time_constantsSEXP, SEXP timeSEXP, SEXP new_segmentSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Eigen::Map<Eigen::MatrixXd> >::type x(xSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type x(xSEXP);
     Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type time_constants(time_constantsSEXP);
     Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type time(timeSEXP);
     Rcpp::traits::input_parameter< const std::vector<bool>& >::type new_segment(new_segmentSEXP);

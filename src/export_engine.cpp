@@ -1,4 +1,6 @@
-// Conversions between R and the engine: convert, call, convert. Nothing is computed here.
+// Conversions between R and the engine: convert, call, convert. Nothing is computed here. Numbers are copied,
+// never mapped: sums depend in their last bit on how memory is aligned, and only memory of Eigen's is always
+// aligned alike.
 #include "export_convert.h"
 
 #include "engine/attribution/ShapleyShares.hpp"
@@ -83,7 +85,7 @@ Rcpp::DataFrame selection_table(const Emulator& emulator) {
 }  // namespace
 
 // [[Rcpp::export]]
-Rcpp::List make_basis_(const Eigen::Map<Eigen::MatrixXd> outputs, const Rcpp::List& control) {
+Rcpp::List make_basis_(const Eigen::MatrixXd& outputs, const Rcpp::List& control) {
   BasisOptions options;
   options.explained = control["explained"];
   options.noise_sd = control["noise_sd"];
@@ -134,7 +136,7 @@ Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& 
 }
 
 // [[Rcpp::export]]
-Eigen::MatrixXd filter_bank_(const Eigen::Map<Eigen::MatrixXd> x, const Eigen::VectorXd& time_constants,
+Eigen::MatrixXd filter_bank_(const Eigen::MatrixXd& x, const Eigen::VectorXd& time_constants,
                              const Eigen::VectorXd& time, const std::vector<bool>& new_segment) {
   return FilterBank(x, std::vector<int>(static_cast<std::size_t>(x.cols()), 0), time_constants,
                     make_axis(time, new_segment))

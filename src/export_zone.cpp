@@ -125,8 +125,10 @@ Options read_options(const Rcpp::List& from) {
 // [[Rcpp::export]]
 Rcpp::NumericMatrix zone_simulate_(Rcpp::List zones, Rcpp::NumericMatrix drivers, double step_s,
                                    Rcpp::NumericVector hold, Rcpp::List control, int threads) {
-  const Eigen::Map<const Eigen::MatrixXd> data(drivers.begin(), drivers.nrow(), drivers.ncol());
-  const Eigen::Map<const Eigen::VectorXd> held(hold.begin(), hold.size());
+  // Copies: see export_engine.cpp.
+  const Eigen::MatrixXd data =
+      Eigen::Map<const Eigen::MatrixXd>(drivers.begin(), drivers.nrow(), drivers.ncol());
+  const Eigen::VectorXd held = Eigen::Map<const Eigen::VectorXd>(hold.begin(), hold.size());
   const Options options = read_options(control);
   std::vector<Zone> read;
   for (const Rcpp::List zone : zones) read.push_back(read_zone(zone));
@@ -157,8 +159,10 @@ Rcpp::NumericMatrix zone_simulate_(Rcpp::List zones, Rcpp::NumericMatrix drivers
 // [[Rcpp::export]]
 Rcpp::List zone_balance_(Rcpp::List zone, Rcpp::NumericMatrix drivers, double step_s,
                          Rcpp::NumericVector hold, Rcpp::List control) {
-  const Eigen::Map<const Eigen::MatrixXd> data(drivers.begin(), drivers.nrow(), drivers.ncol());
-  const Eigen::Map<const Eigen::VectorXd> held(hold.begin(), hold.size());
+  // Copies: see export_engine.cpp.
+  const Eigen::MatrixXd data =
+      Eigen::Map<const Eigen::MatrixXd>(drivers.begin(), drivers.nrow(), drivers.ncol());
+  const Eigen::VectorXd held = Eigen::Map<const Eigen::VectorXd>(hold.begin(), hold.size());
   const Run run = simulate(read_zone(zone), data, step_s, held, read_options(control));
   const EnergyBalance& balance = run.balance;
   Rcpp::NumericVector through(balance.through.begin(), balance.through.end());

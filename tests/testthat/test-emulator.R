@@ -138,3 +138,25 @@ test_that("priors of the hyper-parameters can be changed, within reason", {
   expect_error(train(selection = "backward"), "control\\$selection.*backward", class = "amiss_error_input")
   expect_error(train(selection = "forward", significance = 2), "significance", class = "amiss_error_input")
 })
+
+test_that("the bits do not depend on where R keeps the runs", {
+  m <- linear_measurements()
+  runs <- simulate_design(linear_simulator(), m, runs = 30, seed = 1)
+  control <- c(amiss:::emulator_control, noise_sd = 0.1)
+  first <- amiss:::make_basis_(runs$outputs, control)
+  kept <- list()
+  for (i in 1:24) {  # copies land at other addresses, some aligned in another way
+    kept[[i]] <- list(numeric(i), runs$outputs + 0)
+    expect_identical(amiss:::make_basis_(kept[[i]][[2]], control), first)
+  }
+  zone <- paper_box("M2")
+  data <- synthetic_weather(2, seed = 1)
+  data$RHP <- 50
+  values <- t(vapply(zone_parameters(zone), function(p) 0.5 * (p$prior$lower + p$prior$upper), 0))
+  drivers <- as.matrix(data[setdiff(names(data), "hour")])
+  air <- simulate_zone(zone, values, drivers, step_s = 900)
+  for (i in 1:24) {
+    kept[[i]] <- list(numeric(i), drivers + 0)
+    expect_identical(simulate_zone(zone, values, kept[[i]][[2]], step_s = 900), air)
+  }
+})

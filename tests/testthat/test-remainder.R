@@ -1,5 +1,5 @@
 model_of <- function(r, hours = seq_along(r), noise = 1, time = hours) {
-  m <- list(hours = hours, time = time, noise_sd = noise, unit = "K")
+  m <- list(hours = hours, time = time, noise_sd = noise, unit = "K", target = "Ti")
   model <- list(prediction = data.frame(use = "calibrate", observed = r, mean = 0),
                 fit = list(rows = seq_along(r), emulator = list(basis = list(vectors = matrix(0, length(r), 2)))))
   amiss:::remaining_error(model, m)
@@ -20,9 +20,9 @@ test_that("what comes back every day is told with its hour, what drifts with its
   noise <- withr::with_seed(1, rnorm(240))
   door <- model_of(noise - 8 * (hours %% 24 == 10), hours)
   expect_true(door$large)
-  expect_match(door$pattern, "every day, most of it around 10:00")
+  expect_match(door$pattern$what, "every day around 10:00 the measured Ti is on average [78].* K lower than simulated")
   drift <- model_of(noise + 8 * (hours / 240)^2 - 3, hours)
-  expect_match(drift$pattern, "it drifts, by \\+[78].*K from the first")
+  expect_match(drift$pattern$what, "it drifts, by \\+[78].*K from the beginning")
   expect_null(model_of(3 * noise, hours)$pattern)
 })
 
@@ -31,7 +31,7 @@ test_that("the hour is that of the record's clock", {
   hour <- as.POSIXlt(time)$hour
   noise <- withr::with_seed(1, rnorm(240))
   left <- model_of(noise + 8 * (hour == 7), as.numeric(time) / 3600, time = time)
-  expect_match(left$pattern, "around 07:30")
+  expect_match(left$pattern$what, "around 07:30")
 })
 
 test_that("two days say nothing of every day", {
@@ -48,7 +48,7 @@ test_that("a large error that answers to nothing makes the verdict unexplained",
   upgrade$models[[1]]$prediction$observed <- p$mean + withr::with_seed(1, rnorm(nrow(p), 0, 0.05)) + r
   verdict <- amiss:::diagnosis_verdict(upgrade)
   expect_equal(verdict$verdict, "unexplained")
-  expect_match(verdict$headline, "comes back every day")
+  expect_match(verdict$headline, "every day around")
   upgrade$models[[1]]$prediction$observed <- p$mean + withr::with_seed(1, rnorm(nrow(p), 0, 0.05))
   expect_equal(amiss:::diagnosis_verdict(upgrade)$verdict, "nothing")
 })

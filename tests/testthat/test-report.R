@@ -25,7 +25,7 @@ test_that("a summary says when nothing is named, and why", {
   upgrade$models[[1]]$attribution$table$significant <- FALSE
   told <- summary(upgrade)
   expect_identical(told$verdict, "unexplained")  # the sun is left out: the error is far above the noise
-  expect_match(told$headline, "times as large as the stated noise")
+  expect_match(told$headline, "times the stated noise")
   upgrade$measurements$noise_sd <- 10  # as if so much noise had been stated
   told <- summary(without_held_out(upgrade))
   expect_identical(told$verdict, "nothing")

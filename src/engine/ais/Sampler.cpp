@@ -272,18 +272,17 @@ struct Spread {
 Spread bootstrap(const VectorXd& values, double estimate, Stream stream) {
   constexpr int kReplicates = 1000;
   const Index n = values.size();
-  std::vector<double> replicates(kReplicates);
+  VectorXd replicates(kReplicates);
   VectorXd sample(n);
-  for (double& replicate : replicates) {
+  for (int k = 0; k < kReplicates; ++k) {
     for (Index i = 0; i < n; ++i) sample[i] = values[stream.index(static_cast<int>(n))];
-    replicate = log_mean_exp(sample);
+    replicates[k] = log_mean_exp(sample);
   }
-  std::sort(replicates.begin(), replicates.end());
+  std::sort(replicates.data(), replicates.data() + kReplicates);
   const double widen = std::sqrt(static_cast<double>(n) / static_cast<double>(n - 1));
   const double infinity = std::numeric_limits<double>::infinity();
-  if (n < 2 || !std::isfinite(replicates.front())) return {infinity, -infinity, replicates[974]};
-  const Eigen::Map<const VectorXd> all(replicates.data(), kReplicates);
-  const double sd = std::sqrt((all.array() - all.mean()).square().sum() / (kReplicates - 1));
+  if (n < 2 || !std::isfinite(replicates[0])) return {infinity, -infinity, replicates[974]};
+  const double sd = std::sqrt((replicates.array() - replicates.mean()).square().sum() / (kReplicates - 1));
   const boost::math::students_t student(static_cast<double>(n) - 1.0);
   const double wider = widen * boost::math::quantile(student, 0.975) / 1.959964;
   return {sd * widen, estimate + wider * (replicates[24] - estimate),
