@@ -97,7 +97,7 @@ rate <- function(flags) {
 
 score_rates <- function(rows) {
   pick <- function(f) Filter(f, rows)
-  flags <- function(rows, f) vapply(rows, function(r) as.logical(f(r)), NA)
+  flags <- function(rows, f) vapply(rows, function(r) c(as.logical(f(r)), NA)[1], NA)  # NA where it was not scored
   strong <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95)
   one <- pick(function(r) length(r$true_mechanism) > 0 && abs(r$achieved - 1) <= 0.2)
   none <- pick(function(r) r$kind == "none")

@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kDifference = 1e-4;  // of the emulated means, in standard deviations of the prior
+constexpr double kDifference = 3e-3;  // of the emulated means, in standard deviations of the prior
 constexpr double kSettled = 1e-2;     // gain in nats at which a search ends
 constexpr double kSame = 1.0;         // distance between modes, in standard deviations, that counts as none
 
@@ -107,6 +107,13 @@ class Conditional {
   long& evaluations_;
 };
 
+// Rows rounded to about 20 bits of their scales. The last bits of a mode hang on the unit of the basis, by
+// way of differences and of where a search ends; chains that start from it would carry them on.
+MatrixXd rounded(const MatrixXd& x, const VectorXd& scale) {
+  const VectorXd unit = scale.unaryExpr([](double s) { return std::exp2(std::ceil(std::log2(s)) - 20.0); });
+  return unit.asDiagonal() * MatrixXd((unit.cwiseInverse().asDiagonal() * x).array().round());
+}
+
 bool same(const Mode& a, const Mode& b) {
   const VectorXd apart = a.location - b.location;
   return apart.dot(a.precision * apart) < kSame * kSame;
@@ -158,7 +165,9 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
   for (std::size_t k = 0; k < modes.size(); ++k) {
     const Eigen::LLT<MatrixXd> covariance(
         options.inflation * modes[k].precision.llt().solve(MatrixXd::Identity(starts.rows(), starts.rows())));
-    components.emplace_back(modes[k].location, covariance.matrixL(), options.dof);
+    const MatrixXd root = covariance.matrixL();
+    const VectorXd sd = root.rowwise().norm();
+    components.emplace_back(rounded(modes[k].location, sd), rounded(root, sd), options.dof);
     weights.push_back(0.5 * shares[k] / total + 0.5 / static_cast<double>(modes.size()));
   }
   if (components.empty()) {  // nowhere is the record possible: the prior stands
