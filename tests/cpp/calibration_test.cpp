@@ -264,5 +264,50 @@ TEST(CalibrationTarget, AnnealingFromTheModesGivesTheSameEvidenceForLess) {
     EXPECT_NEAR(closer.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
 }
 
+TEST(CalibrationTarget, FromThePriorItIsTheSamePosterior) {
+  const Joint joint;
+  const CalibrationTarget target = joint.target(0.5), wide = target.from_prior();
+  const MatrixXd x = normal_matrix(6, 5, 90);
+  const VectorXd a = target.log_likelihood(x), b = wide.log_likelihood(x);
+  for (Index i = 0; i < 5; ++i) {
+    EXPECT_NEAR(a[i] + target.log_reference(x.col(i)), b[i] + wide.log_reference(x.col(i)),
+                1e-9 * std::abs(a[i]));
+    EXPECT_NEAR(wide.log_reference(x.col(i)), log_prior(x.col(i)), 1.0);  // nearly the prior
+  }
+}
+
+// The record lies where no parameter reaches: the evidence is found all the same, from another start than the
+// history's.
+TEST(CalibrationTarget, AContradictedHistoryPosteriorDoesNotMislead) {
+  const Emulator emulator = make_emulator(1);
+  HistoryData far = make_data();
+  far.y.array() += 8.0;
+  const HistoryModel model(far, make_model({}).priors(), Context());
+  const HistoryTarget history(model, {});
+  const AisResult outside = sample_ais(history, {}, Context());
+  Stream stream(1, 1, 1);
+  const CalibrationTarget target(
+      history, StudentTMixture::fit(outside.draws, outside.weights, 3, 8.0, stream), emulator);
+  const AisResult result = sample_calibration(target, outside, {}, Context());
+  const CalibrationTarget exact = target.from_prior();
+  const int m = 400;  // trapezoidal rule, as above
+  const double h = 16.0 / m;
+  VectorXd log_terms((m + 1) * (m + 1));
+  MatrixXd row(2, m + 1);
+  for (int i = 0; i <= m; ++i) {
+    for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
+    const VectorXd ll = exact.log_likelihood(row);
+    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + exact.log_reference(row.col(j));
+  }
+  const double top = log_terms.maxCoeff();
+  const double truth = top + std::log((log_terms.array() - top).exp().sum() * h * h);
+  EXPECT_TRUE(result.trusted) << result.verdict;
+  EXPECT_LT(std::abs(result.log_evidence - truth), std::max(4 * result.standard_error, 0.02));
+  EXPECT_LT(result.standard_error, 0.12);
+  const VectorXd again = target.log_likelihood(result.draws.leftCols(20));
+  for (Index i = 0; i < 20; ++i)
+    EXPECT_NEAR(result.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
+}
+
 }  // namespace
 }  // namespace amiss

@@ -37,6 +37,12 @@ CalibrationTarget::CalibrationTarget(const HistoryTarget& history, StudentTMixtu
   }
 }
 
+CalibrationTarget CalibrationTarget::from_prior() const {
+  const Index d = history_.dimension();
+  StudentT wide(VectorXd::Zero(d), MatrixXd::Identity(d, d), 30.0);
+  return CalibrationTarget(history_, StudentTMixture({std::move(wide)}, {1.0}), emulator_);
+}
+
 MatrixXd CalibrationTarget::unit(const MatrixXd& x) const {
   return x.bottomRows(emulator_.n_inputs()).transpose().unaryExpr(&normal_cdf);
 }
@@ -112,8 +118,12 @@ AisResult sample_calibration(const CalibrationTarget& target, const AisResult& h
   const ParameterModes modes = parameter_modes(
       target, spread_points(target.history_target(), history, kHistoryPoints), ModeOptions(), stream);
   if (!(modes.misfit < kContradiction)) {
-    AisResult result = sample_ais(target, options, context);
+    const CalibrationTarget wide = target.from_prior();
+    AisResult result = sample_ais(wide, options, context);
     result.evaluations += modes.evaluations;
+    for (Index i = 0; i < result.log_likelihood.size(); ++i)  // as seen from the target's own reference
+      result.log_likelihood[i] +=
+          wide.log_reference(result.draws.col(i)) - target.log_reference(result.draws.col(i));
     return result;
   }
   const DefensiveTarget closer(target, modes.mixture, target.history_target().dimension());

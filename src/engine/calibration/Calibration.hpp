@@ -28,6 +28,10 @@ class CalibrationTarget : public Target {
   Eigen::VectorXd draw_reference(Stream& stream) const override;
   double log_reference(const Eigen::VectorXd& x) const override;
 
+  /// The same posterior from (nearly) the prior of the history coordinates: for a record that contradicts the
+  /// history posterior.
+  CalibrationTarget from_prior() const;
+
   /// Parameters in the unit cube, n x P.
   Eigen::MatrixXd unit(const Eigen::MatrixXd& x) const;
   HistoryParameters history(const Eigen::VectorXd& x) const {
@@ -55,7 +59,8 @@ class CalibrationTarget : public Target {
 };
 
 /// The joint posterior, annealed from the history posterior times the modes of the parameters
-/// (parameter_modes()); from their prior where no parameters agree with the history posterior.
+/// (parameter_modes()); from the prior of all coordinates where no parameters agree with the history
+/// posterior.
 AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history,
                              const AisOptions& options, const Context& context);
 
