@@ -8,8 +8,9 @@ upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibrat
 #' and the loop begins again with the extended model. Held-out rows only measure; they decide nothing.
 #'
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`), then, as well as the base model is, those that
-#' come within `margin` of the best, if any comes within `margin` of being decisive. Candidates that stay behind keep their
-#' coarse evidence; `candidates$screened` says which, and their intervals say how coarse.
+#' could come within `margin` of the best, if any could come within `margin` of being decisive: the coarse evidence is taken as
+#' uncertain by three standard errors and by what its annealed estimate lags behind the second one. Candidates that stay behind
+#' keep their coarse evidence; `candidates$screened` says which.
 #'
 #' @param simulator The base model.
 #' @param measurements The [measurements()].
@@ -173,10 +174,12 @@ report_candidate <- function(what, fit, current, say) {
   say("  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
 }
 
-# Candidates whose coarse evidence, within three standard errors, comes near the best, if any comes near adoption.
+# Candidates whose coarse evidence could come near the best, if any could come near adoption. It is taken as uncertain by three
+# standard errors and by the nats that annealing lies behind the second estimator: where chains lag, a mode may be missed.
 contenders <- function(fits, reference, control) {
   bf <- do.call(rbind, lapply(fits, bayes_factor, reference))
-  reach <- bf$log10_bf + 3 * (bf$upper95 - bf$log10_bf) / 1.96 + control$margin
+  lag <- vapply(fits, function(f) max(0, f$posterior$second[[1]] - f$posterior$annealed[[1]], na.rm = TRUE), 0)
+  reach <- bf$log10_bf + 3 * (bf$upper95 - bf$log10_bf) / 1.96 + lag / log(10) + control$margin
   names(fits)[reach >= max(bf$log10_bf, control$decisive)]
 }
 

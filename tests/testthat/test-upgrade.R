@@ -7,13 +7,16 @@ test_that("candidates that come near the best are calibrated in full, the others
 })
 
 test_that("contenders are those within the margin, and none where nothing comes near adoption", {
-  fit <- function(log10_evidence, se = 0.05) {
-    structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10), standard_error = se * log(10)), class = "amiss_calibration")
+  fit <- function(log10_evidence, se = 0.05, lag = 0) {
+    posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
+    structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10), standard_error = se * log(10), posterior = posterior),
+              class = "amiss_calibration")
   }
   control <- list(margin = 3, decisive = 2)
   reference <- fit(0, 0)
   expect_equal(amiss:::contenders(list(a = fit(10), b = fit(7.5), c = fit(6)), reference, control), c("a", "b"))
   expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, se = 0.5)), reference, control), c("a", "b"))  # its error reaches
+  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, lag = 2)), reference, control), c("a", "b"))  # its chains may have missed a mode
   expect_length(amiss:::contenders(list(a = fit(-2), b = fit(-5)), reference, control), 0)
   expect_equal(amiss:::contenders(list(a = fit(-0.5), b = fit(-5)), reference, control), "a")
 })
