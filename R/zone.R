@@ -369,11 +369,18 @@ print.amiss_scaled_free <- function(x, ...) {
   invisible(x)
 }
 
-# Applies `visit` to every free parameter in a nested description, in order.
-map_free <- function(x, visit) {
-  if (is_free(x)) return(visit(x))
-  if (!is.list(x)) return(x)
-  for (i in seq_along(x)) if (!is.null(x[[i]])) x[[i]] <- map_free(x[[i]], visit)
+# Where the free parameters stand in a nested description, in order: each with its path, and the factor that scales it.
+free_fields <- function(x, path = integer()) {
+  if (is_free(x)) {
+    scaled <- inherits(x, "amiss_scaled_free")
+    return(list(list(path = path, free = if (scaled) x$free else x, factor = if (scaled) x$factor else 1)))
+  }
+  if (!is.list(x)) return(list())
+  do.call(c, lapply(seq_along(x), function(i) free_fields(x[[i]], c(path, i))))
+}
+
+fill_free <- function(x, fields, values) {
+  for (field in fields) x[[field$path]] <- field$factor * values[[field$free$name]]
   x
 }
 
@@ -388,17 +395,16 @@ zone_parameters <- function(zone) {
   check_zone(zone)
   call <- rlang::current_env()
   found <- list()
-  map_free(unclass(zone), function(x) {
-    if (inherits(x, "amiss_scaled_free")) x <- x$free
+  for (field in free_fields(unclass(zone))) {
+    x <- field$free
     known <- found[[x$name]]
     if (!is.null(known) && !identical(known$prior, x$prior)) {
       abort_input(c("The free parameter {.val {x$name}} stands with two different priors:",
                     "*" = "{format(known$prior)}", "*" = "{format(x$prior)}",
                     i = "Use one prior, or two names."), call = call)
     }
-    if (is.null(known)) found[[x$name]] <<- x
-    0
-  })
+    if (is.null(known)) found[[x$name]] <- x
+  }
   found
 }
 
@@ -433,9 +439,7 @@ check_values <- function(given, parameters, call) {
 }
 
 resolve_zone <- function(zone, values, call) {
-  resolved <- map_free(zone, function(x) {
-    if (inherits(x, "amiss_scaled_free")) x$factor * values[[x$free$name]] else values[[x$name]]
-  })
+  resolved <- fill_free(zone, free_fields(unclass(zone)), values)
   for (x in resolved$components) check_component(x, call)
   check_fields(resolved, zone_fields$zone, "zone", call)
 }
@@ -474,9 +478,12 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
                   i = "The drivers have {nrow(drivers)} rows."))
   }
   control <- check_zone_control(control, call)
-  zones <- lapply(seq_len(nrow(values)), function(i) {
-    index_zone(resolve_zone(zone, values[i, ], call), colnames(drivers))
-  })
+  # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between them.
+  extremes <- vapply(parameters, function(p) range(values[, p]), numeric(2))
+  for (i in 1:2) resolve_zone(zone, extremes[i, ], call)
+  indexed <- index_zone(unclass(zone), colnames(drivers))
+  fields <- free_fields(indexed)
+  zones <- lapply(seq_len(nrow(values)), function(i) fill_free(indexed, fields, values[i, ]))
   storage.mode(drivers) <- "double"
   zone_simulate_(zones, drivers, step_s, as.numeric(hold), control, as.integer(threads))
 }
@@ -512,7 +519,7 @@ index_zone <- function(zone, columns) {
     for (field in column_fields(x)) {
       x[[field]] <- if (is.null(x[[field]])) -1L else match(x[[field]], columns) - 1L
     }
-    if (!is.null(x$azimuth)) x$azimuth <- as.numeric(x$azimuth)
+    if (!is.null(x$azimuth) && !is_free(x$azimuth)) x$azimuth <- as.numeric(x$azimuth)
     x
   })
   zone

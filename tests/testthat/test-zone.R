@@ -82,6 +82,8 @@ test_that("runs follow their parameters and do not depend on threads", {
   expect_identical(air[, 1], air[, 4])
   expect_true(mean(air[, 1]) > mean(air[, 2]) && mean(air[, 2]) > mean(air[, 3]))
   expect_identical(air, simulate_zone(x, values, weather(), 900, threads = 2))
+  expect_identical(air[, 3], simulate_zone(zone_resolve(x, values[3, ]), NULL, weather(), 900)[, 1])
+  expect_error(simulate_zone(x, cbind(ach = c(0.1, -2, 0.3)), weather(), 900), "leaks.*ach.*-2", class = "amiss_error_input")
 })
 
 test_that("held intervals return what they are held at", {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "engine/linalg/constants.hpp"
+#include "engine/linalg/double_policy.hpp"
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/transform.hpp"
 
@@ -198,7 +199,7 @@ HistoryParameters HistoryTarget::parameters(const VectorXd& x) const {
   const HistoryPriors& priors = model_.priors();
   HistoryParameters point;
   const double shape = priors.noise_shape;
-  const double scaled = boost::math::gamma_p_inv(shape, clamp_unit(normal_cdf(x[0])));
+  const double scaled = boost::math::gamma_p_inv(shape, clamp_unit(normal_cdf(x[0])), DoublePolicy());
   point.variance = shape * priors.noise_sd * priors.noise_sd / scaled;
   const Index components = priors.error.correlation_times.size();
   const int levels = static_cast<int>(priors.error.ratios.size());
@@ -238,7 +239,7 @@ VectorXd HistoryTarget::log_likelihood(const MatrixXd& x, MatrixXd& gradient) co
     values[i] = model_.log_likelihood(point.setting, std::log(point.variance), point.t, &natural);
     const double scaled = priors.noise_shape * priors.noise_sd * priors.noise_sd / point.variance;
     gradient(0, i) = -natural[0] * normal_density(x(0, i)) /
-                     (scaled * boost::math::gamma_p_derivative(priors.noise_shape, scaled));
+                     (scaled * boost::math::gamma_p_derivative(priors.noise_shape, scaled, DoublePolicy()));
     for (std::size_t a = 0; a < active_.size(); ++a) {
       const Index row = first + static_cast<Index>(a);
       if (!(point.t[active_[a]] > 0)) continue;

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "engine/linalg/constants.hpp"
+#include "engine/linalg/double_policy.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -65,9 +66,9 @@ BetaPrior::Quantile BetaPrior::quantile(double x) const {
     q.value = std::exp(log_value);
     q.complement = -std::expm1(log_value);
   } else if (lower < upper) {
-    q.value = boost::math::ibeta_inv(a, b, lower, &q.complement);
+    q.value = boost::math::ibeta_inv(a, b, lower, &q.complement, DoublePolicy());
   } else {
-    q.value = boost::math::ibetac_inv(a, b, upper, &q.complement);
+    q.value = boost::math::ibetac_inv(a, b, upper, &q.complement, DoublePolicy());
   }
   const double least = std::numeric_limits<double>::min();
   q.value = std::max(q.value, least);
@@ -82,8 +83,8 @@ void NoisePrior::check() const {
 
 double NoisePrior::precision(double x) const {
   const double lower = tail(x), upper = tail(-x);
-  const double scaled =
-      lower < upper ? boost::math::gamma_p_inv(shape, lower) : boost::math::gamma_q_inv(shape, upper);
+  const double scaled = lower < upper ? boost::math::gamma_p_inv(shape, lower, DoublePolicy())
+                                      : boost::math::gamma_q_inv(shape, upper, DoublePolicy());
   return std::max(scaled, std::numeric_limits<double>::min()) / (shape * sd * sd);
 }
 
