@@ -4,6 +4,7 @@
 #include "engine/attribution/VarianceIndex.hpp"
 #include "engine/calibration/PaperCalibration.hpp"
 #include "engine/discrepancy/KernelModel.hpp"
+#include "engine/discrepancy/KernelSampling.hpp"
 #include "export_convert.h"
 
 using namespace amiss;  // NOLINT
@@ -78,7 +79,17 @@ Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, co
   const KernelData kernel = make_kernel_data(data);
   const KernelModel model(kernel, make_kernel_priors(priors));
   const KernelTarget outside_target(model);
-  const AisResult outside = sample_ais(outside_target, options, context);
+  const double tolerance = Rcpp::as<double>(control["tolerance"]);
+  KernelSample sample;
+  if (tolerance > 0) {
+    KernelSamplingOptions sampling;
+    sampling.tolerance = tolerance;
+    sample = sample_kernel(model, options, sampling, context);
+  } else {
+    sample.posterior = sample_ais(outside_target, options, context);
+    sample.direct = sample.posterior.evaluations;
+  }
+  const AisResult& outside = sample.posterior;
 
   Context second = context;
   second.seed = context.seed + 1;
@@ -93,6 +104,11 @@ Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, co
       variance_index(model, draws, outside.weights, Rcpp::as<double>(control["probability"]), context);
   Rcpp::List outside_list = convert::ais_list(outside), inside_list = convert::ais_list(inside);
   outside_list["hyperparameters"] = list_draws(draws, model.conditions());
+  outside_list["approximation"] = Rcpp::List::create(
+      Rcpp::_["largest_error"] = sample.largest_error, Rcpp::_["correction"] = sample.correction,
+      Rcpp::_["values"] = Rcpp::IntegerVector::create(Rcpp::_["thinned"] = sample.coarse,
+                                                      Rcpp::_["skeleton"] = sample.by_skeleton,
+                                                      Rcpp::_["direct"] = sample.direct));
   inside_list["unit"] = inside_target.unit(inside.draws);
   inside_list["lambda"] = inside_target.lambda(inside.draws);
   using Rcpp::_;

@@ -340,6 +340,25 @@ TEST(HistoryTarget, EvidenceOfTheNoiseAloneEqualsQuadrature) {
             std::min(4 * result.standard_error, 0.15));
 }
 
+TEST(HistoryTarget, NumberingOfTheConditionsLeavesTheSampledEvidenceUnchanged) {
+  const HistoryData data = make_data();
+  HistoryData other = data;  // order 2, 0, 1
+  other.responses << data.responses.rightCols(2), data.responses.leftCols(3);
+  other.condition = {0, 0, 1, 1, 2};
+  const HistoryModel a = make_model(data), b = make_model(other);
+  const HistoryTarget first(a, {0, 1, 2}), second(b, {0, 1, 2});
+  const VectorXd x = normal_vector(first.dimension(), 44);
+  const VectorXd t = first.parameters(x).t, u = second.parameters(x).t;
+  EXPECT_EQ(t[0], u[1]);
+  EXPECT_EQ(t[1], u[2]);
+  EXPECT_EQ(t[2], u[0]);
+  AisOptions options;
+  options.pilot_chains = 64;
+  options.groups = options.max_groups = 3;
+  EXPECT_NEAR(sample_ais(first, options, Context()).log_evidence,
+              sample_ais(second, options, Context()).log_evidence, 1e-8);
+}
+
 TEST(FilterBank, RespondsToAStepExactly) {
   const TimeAxis axis = uneven_axis(20, {});
   VectorXd x = VectorXd::Zero(20);

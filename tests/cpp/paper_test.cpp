@@ -293,7 +293,7 @@ TEST(KernelTarget, CoordinatesAreQuantilesOfThePriors) {
       const KernelParameters p = target.parameters(x);
       for (Index s = 0; s < 4; ++s) {
         // 1 - alpha keeps its digits where alpha does not.
-        const double complement = -std::expm1(-0.25 * p.decay[s]);
+        const double complement = -std::expm1(-0.25 * p.decay[model.order()[static_cast<std::size_t>(s)]]);
         const boost::math::beta_distribution<> mirror(priors.alpha.b, priors.alpha.a);
         EXPECT_NEAR(cdf(mirror, complement), cdf_normal(-x[s]), 1e-10) << variant;
       }
@@ -354,9 +354,11 @@ TEST(KernelTarget, PriorOfAlphaIsNormalised) {
   const KernelModel model = make_model(data);
   const KernelTarget target(model);
   VectorXd x(6);
-  x << 0.0, 0.3, 0.5, 1.0, 0.2, 0.1;
+  x << 0.3, 0.3, 0.5, 1.0, 0.2, 0.1;
+  const std::vector<int>& order = model.order();
+  const Index first = std::find(order.begin(), order.end(), 0) - order.begin();
   const double truth = quadrature([&](double v) {
-    x[0] = v;
+    x[first] = v;
     return target.log_likelihood(x)[0];
   });
   // Beta(1, 0.1): density 0.1 (1 - alpha)^-0.9; alpha = 1 - exp(-g), d alpha = exp(-g) dg.
@@ -364,13 +366,14 @@ TEST(KernelTarget, PriorOfAlphaIsNormalised) {
   const int m = 9000;
   const double h = 45.0 / m;
   KernelParameters p = target.parameters(x);
+  double& decay = p.decay[0];
   VectorXd terms(m + 1);
   for (int i = 0; i < m; ++i) {
     const double g = h * (i + 0.5);
-    p.decay[0] = -4.0 * std::log1p(-std::exp(-g));
+    decay = -4.0 * std::log1p(-std::exp(-g));
     terms[i] = model.log_likelihood(p) + std::log(0.1 * h) - 0.1 * g;
   }
-  p.decay[0] = 0.0;
+  decay = 0.0;
   terms[m] = model.log_likelihood(p) - 4.5;
   const double top = terms.maxCoeff();
   // Middle points of 0.005 beside the slope of the likelihood where alpha is small.

@@ -99,6 +99,20 @@ test_that("a firm noise and other priors are heard", {
   expect_lt(mean_alpha(rough), mean_alpha(loose))
 })
 
+test_that("a longer record is annealed through thinned ones, and its values are certified", {
+  data <- paper_data_frame(sun, n = 160)
+  fast <- paper_fit(data)
+  approximation <- fast$outside$approximation
+  expect_lt(approximation$largest_error, 0.1)
+  expect_true(all(approximation$values > 0))
+  expect_identical(names(approximation$values), c("thinned", "skeleton", "direct"))
+  dense <- paper_fit(data, control = list(tolerance = 0))
+  expect_identical(dense$outside$approximation$values[["skeleton"]], 0L)
+  expect_lt(abs(fast$log_evidence - dense$log_evidence), 4 * sqrt(fast$standard_error^2 + dense$standard_error^2))
+  expect_identical(tidy(fast)$boundary[1], "Gv")
+  expect_error(paper_fit(data, control = list(tolerance = 2)), "tolerance", class = "amiss_error_input")
+})
+
 test_that("it prints, and options are checked", {
   fit <- paper_fit()
   expect_output(suppressMessages(print(fit)), "significant")

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "engine/ais/BridgedTarget.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/parallel_for.hpp"
 
@@ -200,9 +201,9 @@ void tune(const Target& target, const AisOptions& options, Chains& chains, Level
 }
 
 std::vector<Level> pilot(const Target& target, const AisOptions& options, const Context& context,
-                         std::uint64_t purpose, long& evaluations) {
+                         std::uint64_t purpose, Chains& chains, long& evaluations) {
   Stream stream(context.seed, kPilot + purpose, 0);
-  Chains chains = start(target, options.pilot_chains, stream);
+  chains = start(target, options.pilot_chains, stream);
   evaluations += options.pilot_chains;
   if (!std::isfinite(chains.ll.maxCoeff()))
     throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
@@ -294,7 +295,8 @@ class AnnealedRun {
  public:
   AnnealedRun(const Target& target, const AisOptions& options, const Context& context, std::uint64_t purpose)
       : target_(target), options_(options), context_(context), purpose_(purpose) {
-    levels_ = pilot(target, options, context, purpose, evaluations_);
+    Chains chains;
+    levels_ = pilot(target, options, context, purpose, chains, evaluations_);
     add_groups(options.groups);
   }
 
@@ -400,36 +402,6 @@ class AnnealedRun {
   double log_evidence_ = 0.0;
   Spread spread_{};
   long evaluations_ = 0;
-};
-
-// The same posterior seen from a reference fitted to its draws: little is left to anneal.
-class BridgedTarget : public Target {
- public:
-  BridgedTarget(const Target& target, const StudentTMixture& mixture) : target_(target), mixture_(mixture) {}
-
-  Index dimension() const override { return target_.dimension(); }
-  VectorXd draw_reference(Stream& stream) const override { return mixture_.draw(stream); }
-  double log_reference(const VectorXd& x) const override { return mixture_.log_density(x); }
-  VectorXd log_likelihood(const MatrixXd& x) const override {
-    VectorXd values = target_.log_likelihood(x);
-    for (Index i = 0; i < x.cols(); ++i)
-      values[i] += target_.log_reference(x.col(i)) - mixture_.log_density(x.col(i));
-    return values;
-  }
-  bool has_gradient() const override { return target_.has_gradient(); }
-  VectorXd log_likelihood(const MatrixXd& x, MatrixXd& gradient) const override {
-    VectorXd values = target_.log_likelihood(x, gradient);
-    for (Index i = 0; i < x.cols(); ++i) {
-      values[i] += target_.log_reference(x.col(i)) - mixture_.log_density(x.col(i));
-      gradient.col(i) += target_.reference_gradient(x.col(i)) - mixture_.gradient(x.col(i));
-    }
-    return values;
-  }
-  VectorXd reference_gradient(const VectorXd& x) const override { return mixture_.gradient(x); }
-
- private:
-  const Target& target_;
-  const StudentTMixture& mixture_;
 };
 
 struct ImportanceSample {
@@ -549,8 +521,7 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   result.second_ess = result.ess;
   // The likelihood of a draw, as seen from the target's own reference.
   for (Index i = 0; i < result.log_likelihood.size(); ++i)
-    result.log_likelihood[i] +=
-        mixture.log_density(result.draws.col(i)) - target.log_reference(result.draws.col(i));
+    result.log_likelihood[i] -= bridge.log_ratio(result.draws.col(i));
   if (!shorter) report(result, "annealed", annealed);
 }
 
@@ -603,6 +574,14 @@ AisOptions AisOptions::for_dimension(Index d) const {
   if (pilot_chains == 0) filled.pilot_chains = static_cast<int>(std::max<Index>(256, 16 * d));
   if (chains == 0) filled.chains = static_cast<int>(std::max<Index>(32, 3 * d));
   return filled;
+}
+
+MatrixXd sample_population(const Target& target, const AisOptions& asked, const Context& context,
+                           long& evaluations) {
+  asked.check();
+  Chains chains;
+  pilot(target, asked.for_dimension(target.dimension()), context, 0, chains, evaluations);
+  return chains.x;
 }
 
 AisResult sample_ais(const Target& target, const AisOptions& asked, const Context& context) {

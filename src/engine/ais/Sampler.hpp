@@ -70,4 +70,10 @@ struct AisResult {
 /// other estimator has to agree.
 AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context);
 
+/// Draws of the posterior (dimension x pilot_chains, of equal weight) from the pilot alone: a cheap start for
+/// a posterior nearby. Says nothing of the evidence. The likelihood values that it takes are added to
+/// `evaluations`.
+Eigen::MatrixXd sample_population(const Target& target, const AisOptions& options, const Context& context,
+                                  long& evaluations);
+
 }  // namespace amiss

@@ -5,7 +5,9 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
+#include "engine/linalg/GaussianKernel.hpp"
 #include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
@@ -17,30 +19,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kTrace = 1e-8;  // of the noise: what the low rank may leave out
-
-// L of exp(-|x_i - x_j|^2) ~ LL' by pivoted Cholesky, until the trace left is below `tolerance`.
-MatrixXd pivoted_root(const MatrixXd& x, double tolerance) {
-  const Index n = x.rows();
-  MatrixXd root(n, 16);
-  VectorXd left = VectorXd::Ones(n);  // diagonal of the remainder
-  Index r = 0;
-  while (r < n) {
-    Index pivot = 0;
-    const double largest = left.maxCoeff(&pivot);
-    if (left.sum() <= tolerance || largest <= 1e-14) break;
-    if (r == root.cols()) root.conservativeResize(n, std::min(n, 2 * r));
-    const VectorXd squares = (x.rowwise() - x.row(pivot)).rowwise().squaredNorm();
-    VectorXd column = (-squares).array().exp();
-    column.noalias() -= root.leftCols(r) * root.row(pivot).head(r).transpose();
-    root.col(r) = column / std::sqrt(largest);
-    left -= root.col(r).cwiseAbs2();
-    left = left.cwiseMax(0.0);
-    left[pivot] = 0.0;
-    ++r;
-  }
-  root.conservativeResize(n, r);
-  return root;
-}
 
 std::vector<Index> sorted_order(const VectorXd& values) {
   std::vector<Index> order(static_cast<std::size_t>(values.size()));
@@ -101,7 +79,9 @@ VectorXd variance_shares(const KernelModel& model, const KernelParameters& p) {
     for (std::size_t j = 0; j < own.size(); ++j) {
       x.col(static_cast<Index>(j)) = std::sqrt(p.decay[s]) * model.columns().col(own[j]);
     }
-    MatrixXd factor = pivoted_root(x, kTrace * noise);
+    PivotedCholesky cholesky(std::move(x));
+    cholesky.extend(kTrace * noise, model.size());
+    MatrixXd factor = cholesky.root();
     factor -= basis * (basis.transpose() * factor);
     MatrixXd gram = factor.transpose() * factor;
     gram.diagonal().array() += noise;

@@ -7,6 +7,7 @@
 
 #include "engine/linalg/constants.hpp"
 #include "engine/linalg/double_policy.hpp"
+#include "engine/linalg/precedes.hpp"
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/transform.hpp"
 
@@ -189,7 +190,15 @@ VectorXd HistoryModel::coefficients(const WhitenedData& whitened, double log_var
 }
 
 HistoryTarget::HistoryTarget(const HistoryModel& model, std::vector<int> active)
-    : model_(model), active_(std::move(active)) {}
+    : model_(model), active_(std::move(active)) {
+  const HistoryData& data = model_.data();
+  const auto column = [&](int s) {
+    return data.responses.col(std::find(data.condition.begin(), data.condition.end(), s) -
+                              data.condition.begin());
+  };
+  std::stable_sort(active_.begin(), active_.end(),
+                   [&](int a, int b) { return precedes(column(a), column(b)); });
+}
 
 Index HistoryTarget::dimension() const {
   return 1 + model_.priors().error.correlation_times.size() + static_cast<Index>(active_.size());

@@ -113,7 +113,8 @@ struct HistoryParameters {
 };
 
 /// Posterior of the history model with some of its conditions active. Coordinates: sigma, one per error
-/// component, one per active condition.
+/// component, one per active condition, these in an order that hangs on their columns alone: conditions that
+/// are numbered otherwise are sampled by the same chains.
 class HistoryTarget : public Target {
  public:
   HistoryTarget(const HistoryModel& model, std::vector<int> active);
@@ -125,6 +126,7 @@ class HistoryTarget : public Target {
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override;
   HistoryParameters parameters(const Eigen::VectorXd& x) const;
   const HistoryModel& model() const { return model_; }
+  const std::vector<int>& active() const { return active_; }  ///< condition of each of the last coordinates
 
  private:
   const HistoryModel& model_;

@@ -5,10 +5,12 @@
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include "engine/linalg/constants.hpp"
 #include "engine/linalg/double_policy.hpp"
+#include "engine/linalg/precedes.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -20,7 +22,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kSmallestTail = 1e-15;  // of Phi; keeps logarithms finite
-constexpr double kLargestRatio = 1e10;   // of discrepancy to noise variance
 constexpr std::uint64_t kFictitious = 64;
 constexpr Index kBlock = 96;  // columns of the covariance built at once
 
@@ -123,12 +124,14 @@ KernelModel::KernelModel(KernelData data, KernelPriors priors) : priors_(priors)
   data.check();
   priors_.check();
   const Index n = data.y.size(), q = data.basis.cols();
+  sort_rows(data);
   condition_ = data.condition;
   condition_.push_back(conditions_);
   MatrixXd all(n, data.conditions.cols() + 1);
   all << data.conditions, data.fictitious;
   columns_ = scale_to_unit(all, condition_);
   squares_ = columns_.cwiseAbs2();
+  sort_conditions();
 
   // Columns scaled to unit norm first, so that their very different sizes do not cost accuracy.
   data.basis.array().rowwise() /= data.basis.colwise().norm().array();
@@ -138,6 +141,56 @@ KernelModel::KernelModel(KernelData data, KernelPriors priors) : priors_(priors)
   orthonormal_ = qr.householderQ() * MatrixXd::Identity(n, q);
   outside_ = data.y - orthonormal_ * (orthonormal_.transpose() * data.y);
   outside_ -= orthonormal_ * (orthonormal_.transpose() * outside_);
+}
+
+KernelModel KernelModel::thinned(Index k) const {
+  KernelModel out = *this;
+  const Index n = (size() + k - 1) / k;
+  MatrixXd basis(n, orthonormal_.cols());
+  out.columns_.resize(n, columns_.cols());
+  out.outside_.resize(n);
+  for (Index i = 0; i < n; ++i) {
+    out.columns_.row(i) = columns_.row(i * k);
+    out.outside_[i] = outside_[i * k];
+    basis.row(i) = orthonormal_.row(i * k);
+  }
+  out.squares_ = out.columns_.cwiseAbs2();
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(basis);
+  const MatrixXd q = qr.householderQ() * MatrixXd::Identity(n, std::min(n, basis.cols()));
+  out.orthonormal_ = q.leftCols(qr.rank());
+  // What is measured differs from Hv by a vector of the simulation space alone.
+  out.outside_ -= out.orthonormal_ * (out.orthonormal_.transpose() * out.outside_);
+  out.row_.clear();
+  for (Index i = 0; i < n; ++i) out.row_.push_back(i);
+  return out;
+}
+
+// Time steps by what was measured.
+void KernelModel::sort_rows(KernelData& data) {
+  const Index n = data.y.size();
+  row_.resize(static_cast<std::size_t>(n));
+  std::iota(row_.begin(), row_.end(), Index{0});
+  std::stable_sort(row_.begin(), row_.end(), [&](Index a, Index b) { return data.y[a] < data.y[b]; });
+  const KernelData given = data;
+  for (Index i = 0; i < n; ++i) {
+    const Index from = row_[static_cast<std::size_t>(i)];
+    data.y[i] = given.y[from];
+    data.fictitious[i] = given.fictitious[from];
+    data.basis.row(i) = given.basis.row(from);
+    data.conditions.row(i) = given.conditions.row(from);
+  }
+}
+
+// Conditions by their first columns, the fictitious one last.
+void KernelModel::sort_conditions() {
+  const auto column = [&](int s) {
+    return columns_.col(std::find(condition_.begin(), condition_.end(), s) - condition_.begin());
+  };
+  order_.resize(static_cast<std::size_t>(conditions_));
+  std::iota(order_.begin(), order_.end(), 0);
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](int a, int b) { return precedes(column(a), column(b)); });
+  order_.push_back(conditions_);
 }
 
 // With B = lambda* A = LL' and W = L^-1 [O, Hv]: O'B^-1 O = RR' and the coordinates of the projection.
@@ -152,7 +205,7 @@ struct KernelModel::Factor {
 
 bool KernelModel::factorise(const KernelParameters& p, Factor& work) const {
   const double ratio = p.amplitude * p.lambda;
-  if (!(ratio <= kLargestRatio)) return false;
+  if (!(ratio <= largest_ratio)) return false;
   const Index n = size(), q = orthonormal_.cols(), c = columns_.cols();
   VectorXd decay(c);
   for (Index j = 0; j < c; ++j) decay[j] = p.decay[condition_[static_cast<std::size_t>(j)]];
@@ -220,7 +273,9 @@ VectorXd KernelModel::discrepancy(const KernelParameters& parameters) const {
   const VectorXd beta = work.root.transpose().triangularView<Eigen::Upper>().solve(work.project);
   VectorXd rest = work.half.col(q) - work.half.leftCols(q) * beta;
   work.b.triangularView<Eigen::Lower>().transpose().solveInPlace(rest);
-  return outside_ - rest;
+  VectorXd discrepancy(size());
+  for (Index i = 0; i < size(); ++i) discrepancy[row_[static_cast<std::size_t>(i)]] = outside_[i] - rest[i];
+  return discrepancy;
 }
 
 KernelParameters KernelTarget::parameters(const VectorXd& x) const {
@@ -228,7 +283,8 @@ KernelParameters KernelTarget::parameters(const VectorXd& x) const {
   const Index s = model_.conditions() + 1;
   KernelParameters p;
   p.decay.resize(s);
-  for (Index i = 0; i < s; ++i) p.decay[i] = -4.0 * priors.alpha.quantile(x[i]).log();
+  for (Index i = 0; i < s; ++i)
+    p.decay[model_.order()[static_cast<std::size_t>(i)]] = -4.0 * priors.alpha.quantile(x[i]).log();
   const BetaPrior::Quantile t2 = priors.t2.quantile(x[s]);
   p.amplitude = t2.complement / t2.value;
   p.lambda = priors.noise.precision(x[s + 1]);

@@ -82,12 +82,18 @@ struct KernelParameters {
 /// be compared; a factor p(z*), though nothing in it depends on z*; a*^b* where the Gamma density has b*^a*;
 /// and I lambda* for the covariance of the noise, whose unit only I / lambda* has.
 ///
+/// Neither the order of the time steps nor the numbering of the conditions changes anything, to rounding: the
+/// order inside, which is also that of accessors by row, hangs on the values.
+///
 /// Cost of a value: one N x N matrix product of S+1 columns, N^2/2 exponentials, one Cholesky factor.
 class KernelModel {
  public:
+  static constexpr double largest_ratio = 1e10;  ///< of discrepancy to noise variance
+
   KernelModel(KernelData data, KernelPriors priors);
 
-  /// Log density of v. -infinity where amplitude * lambda* exceeds 1e10: rounding would decide there.
+  /// Log density of v. -infinity where amplitude * lambda* exceeds largest_ratio: rounding would decide
+  /// there.
   double log_likelihood(const KernelParameters& parameters) const;
   /// The same for n points; working memory is shared.
   Eigen::VectorXd log_likelihood(const std::vector<KernelParameters>& points) const;
@@ -102,21 +108,30 @@ class KernelModel {
   const std::vector<int>& condition() const { return condition_; }  ///< of each of columns(); x_0 is number S
   const Eigen::MatrixXd& orthonormal() const { return orthonormal_; }  ///< O, N x Q
   const Eigen::VectorXd& outside() const { return outside_; }          ///< H v = y - O O'y
+  /// The conditions in an order that hangs on their values alone, the fictitious one last.
+  const std::vector<int>& order() const { return order_; }
+
+  /// Every k-th time step, with the same scales of the conditions: a cheaper distribution of the same
+  /// parameters.
+  KernelModel thinned(Eigen::Index k) const;
 
  private:
   struct Factor;
   bool factorise(const KernelParameters& parameters, Factor& work) const;
+  void sort_rows(KernelData& data);
+  void sort_conditions();
 
   KernelPriors priors_;
   int conditions_;
-  std::vector<int> condition_;
+  std::vector<int> condition_, order_;
+  std::vector<Eigen::Index> row_;      // given time step of each row: rows are sorted by what was measured
   Eigen::MatrixXd columns_, squares_;  // x and x^2
   Eigen::MatrixXd orthonormal_;
   Eigen::VectorXd outside_;
 };
 
-/// Posterior (6). Coordinates: alpha_1 ... alpha_S, alpha_0, t2, lambda*; each is the prior's quantile at
-/// Phi(x).
+/// Posterior (6). Coordinates: alpha of the conditions in KernelModel::order(), t2, lambda*; each is the
+/// prior's quantile at Phi(x).
 class KernelTarget : public Target {
  public:
   explicit KernelTarget(const KernelModel& model) : model_(model) {}

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "engine/emulator/ModeSearch.hpp"
+#include "engine/linalg/GaussianKernel.hpp"
 
 namespace amiss {
 namespace {
@@ -20,21 +21,13 @@ VectorXd decay_rates(const VectorXd& logit_beta) {
       [](double b) { return b > 0 ? 4 * std::log1p(std::exp(-b)) : 4 * (std::log1p(std::exp(b)) - b); });
 }
 
-// prod_p beta_p^(4 (a_ip - b_jp)^2) for inputs already scaled by sqrt(theta_p): one matrix product and one
-// exp.
-MatrixXd correlation(const MatrixXd& a, const MatrixXd& b) {
-  MatrixXd r = 2.0 * a * b.transpose();
-  r.colwise() -= a.rowwise().squaredNorm();
-  r.rowwise() -= b.rowwise().squaredNorm().transpose();
-  return r.array().min(0.0).exp();
-}
-
 double noise_variance(const GaussianProcessParameters& p) {
   return std::exp(p.log_nugget) + (std::isfinite(p.log_lambda) ? std::exp(-p.log_lambda) : 0.0);
 }
 
+// Of inputs already scaled by sqrt(theta_p): prod_p beta_p^(4 (a_ip - b_jp)^2) is a Gaussian kernel in them.
 MatrixXd covariance(const MatrixXd& scaled, const GaussianProcessParameters& p) {
-  MatrixXd c = std::exp(p.log_amplitude) * correlation(scaled, scaled);
+  MatrixXd c = std::exp(p.log_amplitude) * gaussian_kernel(scaled, scaled);
   c.diagonal().array() += noise_variance(p) + kJitter * std::exp(p.log_amplitude);
   return c;
 }
@@ -179,7 +172,7 @@ void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
                               Eigen::Ref<VectorXd> variance) const {
   const MatrixXd scaled = points * decay_rates(parameters_.logit_beta).cwiseSqrt().asDiagonal();
   const double amplitude = std::exp(parameters_.log_amplitude);
-  const MatrixXd cross = amplitude * correlation(scaled_inputs_, scaled);  // M x n
+  const MatrixXd cross = amplitude * gaussian_kernel(scaled_inputs_, scaled);  // M x n
   mean.noalias() = cross.transpose() * weights_;
   const MatrixXd half = root_inverse_.triangularView<Eigen::Lower>() * cross;
   variance = (amplitude - half.colwise().squaredNorm().array()).max(kJitter * amplitude).matrix().transpose();

@@ -1,0 +1,132 @@
+#include "engine/discrepancy/LowRankKernel.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "engine/linalg/GaussianKernel.hpp"
+#include "engine/linalg/constants.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kExtensions = 3;  // of a factor whose certificate is not yet good enough
+// Up to this share of N a low rank costs less than the dense factor, and in a short record hardly ever:
+// measured.
+constexpr double kCheap = 0.33;
+constexpr Index kSmall = 600;
+
+// Conditions times the root of their decays: zeta is a Gaussian kernel in them.
+MatrixXd scaled(const MatrixXd& columns, const std::vector<int>& condition, const VectorXd& decay) {
+  MatrixXd x = columns;
+  for (Index j = 0; j < x.cols(); ++j) x.col(j) *= std::sqrt(decay[condition[static_cast<std::size_t>(j)]]);
+  return x;
+}
+
+double log_density(double dimension, double lambda, double log_det, double quadratic) {
+  return -0.5 * (dimension * (kLogTwoPi - std::log(lambda)) + log_det + lambda * quadratic);
+}
+
+// log|I + r G| and, given b, what the discrepancy explains: r b'(I + r G)^-1 b.
+struct Inside {
+  double log_det, explained;
+  VectorXd weights;  // r (I + r G)^-1 b
+};
+
+Inside inside(const MatrixXd& gram, const VectorXd& b, double ratio) {
+  MatrixXd matrix = ratio * gram;
+  matrix.diagonal().array() += 1.0;
+  const Eigen::LLT<MatrixXd> factor(matrix);
+  const VectorXd weights = ratio * factor.solve(b);
+  return {2.0 * factor.matrixLLT().diagonal().array().log().sum(), b.dot(weights), weights};
+}
+
+}  // namespace
+
+std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const KernelParameters& p,
+                                                double tolerance, Certificate certificate, Index max_rank) {
+  const double ratio = p.amplitude * p.lambda;
+  const double infinity = std::numeric_limits<double>::infinity();
+  if (!(ratio <= KernelModel::largest_ratio)) return BoundedValue{-infinity, 0.0, 0.0};
+  PivotedCholesky cholesky(scaled(model.columns(), model.condition(), p.decay));
+  const MatrixXd& basis = model.orthonormal();
+  const double dimension = static_cast<double>(model.size() - basis.cols());
+  double trace = 2.0 * tolerance / ratio;
+  for (int i = 0;; ++i) {
+    if (!cholesky.extend(trace, max_rank)) return std::nullopt;
+    MatrixXd f = cholesky.root();
+    f -= basis * (basis.transpose() * f);
+    MatrixXd gram = MatrixXd::Zero(f.cols(), f.cols());
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(f.transpose());
+    gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
+    const Inside part = inside(gram, f.transpose() * model.outside(), ratio);
+    const VectorXd w = model.outside() - f * part.weights;
+    const double quadratic = model.outside().squaredNorm() - part.explained;
+    const double below = 0.5 * ratio * cholesky.trace();
+    const double above = p.lambda * below * w.squaredNorm();
+    const double reached = certificate == Certificate::determinant ? below : below + above;
+    // A remainder that is rounding cannot be brought down further.
+    if (reached <= tolerance || i == kExtensions || cholesky.trace() < 1e-3 * trace)
+      return BoundedValue{log_density(dimension, p.lambda, part.log_det, quadratic), below, above};
+    trace *= 0.5 * tolerance / reached;
+  }
+}
+
+BoundedValue bounded_likelihood(const KernelModel& model, const KernelParameters& parameters,
+                                double tolerance, Certificate certificate) {
+  const auto most = static_cast<Index>(kCheap * static_cast<double>(model.size()));
+  if (model.size() >= kSmall) {
+    if (const auto value = low_rank_likelihood(model, parameters, tolerance, certificate, most))
+      return *value;
+  }
+  return {model.log_likelihood(parameters), 0.0, 0.0};
+}
+
+std::optional<KernelSkeleton> KernelSkeleton::make(const KernelModel& model, const VectorXd& decay,
+                                                   double ratio, double tolerance, Index max_rank) {
+  PivotedCholesky cholesky(scaled(model.columns(), model.condition(), decay));
+  if (!cholesky.extend(tolerance / ratio, max_rank)) return std::nullopt;
+  return KernelSkeleton(model, decay, ratio, tolerance, cholesky);
+}
+
+KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double ratio, double tolerance,
+                               const PivotedCholesky& cholesky)
+    : decay_(std::move(decay)), ratio_(ratio), tolerance_(tolerance), condition_(model.condition()) {
+  const std::vector<Index>& rows = cholesky.pivots();
+  const Index m = cholesky.rank();
+  MatrixXd u = cholesky.root(), own(m, m);
+  pivots_.resize(m, model.columns().cols());
+  for (Index i = 0; i < m; ++i) {
+    own.row(i) = u.row(rows[static_cast<std::size_t>(i)]);
+    pivots_.row(i) = model.columns().row(rows[static_cast<std::size_t>(i)]);
+  }
+  // U = C_:I C_II^-1 = L L_I^-1, L_I lower triangular in the order of the pivots.
+  own.triangularView<Eigen::Lower>().solveInPlace<Eigen::OnTheRight>(u);
+  u -= model.orthonormal() * (model.orthonormal().transpose() * u);
+  gram_.noalias() = u.transpose() * u;
+  projected_ = u.transpose() * model.outside();
+  square_ = model.outside().squaredNorm();
+  dimension_ = static_cast<double>(model.size() - model.orthonormal().cols());
+}
+
+bool KernelSkeleton::serves(const KernelParameters& p) const {
+  return p.amplitude * p.lambda <= ratio_ && (p.decay.array() <= decay_.array()).all();
+}
+
+double KernelSkeleton::log_likelihood(const KernelParameters& p) const {
+  const double ratio = p.amplitude * p.lambda;
+  PivotedCholesky cholesky(scaled(pivots_, condition_, p.decay));
+  cholesky.extend(0.1 * tolerance_ / ratio, rank());
+  const MatrixXd root = cholesky.root();
+  const MatrixXd product = gram_ * root;
+  const Inside part = inside(root.transpose() * product, root.transpose() * projected_, ratio);
+  return log_density(dimension_, p.lambda, part.log_det, square_ - part.explained);
+}
+
+}  // namespace amiss

@@ -1,0 +1,121 @@
+#include "engine/linalg/GaussianKernel.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr Index kBlock = 32;       // pivots added at once, at most
+constexpr Index kStretches = 128;  // candidates, one from each stretch of the record
+constexpr double kWorthy = 0.2;    // of the largest remainder: what a pivot of the same block must still have
+constexpr Index kShort = 256;  // records up to which the whole kernel is formed and pivots are added singly
+constexpr double kRounding = 1e-14;  // a remainder that is none
+
+}  // namespace
+
+MatrixXd gaussian_kernel(const MatrixXd& a, const MatrixXd& b) {
+  MatrixXd r = 2.0 * a * b.transpose();
+  r.colwise() -= a.rowwise().squaredNorm();
+  r.rowwise() -= b.rowwise().squaredNorm().transpose();
+  return r.array().min(0.0).exp();
+}
+
+PivotedCholesky::PivotedCholesky(MatrixXd x) : x_(std::move(x)), left_(VectorXd::Ones(x_.rows())) {
+  if (x_.rows() <= kShort) kernel_ = gaussian_kernel(x_, x_);
+}
+
+bool PivotedCholesky::extend(double tolerance, Index max_rank) {
+  const Index most = std::min(max_rank, x_.rows());
+  while (trace() > tolerance && left_.maxCoeff() > kRounding) {
+    if (rank() >= most) return rank() == x_.rows();
+    if (kernel_.size() > 0) {
+      add_pivot();
+    } else {
+      add_block(std::min(kBlock, most - rank()));
+    }
+  }
+  return true;
+}
+
+void PivotedCholesky::add_pivot() {
+  const Index r = rank();
+  Index pivot = 0;
+  const double largest = left_.maxCoeff(&pivot);
+  if (r == root_.cols()) root_.conservativeResize(x_.rows(), std::min(x_.rows(), r + 2 * kBlock));
+  auto column = root_.col(r);
+  column = kernel_.col(pivot);
+  column.noalias() -= root_.leftCols(r) * root_.row(pivot).head(r).transpose();
+  column /= std::sqrt(largest);
+  left_ = (left_ - column.cwiseAbs2()).cwiseMax(0.0);
+  left_[pivot] = 0.0;
+  pivots_.push_back(pivot);
+}
+
+std::vector<Index> PivotedCholesky::candidates(Index count) const {
+  const Index n = x_.rows(), stretches = std::min(count, n);
+  std::vector<Index> rows;
+  for (Index k = 0; k < stretches; ++k) {
+    const Index first = k * n / stretches, end = (k + 1) * n / stretches;
+    Index worst = 0;
+    if (left_.segment(first, end - first).maxCoeff(&worst) > kRounding) rows.push_back(first + worst);
+  }
+  return rows;
+}
+
+void PivotedCholesky::add_block(Index most) {
+  const Index n = x_.rows(), r = rank();
+  const std::vector<Index> rows = candidates(kStretches);
+  const Index c = static_cast<Index>(rows.size());
+  MatrixXd own(c, x_.cols()), own_root(c, r);
+  for (Index i = 0; i < c; ++i) {
+    own.row(i) = x_.row(rows[static_cast<std::size_t>(i)]);
+    own_root.row(i) = root_.row(rows[static_cast<std::size_t>(i)]).head(r);
+  }
+  // E among the candidates, and its own pivoted Cholesky factor.
+  MatrixXd small = gaussian_kernel(own, own);
+  small.noalias() -= own_root * own_root.transpose();
+  VectorXd left(c);  // not the diagonal of `small`, in which rounding may leave nothing of a pivot
+  for (Index i = 0; i < c; ++i) left[i] = left_[rows[static_cast<std::size_t>(i)]];
+  const double worthy = kWorthy * left.maxCoeff();
+  MatrixXd factor(c, most);
+  std::vector<Index> chosen;
+  while (static_cast<Index>(chosen.size()) < most) {
+    Index worst = 0;
+    const double largest = left.maxCoeff(&worst);
+    if (!(largest >= worthy) || !(largest > kRounding)) break;
+    const Index k = static_cast<Index>(chosen.size());
+    VectorXd column = small.col(worst);
+    column.noalias() -= factor.leftCols(k) * factor.row(worst).head(k).transpose();
+    factor.col(k) = column / std::sqrt(largest);
+    left -= factor.col(k).cwiseAbs2();
+    left[worst] = 0.0;
+    chosen.push_back(worst);
+  }
+
+  const Index k = static_cast<Index>(chosen.size());
+  MatrixXd pivots(k, x_.cols()), pivot_root(k, r), triangle(k, k);
+  for (Index i = 0; i < k; ++i) {
+    const Index row = chosen[static_cast<std::size_t>(i)];
+    pivots.row(i) = own.row(row);
+    pivot_root.row(i) = own_root.row(row);
+    triangle.row(i) = factor.row(row).head(k);
+    pivots_.push_back(rows[static_cast<std::size_t>(row)]);
+  }
+  MatrixXd columns = gaussian_kernel(x_, pivots);
+  if (r > 0) columns.noalias() -= root_.leftCols(r) * pivot_root.transpose();
+  triangle.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(columns);
+  if (r + k > root_.cols())
+    root_.conservativeResize(n, std::min(n, std::max(2 * root_.cols(), r + 2 * kBlock)));
+  root_.middleCols(r, k) = columns;
+  left_ = (left_ - columns.rowwise().squaredNorm()).cwiseMax(0.0);
+  for (Index i = r; i < r + k; ++i) left_[pivots_[static_cast<std::size_t>(i)]] = 0.0;
+}
+
+}  // namespace amiss
