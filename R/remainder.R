@@ -53,3 +53,32 @@ daily_share <- function(r, hours, clock) {
   if (diff(range(hours)) < 72 || nlevels(bin) < 4 || length(r) <= 2 * nlevels(bin)) return(0)
   summary(stats::lm(r ~ bin))$adj.r.squared
 }
+
+# TRUE where a drift (a parabola in time) on top of the base model, its parameters adapted to first order, fits the calibration
+# record about as well as the extended model: no decisive difference of likelihoods (white error, a BIC's price for the drift).
+drift_rivals <- function(upgrade) {
+  base <- upgrade$models[[1]]
+  hours <- upgrade$measurements$hours[base$fit$rows]
+  if (length(hours) < 10) return(FALSE)
+  n <- length(hours)
+  drifted <- stats::lm.fit(cbind(1, output_slopes(base$fit), stats::poly(hours, 2)), calibration_residual(base))$residuals
+  extended <- calibration_residual(upgrade$models[[length(upgrade$models)]])
+  0.5 * n * log(sum(drifted^2) / sum(extended^2)) + log(n) < upgrade$control$decisive * log(10)
+}
+
+calibration_residual <- function(model) {
+  p <- model$prediction[model$prediction$use == "calibrate", ]
+  p$observed - p$mean
+}
+
+# Change of the simulated series with each parameter about the posterior mean, by central differences in the unit cube.
+output_slopes <- function(fit, step = 0.02) {
+  unit <- posterior_unit(fit)
+  centre <- pmin(pmax(colSums(fit$weights * unit), step), 1 - step)
+  steps <- diag(step, length(centre))
+  series <- function(sign) {
+    w <- predict_emulator_(fit$emulator$processes, sweep(sign * steps, 2, centre, "+"))$mean
+    fit$emulator$basis$vectors %*% t(w)
+  }
+  (series(1) - series(-1)) / (2 * step)
+}

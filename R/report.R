@@ -79,7 +79,8 @@ cause_doubts <- function(upgrade) {
   c(if (best$probability < 0.95) "others are possible",
     if (rough && best$lower95 < upgrade$control$decisive) "the estimate is rough",
     if (!improves_held_out(upgrade)) "not confirmed by held-out data",
-    if (much_remains(upgrade)) "a good part of the error remains")
+    if (much_remains(upgrade)) "a good part of the error remains",
+    if (drift_rivals(upgrade)) "a drift of the sensor would explain it as well")
 }
 
 # TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The mechanism

@@ -63,3 +63,27 @@ test_that("a cause that leaves a good part of the error is only likely", {
   expect_false(amiss:::much_remains(small_upgrade()))
   expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a good part of the error remains")
 })
+
+test_that("a cause is only likely where a drift would explain the record as well", {
+  upgrade <- small_upgrade()
+  expect_false(amiss:::drift_rivals(upgrade))
+  expect_identical(amiss:::diagnosis_verdict(upgrade)$verdict, "named")
+  # The base model off by a parabola; the extended one no better than that.
+  p <- upgrade$models[[1]]$prediction
+  hours <- upgrade$measurements$hours[match(p$time, upgrade$measurements$time)]
+  noise <- withr::with_seed(1, rnorm(nrow(p), 0, upgrade$measurements$noise_sd))
+  upgrade$models[[1]]$prediction$observed <- p$mean + noise + 3 * (hours / max(hours))^2
+  upgrade$models[[2]]$prediction$observed <- upgrade$models[[2]]$prediction$mean + 1.5 * noise
+  expect_true(amiss:::drift_rivals(upgrade))
+  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a drift of the sensor would explain it as well")
+})
+
+test_that("slopes of the output are those of the emulated series", {
+  fit <- small_upgrade()$models[[1]]$fit
+  slopes <- amiss:::output_slopes(fit)
+  expect_identical(dim(slopes), c(length(fit$rows), length(fit$emulator$parameters)))
+  unit <- amiss:::posterior_unit(fit)
+  own <- colSums(fit$weights * unit)
+  near <- function(by) fit$emulator$basis$vectors %*% t(amiss:::predict_emulator_(fit$emulator$processes, t(own + by))$mean)
+  expect_equal(slopes[, 1], as.numeric(near(replace(0 * own, 1, 0.01)) - near(replace(0 * own, 1, -0.01))) / 0.02, tolerance = 0.02)
+})
