@@ -222,6 +222,33 @@ TEST(HistoryModel, OneAndTwoThreadsGiveTheSameBits) {
   for (int g = 0; g < 9; ++g) EXPECT_EQ(a.log_likelihood(g, -0.5, kT), b.log_likelihood(g, -0.5, kT));
 }
 
+// More rows than are whitened at once; a segment begins within the second block.
+TEST(HistoryModel, LongRecordsAreWhitenedInBlocksWithTheSameResult) {
+  constexpr Index n = 2600;
+  HistoryData data;
+  data.axis = uneven_axis(n, {2300});
+  data.basis = normal_matrix(n, 3, 45);
+  data.basis.col(0) *= 1e4;
+  data.responses = normal_matrix(n, 4, 46);
+  data.condition = {0, 0, 1, 1};
+  data.y = data.basis * Eigen::Vector3d(1e-3, 2.0, 20.0) + data.responses.col(1) + normal_vector(n, 47);
+  const VectorXd ratios = Eigen::Vector2d(0.5, 3.0);
+  const WhitenedData own = whiten(data, kTimes, ratios);
+  // All rows at once, by a complete orthogonal decomposition.
+  const Whitener whitener(data.axis, kTimes, ratios);
+  const MatrixXd k = whitener(data.basis), phi = whitener(data.responses), y = whitener(data.y);
+  const Eigen::HouseholderQR<MatrixXd> qr(k);
+  const MatrixXd o = qr.householderQ() * MatrixXd::Identity(n, 3);
+  const MatrixXd phi_outside = phi - o * (o.transpose() * phi), y_outside = y - o * (o.transpose() * y);
+  EXPECT_LT((own.gram - phi_outside.transpose() * phi_outside).cwiseAbs().maxCoeff(), 1e-9 * n);
+  EXPECT_LT((own.cross - phi_outside.transpose() * y_outside).cwiseAbs().maxCoeff(), 1e-9 * n);
+  EXPECT_NEAR(own.square, y_outside.squaredNorm(), 1e-9 * n);
+  EXPECT_LT((own.estimate - MatrixXd(qr.solve(y))).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((own.root.transpose() * own.root - k.transpose() * k).cwiseAbs().maxCoeff(),
+            1e-9 * k.squaredNorm());
+  EXPECT_EQ(own.residual_dimension, n - 3);
+}
+
 TEST(HistoryModel, RefusesDataThatDoNotFit) {
   HistoryData data = make_data();
   data.y.conservativeResize(kN - 1);
@@ -301,7 +328,7 @@ TEST(HistoryTarget, GradientIsTheDerivative) {
     x[d - 2] = 1.2 + 0.1 * seed;
     MatrixXd gradient;
     const VectorXd value = target.log_likelihood(x, gradient);
-    EXPECT_EQ(value[0], target.log_likelihood(MatrixXd(x))[0]);
+    EXPECT_DOUBLE_EQ(value[0], target.log_likelihood(MatrixXd(x))[0]);
     const VectorXd expected = numerical_gradient(
         [&](const VectorXd& at) { return target.log_likelihood(MatrixXd(at))[0]; }, x, 1e-6);
     for (Index i = 0; i < d; ++i)

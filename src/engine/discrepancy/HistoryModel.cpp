@@ -19,7 +19,41 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr Index kBlock = 2048;  // rows of a long record that are whitened at once
+
 double clamp_unit(double u) { return std::min(std::max(u, 1e-12), 1.0 - 1e-12); }
+
+// Whitened rows of the basis (columns divided by `norms`) and of [Phi, y], block after block, as often as
+// asked.
+class WhitenedBlocks {
+ public:
+  WhitenedBlocks(const HistoryData& data, const Whitener& whitener, const VectorXd& norms)
+      : data_(data), whitener_(whitener), norms_(norms) {}
+
+  template <class Visit>
+  void visit(const Visit& visit) {
+    const Index n = data_.y.size(), q = data_.basis.cols(), p = data_.responses.cols();
+    if (n <= kBlock && all_.size() > 0) return visit(basis_, all_);
+    MatrixXd state;
+    for (Index first = 0; first < n; first += kBlock) {
+      const Index rows = std::min(kBlock, n - first);
+      MatrixXd block(rows, q + p + 1);
+      block << data_.basis.middleRows(first, rows), data_.responses.middleRows(first, rows),
+          data_.y.segment(first, rows);
+      block.leftCols(q).array().rowwise() /= norms_.transpose().array();
+      block = whitener_.rows(block, first, state);
+      basis_ = block.leftCols(q);
+      all_ = block.rightCols(p + 1);
+      visit(basis_, all_);
+    }
+  }
+
+ private:
+  const HistoryData& data_;
+  const Whitener& whitener_;
+  const VectorXd& norms_;
+  MatrixXd basis_, all_;  // the last block; the only one of a short record
+};
 
 }  // namespace
 
@@ -51,32 +85,42 @@ void HistoryPriors::check() const {
 
 WhitenedData whiten(const HistoryData& data, const VectorXd& correlation_times, const VectorXd& ratios) {
   const Whitener whitener(data.axis, correlation_times, ratios);
-  MatrixXd basis = whitener(data.basis);
-  const MatrixXd responses = whitener(data.responses);
-  const VectorXd y = whitener(data.y);
-  const Index q = basis.cols();
-
+  const Index n = data.y.size(), q = data.basis.cols(), p = data.responses.cols();
   // Columns scaled to unit norm first, so that their very different sizes do not cost accuracy.
-  const VectorXd norms = basis.colwise().norm().transpose();
-  basis.array().rowwise() /= norms.transpose().array();
-  const Eigen::HouseholderQR<MatrixXd> qr(basis);
-  const MatrixXd orthonormal = qr.householderQ() * MatrixXd::Identity(basis.rows(), q);
+  const VectorXd norms = data.basis.colwise().norm().transpose();
+  WhitenedBlocks blocks(data, whitener, norms);
+
+  // First pass: W K = O R in blocks, and what lies inside.
+  MatrixXd root = MatrixXd::Zero(q, q), inside = MatrixXd::Zero(q, p + 1);
+  blocks.visit([&](const MatrixXd& basis, const MatrixXd& series) {
+    if (q == 0) return;
+    MatrixXd stacked(q + basis.rows(), q);
+    stacked << root, basis;
+    const Eigen::HouseholderQR<MatrixXd> qr(stacked);
+    root = qr.matrixQR().topRows(q).triangularView<Eigen::Upper>();
+    inside.noalias() += basis.transpose() * series;
+  });
+  root.triangularView<Eigen::Upper>().transpose().solveInPlace(inside);  // O'W [Phi, y]
+
+  // Second pass: what lies outside.
+  MatrixXd gram = MatrixXd::Zero(p + 1, p + 1);
+  blocks.visit([&](const MatrixXd& basis, const MatrixXd& series) {
+    MatrixXd o = basis;
+    root.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(o);
+    MatrixXd outside = series;
+    outside.noalias() -= o * inside;
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(outside.transpose());
+  });
 
   WhitenedData out;
-  out.root = qr.matrixQR().topRows(q).triangularView<Eigen::Upper>();
-  out.root *= norms.asDiagonal();
-  const VectorXd inside = orthonormal.transpose() * y;
-  out.estimate = out.root.triangularView<Eigen::Upper>().solve(inside);
-  const VectorXd y_outside = y - orthonormal * inside;
-  const MatrixXd outside = responses - orthonormal * (orthonormal.transpose() * responses);
-  out.gram = MatrixXd::Zero(outside.cols(), outside.cols());
-  out.gram.selfadjointView<Eigen::Lower>().rankUpdate(outside.transpose());
-  out.gram.triangularView<Eigen::StrictlyUpper>() = out.gram.transpose();
-  out.cross = outside.transpose() * y_outside;
-  out.square = y_outside.squaredNorm();
+  out.gram = MatrixXd(gram.topLeftCorner(p, p)).selfadjointView<Eigen::Lower>();
+  out.cross = gram.row(p).head(p).transpose();
+  out.square = gram(p, p);
+  out.estimate = norms.cwiseInverse().cwiseProduct(root.triangularView<Eigen::Upper>().solve(inside.col(p)));
+  out.root = root * norms.asDiagonal();
   out.log_det =
       whitener.log_det() + log_volume(data.basis) - out.root.diagonal().cwiseAbs().array().log().sum();
-  out.residual_dimension = y.size() - q;
+  out.residual_dimension = n - q;
   return out;
 }
 

@@ -65,20 +65,27 @@ Whitener::Whitener(const TimeAxis& axis, const Eigen::VectorXd& correlation_time
 }
 
 Eigen::MatrixXd Whitener::operator()(const Eigen::Ref<const Eigen::MatrixXd>& x) const {
+  Eigen::MatrixXd state;
+  return rows(x, 0, state);
+}
+
+Eigen::MatrixXd Whitener::rows(const Eigen::Ref<const Eigen::MatrixXd>& x, Eigen::Index first,
+                               Eigen::MatrixXd& state) const {
   const Eigen::Index components = gain_.rows();
   if (components == 0) return x;
+  if (first == 0) state.setZero(x.cols(), components);
   // Time runs along the columns here, so that each step of the recursion touches contiguous memory.
   Eigen::MatrixXd series = x.transpose();
-  Eigen::MatrixXd state = Eigen::MatrixXd::Zero(series.rows(), components);
   Eigen::VectorXd innovation(series.rows());
-  for (Eigen::Index i = 0; i < series.cols(); ++i) {
-    innovation = series.col(i);
+  for (Eigen::Index j = 0; j < series.cols(); ++j) {
+    const Eigen::Index i = first + j;
+    innovation = series.col(j);
     for (Eigen::Index k = 0; k < components; ++k) {
       state.col(k) *= decay_(k, i);  // zero at the start of a segment
       innovation -= state.col(k);
     }
     for (Eigen::Index k = 0; k < components; ++k) state.col(k) += gain_(k, i) * innovation;
-    series.col(i) = scale_[i] * innovation;
+    series.col(j) = scale_[i] * innovation;
   }
   return series.transpose();
 }

@@ -35,6 +35,10 @@ class Whitener {
 
   /// W x for every column of x (N rows).
   Eigen::MatrixXd operator()(const Eigen::Ref<const Eigen::MatrixXd>& x) const;
+  /// The same for rows first ... first + n - 1 alone, given and leaving behind the state of the filter
+  /// (columns x K, of any size at the first row): a long record in blocks.
+  Eigen::MatrixXd rows(const Eigen::Ref<const Eigen::MatrixXd>& x, Eigen::Index first,
+                       Eigen::MatrixXd& state) const;
   double log_det() const { return log_det_; }  ///< log |W|
 
  private:

@@ -1,0 +1,83 @@
+// Google Benchmark: values of equation (6), dense, at low rank and from a skeleton.
+#include <benchmark/benchmark.h>
+
+#include "engine/discrepancy/KernelSampling.hpp"
+#include "engine/discrepancy/LowRankKernel.hpp"
+#include "records.hpp"
+
+namespace amiss::bench {
+
+// Where the posterior of kernel_record(n, 3, seed) lies.
+KernelParameters typical_point() {
+  KernelParameters p;
+  p.decay = -4.0 * (VectorXd(6) << 0.75, 0.92, 0.965, 0.9995, 0.9995, 0.9998).finished().array().log();
+  p.amplitude = 8.0;
+  p.lambda = 100.0;
+  return p;
+}
+
+void dense(benchmark::State& state) {
+  const KernelModel model = kernel_record(state.range(0), 3, 3);
+  for (auto _ : state) benchmark::DoNotOptimize(model.log_likelihood(typical_point()));
+}
+BENCHMARK(dense)->Name("kernel/dense")->Arg(384)->Arg(1536)->Unit(benchmark::kMillisecond);
+
+// The least that a dense value can cost: one Cholesky factor of that size.
+void factor(benchmark::State& state) {
+  const Index n = state.range(0);
+  MatrixXd a = MatrixXd::Constant(n, n, 0.5), work;
+  a.diagonal().array() += 1.0;
+  for (auto _ : state) {
+    work = a;
+    benchmark::DoNotOptimize(Eigen::LLT<Eigen::Ref<MatrixXd>, Eigen::Lower>(work).matrixLLT().data());
+  }
+}
+BENCHMARK(factor)->Name("kernel/cholesky")->Arg(384)->Arg(1536)->Unit(benchmark::kMillisecond);
+
+void low_rank(benchmark::State& state) {
+  const KernelModel model = kernel_record(state.range(0), 3, 3);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(low_rank_likelihood(model, typical_point(), 0.01, Certificate::determinant, model.size()));
+  }
+}
+BENCHMARK(low_rank)->Name("kernel/low_rank")->Arg(384)->Arg(1536)->Arg(5760)->Unit(benchmark::kMillisecond);
+
+void skeleton(benchmark::State& state) {
+  const KernelModel model = kernel_record(state.range(0), 3, 3);
+  const KernelParameters p = typical_point();
+  const auto made = KernelSkeleton::make(model, 1.5 * p.decay, 2.0 * p.amplitude * p.lambda, 0.01, model.size());
+  for (auto _ : state) benchmark::DoNotOptimize(made->log_likelihood(p));
+  state.counters["pivots"] = static_cast<double>(made->rank());
+}
+BENCHMARK(skeleton)->Name("kernel/skeleton")->Arg(384)->Arg(5760)->Arg(11520)->Unit(benchmark::kMillisecond);
+
+// Posterior and log evidence, to a standard error of 0.05 nat. Arguments: time steps, conditions that act.
+void sampling(benchmark::State& state) {
+  const KernelModel model = kernel_record(state.range(0), static_cast<int>(state.range(1)), 3);
+  AisOptions options;
+  options.precision = 0.05;
+  KernelSample sample;
+  Context context;
+  for (auto _ : state) sample = sample_kernel(model, options, {}, context);
+  state.counters["log_evidence"] = sample.posterior.log_evidence;
+  state.counters["standard_error"] = sample.posterior.standard_error;
+  state.counters["annealed_less"] = sample.posterior.log_evidence - sample.posterior.annealed;
+  state.counters["annealed_error"] = sample.posterior.annealed_se;
+  state.counters["effective_draws"] = sample.posterior.ess;
+  state.counters["values"] = static_cast<double>(sample.posterior.evaluations);
+  state.counters["direct"] = static_cast<double>(sample.direct);
+  state.counters["largest_error"] = sample.largest_error;
+}
+BENCHMARK(sampling)
+    ->Name("kernel/sampling")
+    ->Args({384, 3})
+    ->Args({5760, 3})
+    ->Args({5760, 5})
+    ->Args({8760, 3})
+    ->Args({11520, 3})
+    ->Iterations(1)
+    ->Unit(benchmark::kSecond);
+
+}  // namespace amiss::bench
+
+BENCHMARK_MAIN();
