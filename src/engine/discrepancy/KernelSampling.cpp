@@ -27,9 +27,9 @@ constexpr double kBulk = 0.9, kAll = 0.998;
 constexpr std::array<double, 3> kWide = {0.95, 0.98, 0.998};
 constexpr double kLargestSkeleton = 800.0, kWorthySkeleton = 0.65;  // the latter times N
 constexpr Index kReachDraws = 1000;
-constexpr double kCoarser = 10.0;      // tolerance while only draws are needed, over the final one
-constexpr int kPilotChains = 96;       // unless asked otherwise
-constexpr std::uint64_t kStage = 128;  // purposes of the random streams
+constexpr double kCoarser = 10.0;               // tolerance while only draws are needed, over the final one
+constexpr int kPilotChains = 64, kChains = 16;  // unless asked otherwise
+constexpr std::uint64_t kStage = 128;           // purposes of the random streams
 
 // Skeletons from small to large that together serve nearly all draws of a distribution: one for its bulk, one
 // for draws that are rough in one direction only, and the largest that is still worth it for the others.
@@ -181,6 +181,7 @@ KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
   }
   AisOptions own = options;
   if (own.pilot_chains == 0) own.pilot_chains = kPilotChains;
+  if (own.chains == 0) own.chains = kChains;
   const StudentTMixture before = sample_stage(model, own, sampling, context, sample.coarse);
   Stream stream(context.seed, kStage, 0);
   const ApproximateTarget approximate(model, before, sampling.tolerance, context, stream);
