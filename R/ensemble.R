@@ -26,6 +26,39 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
   new_ensemble(parameters, unit, values, outputs, simulator, seed)
 }
 
+#' More runs where they matter
+#'
+#' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say; in a corner of the
+#' priors the emulator can be off by more than it knows. This adds runs at draws from a first posterior, drawn apart by half
+#' about their mean so that they surround it.
+#'
+#' @param ensemble An ensemble made by [simulate_design()].
+#' @param fit A calibration with the emulator trained on it ([calibrate()]).
+#' @param runs Number of runs to add.
+#' @inheritParams simulate_design
+#' @return The ensemble with the runs added. Train and calibrate anew.
+#' @export
+refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
+  check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
+  check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
+  check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  threads <- check_threads(threads)
+  if (is.null(ensemble$simulator)) {
+    abort_input(c("The runs of this ensemble were made elsewhere, and so must more of them be.",
+                  i = "Run the simulator at draws of {.code fit$values} and give all runs to {.fun ensemble}."))
+  }
+  if (!identical(names(ensemble$parameters), names(fit$emulator$parameters))) {
+    abort_input("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the ensemble {.val {names(ensemble$parameters)}}.")
+  }
+  drawn <- posterior_unit(fit)[systematic_draws(fit$weights, runs), , drop = FALSE]
+  centre <- colMeans(drawn)
+  unit <- pmin(pmax(sweep(1.5 * sweep(drawn, 2, centre), 2, centre, "+"), 0.001), 0.999)
+  values <- unit_to_values(unit, ensemble$parameters)
+  outputs <- simulate_measured(ensemble$simulator, values, fit$measurements, "calibrate", threads)
+  new_ensemble(ensemble$parameters, rbind(ensemble$unit, unit), rbind(ensemble$values, values), cbind(ensemble$outputs, outputs),
+               ensemble$simulator, ensemble$seed)
+}
+
 #' @rdname simulate_design
 #' @param design Matrix of parameter values, one run a row, named columns.
 #' @param outputs Matrix of outputs at the calibration rows of the measurements, one run a column.

@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
+upgrade_control <- list(max_steps = 3, decisive = 2, refine = 40, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
@@ -16,7 +16,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, emulator = list(), calibrat
 #' @param measurements The [measurements()].
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model.
-#' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#' @param control List of options: `max_steps` (3), `refine` (runs added where the posterior lies to every model that is calibrated
+#'   in full, [refine_ensemble()]; 40, 0 for none), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
@@ -34,6 +35,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   control <- merge_control(upgrade_control, control)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps")
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
+  check_input(checkmate::check_count(control$refine), "control$refine")
   check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin")
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening")
   seed <- pick_seed(seed)
@@ -43,7 +45,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   say("Calibrating the base model")
-  current <- measured_model(fit_model(simulator, "base", settings), "base", NULL, NULL, settings)
+  current <- measured_model(fit_fully(simulator, "base", settings), "base", NULL, NULL, settings)
   report_model(current, say)
   models <- list(current)
   candidates <- NULL
@@ -87,16 +89,21 @@ fit_model <- function(simulator, name, settings, calibration = settings$control$
   })
 }
 
-# The coarse calibration of a candidate, and the full one that follows it.
+# The coarse calibration of a model, and the full one, with runs added where the coarse posterior lies.
 screen_model <- function(simulator, name, settings) {
   coarse <- settings$control$calibration
-  coarse$ais <- utils::modifyList(as.list(settings$control$screening), as.list(coarse$ais))
+  coarse$ais <- utils::modifyList(as.list(settings$control$screening %||% upgrade_control$screening), as.list(coarse$ais))
   fit_model(simulator, name, settings, coarse)
 }
 
-calibrate_fully <- function(fit, name, settings) {
-  settings$keep(list("full", name, plain(fit$emulator$simulator)), {
-    settings$calibrate(fit$emulator, settings$measurements, settings$control$calibration, seed = settings$seed, threads = settings$threads)
+fit_fully <- function(simulator, name, settings, first = NULL) {
+  if (settings$control$refine == 0) return(fit_model(simulator, name, settings))
+  settings$keep(list("full", name, plain(simulator)), {
+    first <- first %||% screen_model(simulator, name, settings)
+    ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
+    ensemble <- refine_ensemble(ensemble, first, settings$control$refine, threads = settings$threads)
+    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
+    settings$calibrate(emulator, settings$measurements, settings$control$calibration, seed = settings$seed, threads = settings$threads)
   })
 }
 
@@ -156,14 +163,14 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   screening <- !is.null(settings$control$screening)
   fits <- list()
   for (name in names(catalogue)) {
-    first <- if (screening) screen_model else fit_model
+    first <- if (screening) screen_model else fit_fully
     fits[[name]] <- rlang::try_fetch(first(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings),
                                      amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
     report_candidate(name, fits[[name]], current, say)
   }
   full <- if (screening) contenders(fits, current$fit, settings$control) else names(fits)
   if (screening) for (name in full) {
-    fits[[name]] <- calibrate_fully(fits[[name]], paste(current$name, "+", name), settings)
+    fits[[name]] <- fit_fully(fits[[name]]$emulator$simulator, paste(current$name, "+", name), settings, first = fits[[name]])
     report_candidate(paste(name, "in full"), fits[[name]], current, say)
   }
   list(fits = fits, table = trial_table(fits, current, screened = !names(fits) %in% full))

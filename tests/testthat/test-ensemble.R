@@ -63,3 +63,27 @@ test_that("runs that cover a part of the prior are told, by parameter and number
   expect_error(with_prior(uniform(10, 30), still), "offset.*same value, 20, in all 30 runs", class = "amiss_error_input")
   expect_error(ensemble(still, r$outputs), "offset.*same value", class = "amiss_error_input")
 })
+
+test_that("runs are added where the posterior lies, and the emulator is better there", {
+  hour <- seq_len(72)
+  data <- data.frame(hour = hour, Te = 10 + 5 * sin(2 * pi * hour / 24))
+  bent <- function_simulator(function(values, drivers) 20 + exp(3 * values[["a"]]) * 0.02 * drivers[, "Te"] + values[["b"]] * seq_len(nrow(drivers)) / 100,
+                             free("a", uniform(0, 2)), free("b", uniform(-1, 1)), boundary = "Te")
+  data$Ti <- bent$f(c(a = 0.12, b = 0.2), as.matrix(data["Te"])) + withr::with_seed(1, rnorm(72, 0, 0.02))
+  m <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te, noise_sd = 0.02)
+  first <- simulate_design(bent, m, runs = 12, seed = 2)
+  fit <- calibrate(train_emulator(first, m), m, quick_ais, seed = 1)
+  more <- refine_ensemble(first, fit, runs = 8)
+  expect_identical(dim(more$values), c(20L, 2L))
+  expect_identical(more$outputs[, 1:12], first$outputs)
+  expect_true(all(more$unit > 0 & more$unit < 1))
+  added <- more$values[13:20, "a"]
+  expect_lt(abs(mean(added) - sum(fit$weights * fit$values[, "a"])), 0.2)
+  expect_equal(more$outputs[, 20], bent$f(more$values[20, ], as.matrix(data["Te"])))
+  truth <- bent$f(c(a = 0.12, b = 0.2), as.matrix(data["Te"]))
+  off <- function(ensemble) max(abs(stats::predict(train_emulator(ensemble, m), cbind(a = 0.12, b = 0.2))$mean - truth))
+  expect_lt(off(more), off(first))
+  elsewhere <- suppressWarnings(ensemble(first$values, first$outputs))
+  expect_error(refine_ensemble(elsewhere, fit), "elsewhere", class = "amiss_error_input")
+  expect_error(refine_ensemble(first, "fit"), "fit", class = "amiss_error_input")
+})
