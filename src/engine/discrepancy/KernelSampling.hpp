@@ -17,8 +17,8 @@ struct KernelSample {
   AisResult posterior;               ///< in the coordinates of KernelTarget
   double correction = 0.0;           ///< of the log evidence, found at the certified draws and applied
   double largest_error = 0.0;        ///< of the certified draws' values, nats
-  long direct = 0, by_skeleton = 0;  ///< likelihood values on the full record
-  long coarse = 0;                   ///< on thinned ones
+  long direct = 0, by_skeleton = 0;  ///< likelihood values of the last stage
+  long coarse = 0;                   ///< of the stages before it
 };
 
 /// Posterior (6) and its evidence, annealed through the record: first from the prior to the posterior of
