@@ -63,6 +63,7 @@ drift_rivals <- function(upgrade) {
   n <- length(hours)
   drifted <- stats::lm.fit(cbind(1, output_slopes(base$fit), stats::poly(hours, 2)), calibration_residual(base))$residuals
   extended <- calibration_residual(upgrade$models[[length(upgrade$models)]])
+  if (!sum(extended^2) > 0) return(FALSE)
   0.5 * n * log(sum(drifted^2) / sum(extended^2)) + log(n) < upgrade$control$decisive * log(10)
 }
 

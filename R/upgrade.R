@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, refine = 40, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
+upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
@@ -7,17 +7,19 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 40, emulator = lis
 #' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
 #' and the loop begins again with the extended model. Held-out rows only measure; they decide nothing.
 #'
-#' Mechanisms are calibrated twice: first with a coarse sampler (`screening`), then, as well as the base model is, those that
-#' could come within `margin` of the best, if any could come within `margin` of being decisive: the coarse evidence is taken as
-#' uncertain by three standard errors and by what its annealed estimate lags behind the second one. Candidates that stay behind
-#' keep their coarse evidence; `candidates$screened` says which.
+#' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the parameters,
+#' two thirds of all, and compared with the present model calibrated in the same way; then in full, with the other runs made
+#' where the coarse posterior lies ([refine_ensemble()]), those that could come within `margin` of the best, if any could come
+#' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and by what its
+#' annealed estimate lags behind the second one. Candidates that stay behind keep their coarse Bayes factor;
+#' `candidates$screened` says which.
 #'
 #' @param simulator The base model.
 #' @param measurements The [measurements()].
 #' @param catalogue A [catalogue()] of mechanisms.
-#' @param runs Runs of the simulator for each model.
-#' @param control List of options: `max_steps` (3), `refine` (runs added where the posterior lies to every model that is calibrated
-#'   in full, [refine_ensemble()]; 40, 0 for none), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#' @param runs Runs of the simulator for each model that is calibrated in full.
+#' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
+#'   none), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
@@ -35,7 +37,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   control <- merge_control(upgrade_control, control)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps")
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
-  check_input(checkmate::check_count(control$refine), "control$refine")
+  check_input(checkmate::check_number(control$refine, lower = 0, upper = 0.8), "control$refine")
   check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin")
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening")
   seed <- pick_seed(seed)
@@ -81,29 +83,41 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
 
 # A model simulated, trained and calibrated by `settings$calibrate`. Every model of a study is drawn on the same design
 # seed: differences between models are not the design's.
-fit_model <- function(simulator, name, settings, calibration = settings$control$calibration) {
-  settings$keep(list("fit", name, plain(simulator), calibration), {
-    ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
-    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
-    settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
+fit_model <- function(simulator, name, settings) {
+  settings$keep(list("fit", name, plain(simulator)), fit_runs(first_runs(simulator, settings$runs, settings), settings))
+}
+
+first_runs <- function(simulator, runs, settings) {
+  simulate_design(simulator, settings$measurements, runs, seed = settings$seed, threads = settings$threads)
+}
+
+fit_runs <- function(ensemble, settings, calibration = settings$control$calibration) {
+  emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
+  settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
+}
+
+# The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them.
+screen_model <- function(simulator, name, settings) {
+  calibration <- settings$control$calibration
+  calibration$ais <- utils::modifyList(as.list(calibration$ais), as.list(settings$control$screening %||% upgrade_control$screening))
+  settings$keep(list("coarse", name, plain(simulator)), {
+    ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
+    list(ensemble = ensemble, fit = fit_runs(ensemble, settings, calibration))
   })
 }
 
-# The coarse calibration of a model, and the full one, with runs added where the coarse posterior lies.
-screen_model <- function(simulator, name, settings) {
-  coarse <- settings$control$calibration
-  coarse$ais <- utils::modifyList(as.list(settings$control$screening %||% upgrade_control$screening), as.list(coarse$ais))
-  fit_model(simulator, name, settings, coarse)
-}
+refined_runs <- function(settings) round(settings$control$refine * settings$runs)
 
+# The full calibration, with the remaining runs made where the coarse posterior lies. It keeps the coarse one's evidence.
 fit_fully <- function(simulator, name, settings, first = NULL) {
-  if (settings$control$refine == 0) return(fit_model(simulator, name, settings))
+  more <- refined_runs(settings)
+  if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
   settings$keep(list("full", name, plain(simulator)), {
     first <- first %||% screen_model(simulator, name, settings)
-    ensemble <- simulate_design(simulator, settings$measurements, settings$runs, seed = settings$seed, threads = settings$threads)
-    ensemble <- refine_ensemble(ensemble, first, settings$control$refine, threads = settings$threads)
-    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
-    settings$calibrate(emulator, settings$measurements, settings$control$calibration, seed = settings$seed, threads = settings$threads)
+    ensemble <- if (more > 0) refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads) else first$ensemble
+    fit <- fit_runs(ensemble, settings)
+    fit$coarse <- first$fit[c("log_evidence", "standard_error")]
+    fit
   })
 }
 
@@ -159,25 +173,35 @@ trial_order <- function(catalogue, attribution) {
   names(catalogue)[order(-weight)]
 }
 
+# Every mechanism as an extension of the current model: fits, and the table of their Bayes factors.
 try_mechanisms <- function(current, catalogue, settings, say) {
   screening <- !is.null(settings$control$screening)
-  fits <- list()
+  coarse <- as_coarse(current$fit)
+  fits <- screens <- list()
   for (name in names(catalogue)) {
     first <- if (screening) screen_model else fit_fully
-    fits[[name]] <- rlang::try_fetch(first(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings),
-                                     amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
-    report_candidate(name, fits[[name]], current, say)
+    made <- rlang::try_fetch(first(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings),
+                             amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
+    if (screening) screens[[name]] <- made
+    fits[[name]] <- if (screening) made$fit else made
+    report_candidate(name, fits[[name]], if (screening) coarse else current$fit, say)
   }
-  full <- if (screening) contenders(fits, current$fit, settings$control) else names(fits)
+  full <- if (screening) contenders(fits, coarse, settings$control) else names(fits)
   if (screening) for (name in full) {
-    fits[[name]] <- fit_fully(fits[[name]]$emulator$simulator, paste(current$name, "+", name), settings, first = fits[[name]])
-    report_candidate(paste(name, "in full"), fits[[name]], current, say)
+    fits[[name]] <- fit_fully(fits[[name]]$emulator$simulator, paste(current$name, "+", name), settings, first = screens[[name]])
+    report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
   }
-  list(fits = fits, table = trial_table(fits, current, screened = !names(fits) %in% full))
+  list(fits = fits, table = trial_table(fits, current, full))
 }
 
-report_candidate <- function(what, fit, current, say) {
-  bf <- bayes_factor(fit, current$fit)
+# The fit with the evidence of its coarse calibration, with which other coarse ones are compared.
+as_coarse <- function(fit) {
+  fit[names(fit$coarse)] <- fit$coarse
+  fit
+}
+
+report_candidate <- function(what, fit, reference, say) {
+  bf <- bayes_factor(fit, reference)
   say("  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
 }
 
@@ -190,14 +214,15 @@ contenders <- function(fits, reference, control) {
   names(fits)[reach >= max(bf$log10_bf, control$decisive)]
 }
 
-trial_table <- function(fits, current, screened) {
+trial_table <- function(fits, current, full) {
   rows <- lapply(names(fits), function(name) {
-    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], current$fit), trusted = fits[[name]]$trust$trusted)
+    reference <- if (name %in% full) current$fit else as_coarse(current$fit)
+    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], reference), trusted = fits[[name]]$trust$trusted)
     row$parameters <- list(added_parameters(fits[[name]], current$fit))
     row
   })
   table <- do.call(rbind, rows)
-  table$screened <- screened
+  table$screened <- !table$mechanism %in% full
   # Equal prior probability for no change and for each mechanism.
   log_odds <- c(0, table$log10_bf) * log(10)
   probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))

@@ -2,7 +2,7 @@
 
 fit_seed <- function(world) world$seed + 77L  # never the world's own
 
-score_world <- function(world, control = list(max_steps = 2, calibration = list(ais = list(precision = 0.2))), runs = 120, rivals = TRUE) {
+score_world <- function(world, control = list(max_steps = 2, calibration = list(ais = list(precision = 0.3))), runs = 120, rivals = TRUE) {
   started <- proc.time()[["elapsed"]]
   upgrade <- amiss::upgrade_model(world$base, world$measurements, world$catalogue, runs = runs, control = control,
                                   seed = fit_seed(world), threads = 1, quiet = TRUE)
@@ -67,15 +67,17 @@ parameter_covered <- function(world, upgrade) {
   own$lower95 <= true[[1]] && true[[1]] <= own$upper95
 }
 
-# What is done today: the residuals of the calibrated base model held against each condition.
-rival_conditions <- function(fit, world) {
+# What is done today: the residuals of the calibrated base model held against each condition. The lengthscales are fitted to
+# every k-th row, at most 400 of them.
+rival_conditions <- function(fit, world, most = 400) {
   m <- fit$measurements
   x <- m$boundary[fit$rows, , drop = FALSE]
   names_of <- m$conditions[m$condition]
   r <- residuals(fit)
   strongest <- function(score) unname(names_of[which.max(score)])
   unit <- apply(x, 2, function(v) (v - min(v)) / diff(range(v)))
-  ard <- amiss:::train_emulator_(unit, list(vectors = matrix(1, 3, 1), coefficients = matrix(r), singular_values = 1, discarded_ss = 0),
+  thin <- seq(1, length(r), by = ceiling(length(r) / most))
+  ard <- amiss:::train_emulator_(unit[thin, , drop = FALSE], list(vectors = matrix(1, 3, 1), coefficients = matrix(r[thin]), singular_values = 1, discarded_ss = 0),
                                  utils::modifyList(amiss:::emulator_control, list(starts = 2, searches = 1, max_evaluations = 40)),
                                  list(seed = 1, threads = 1))
   forest <- if (requireNamespace("ranger", quietly = TRUE)) {

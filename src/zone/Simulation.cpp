@@ -73,15 +73,23 @@ void Simulation::add_walls(const Options& options) {
   double area = 0.0;
   double emitting = 0.0;
   for (const Wall& wall : zone_.walls) {
-    walls_.push_back({&wall, WallSolver(wall, substep_ * n_substeps_, options.cells)});
     area += wall.area;
     emitting += wall.area * wall.inside_emissivity;
   }
   surfaces_emit_ = emitting > 0.0;
-  for (WallState& state : walls_) {
-    state.area_share = state.wall->area / area;
-    if (surfaces_emit_) state.emissivity_share = state.wall->area * state.wall->inside_emissivity / emitting;
-    state.solver.factorise(stage_weight_, state.solver.outside_conductance());
+  for (std::size_t first = 0; first < zone_.walls.size(); first += WallSolver::kLanes) {
+    std::vector<const Wall*> walls;
+    for (std::size_t k = first; k < std::min(first + WallSolver::kLanes, zone_.walls.size()); ++k)
+      walls.push_back(&zone_.walls[k]);
+    walls_.push_back({walls, WallSolver(walls, substep_ * n_substeps_, options.cells)});
+    WallGroup& group = walls_.back();
+    for (std::size_t k = 0; k < walls.size(); ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      group.area_share[lane] = walls[k]->area / area;
+      if (surfaces_emit_)
+        group.emissivity_share[lane] = walls[k]->area * walls[k]->inside_emissivity / emitting;
+    }
+    group.solver.factorise(stage_weight_, group.solver.outside_conductance());
   }
   update_room_matrix();
 }
@@ -116,11 +124,13 @@ void Simulation::start(const Options& options) {
   }
   const double wanted = std::round(options.initial_hours * 3600.0 / (substep_ * n_substeps_));
   const auto rows = static_cast<Eigen::Index>(std::clamp(wanted, 1.0, static_cast<double>(drivers_.rows())));
-  for (WallState& state : walls_) {
-    const Column outside = state.wall->outside;
-    const double inside = air_ + zone_.initial_wall_offset;
-    state.solver.start_steady(inside,
-                              outside == no_column ? inside : drivers_.col(outside).head(rows).mean());
+  const double inside = air_ + zone_.initial_wall_offset;
+  for (WallGroup& group : walls_) {
+    for (std::size_t k = 0; k < group.walls.size(); ++k) {
+      const Column outside = group.walls[k]->outside;
+      group.solver.start_steady(static_cast<int>(k), inside,
+                                outside == no_column ? inside : drivers_.col(outside).head(rows).mean());
+    }
   }
   spin_up(options.spinup);
 }
@@ -137,7 +147,7 @@ void Simulation::spin_up(int times) {
 void Simulation::begin_balance() {
   hold_energy_ = 0.0;
   for (Exchange& exchange : exchanges_) exchange.energy = 0.0;
-  for (WallState& state : walls_) state.energy = 0.0;
+  for (WallGroup& group : walls_) group.energy.setZero();
   begun_air_ = air_;
   begun_walls_ = stored_walls();
   begun_heaters_ = stored_heaters();
@@ -145,9 +155,11 @@ void Simulation::begin_balance() {
 
 EnergyBalance Simulation::balance() const {
   EnergyBalance result;
-  for (const WallState& state : walls_) {
-    result.component.push_back(state.wall->name);
-    result.through.push_back(state.energy);
+  for (const WallGroup& group : walls_) {
+    for (std::size_t k = 0; k < group.walls.size(); ++k) {
+      result.component.push_back(group.walls[k]->name);
+      result.through.push_back(group.energy[static_cast<Eigen::Index>(k)]);
+    }
   }
   for (const Exchange& exchange : exchanges_) {
     result.component.push_back(exchange.name);
@@ -162,7 +174,7 @@ EnergyBalance Simulation::balance() const {
 
 double Simulation::stored_walls() const {
   double stored = 0.0;
-  for (const WallState& state : walls_) stored += state.solver.stored();
+  for (const WallGroup& group : walls_) stored += group.solver.stored();
   return stored;
 }
 
@@ -206,24 +218,33 @@ double Simulation::film(const Wall& wall) const {
   return (1.0 - wall.wind_film) * wall.outside_film + wall.wind_film * (4.5 + 2.8 + 3.0 * speed);
 }
 
+// What the outer side of a wall brings with its surface at 0 degC, W.
+double Simulation::outside_heat(const Wall& wall, double conductance) const {
+  const double outside = driver(wall.outside);
+  double absorbed = 0.0;
+  if (wall.sun != no_column) absorbed += wall.absorptance * driver(wall.sun);
+  if (wall.sky != no_column) {
+    const double kelvin = outside + zero_celsius;
+    const double black = stefan_boltzmann * kelvin * kelvin * kelvin * kelvin;
+    absorbed -= wall.outside_emissivity * wall.sky_view * (black - driver(wall.sky));
+  }
+  return conductance * outside + wall.area * absorbed;
+}
+
 void Simulation::set_walls() {
   bool refactorised = false;
-  for (WallState& state : walls_) {
-    const Wall& wall = *state.wall;
-    if (wall.outside == no_column) continue;
-    const double outside = driver(wall.outside);
-    const double conductance = wall.area * film(wall);
-    if (conductance != state.solver.outside_conductance()) {
-      state.solver.factorise(stage_weight_, conductance);
-      refactorised = true;
+  for (WallGroup& group : walls_) {
+    Lanes conductance = Lanes::Zero();
+    for (std::size_t k = 0; k < group.walls.size(); ++k) {
+      const Wall& wall = *group.walls[k];
+      if (wall.outside == no_column) continue;
+      const auto lane = static_cast<Eigen::Index>(k);
+      conductance[lane] = wall.area * film(wall);
+      group.outside_heat[lane] = outside_heat(wall, conductance[lane]);
     }
-    double absorbed = 0.0;
-    if (wall.sun != no_column) absorbed += wall.absorptance * driver(wall.sun);
-    if (wall.sky != no_column) {
-      const double black = stefan_boltzmann * std::pow(outside + zero_celsius, 4);
-      absorbed -= wall.outside_emissivity * wall.sky_view * (black - driver(wall.sky));
-    }
-    state.outside_heat = conductance * outside + wall.area * absorbed;
+    if ((conductance == group.solver.outside_conductance()).all()) continue;
+    group.solver.factorise(stage_weight_, conductance);
+    refactorised = true;
   }
   if (refactorised) update_room_matrix();
 }
@@ -303,15 +324,15 @@ void Simulation::sum_load() {
 
 void Simulation::update_room_matrix() {
   room_ = RoomMatrix{};
-  for (const WallState& state : walls_) {
-    const double air = state.solver.to_air();
-    const double star = state.solver.to_star();
-    const double response = stage_weight_ * state.solver.surface_response();
-    room_.air += air;
-    room_.star += star;
-    room_.air_air += air * air * response;
-    room_.air_star += air * star * response;
-    room_.star_star += star * star * response;
+  for (const WallGroup& group : walls_) {
+    const Lanes& air = group.solver.to_air();
+    const Lanes& star = group.solver.to_star();
+    const Lanes response = stage_weight_ * group.solver.surface_response();
+    room_.air += air.sum();
+    room_.star += star.sum();
+    room_.air_air += (air * air * response).sum();
+    room_.air_star += (air * star * response).sum();
+    room_.star_star += (star * star * response).sum();
   }
 }
 
@@ -322,9 +343,9 @@ double Simulation::advance_substep() {
   sum_load();
   const double before = air_;
   const Stage first = solve_stage(true, before, first_weight);
-  for (WallState& state : walls_) state.solver.set_second_base(base_ratio);
+  for (WallGroup& group : walls_) group.solver.set_second_base(base_ratio);
   const Stage second = solve_stage(false, before + base_ratio * (first.air - before), second_weight);
-  for (WallState& state : walls_) state.solver.accept();
+  for (WallGroup& group : walls_) group.solver.accept();
   air_ = second.air;
 
   const double mean = first_weight * first.air + second_weight * second.air;
@@ -341,11 +362,11 @@ double Simulation::advance_substep() {
 Simulation::Stage Simulation::solve_stage(bool first, double base_air, double quadrature_weight) {
   double to_air = 0.0;   // sum gc p
   double to_star = 0.0;  // sum gr p
-  for (WallState& state : walls_) {
-    const double inside = state.emissivity_share * load_.by_emissivity + state.area_share * load_.by_area;
-    const double surface = state.solver.eliminate(first, inside, state.outside_heat);
-    to_air += state.solver.to_air() * surface;
-    to_star += state.solver.to_star() * surface;
+  for (WallGroup& group : walls_) {
+    const Lanes inside = group.emissivity_share * load_.by_emissivity + group.area_share * load_.by_area;
+    const Lanes surface = group.solver.eliminate(first, inside, group.outside_heat);
+    to_air += (group.solver.to_air() * surface).sum();
+    to_star += (group.solver.to_star() * surface).sum();
   }
 
   const double star_pivot = surfaces_emit_ ? room_.star - room_.star_star : 1.0;
@@ -358,11 +379,11 @@ Simulation::Stage Simulation::solve_stage(bool first, double base_air, double qu
   }
   const double star = (to_star + room_.air_star * air) / star_pivot;
 
-  for (WallState& state : walls_) {
-    const double from_room = state.solver.to_air() * air + state.solver.to_star() * star;
-    const double outer = state.solver.substitute(from_room);
-    state.energy +=
-        quadrature_weight * substep_ * (state.outside_heat - state.solver.outside_conductance() * outer);
+  for (WallGroup& group : walls_) {
+    const Lanes from_room = group.solver.to_air() * air + group.solver.to_star() * star;
+    const Lanes outer = group.solver.substitute(from_room);
+    group.energy +=
+        quadrature_weight * substep_ * (group.outside_heat - group.solver.outside_conductance() * outer);
   }
   return {air, to_air + (room_.air_air - room_.air) * air + room_.air_star * star};
 }

@@ -53,15 +53,17 @@ class Simulation {
     double energy = 0.0;         // J, since the balance was begun
   };
 
-  /// A wall with its shares of radiant heat, what its outer side brings with the surface at 0 degC (W), and
-  /// the heat that came through the outer side (J).
-  struct WallState {
-    const Wall* wall;
+  using Lanes = WallSolver::Lanes;
+
+  /// Walls that are solved side by side, with their shares of radiant heat, what their outer sides bring with
+  /// the surface at 0 degC (W), and the heat that came through the outer sides (J).
+  struct WallGroup {
+    std::vector<const Wall*> walls;
     WallSolver solver;
-    double emissivity_share = 0.0;
-    double area_share = 0.0;
-    double outside_heat = 0.0;
-    double energy = 0.0;
+    Lanes emissivity_share = Lanes::Zero();
+    Lanes area_share = Lanes::Zero();
+    Lanes outside_heat = Lanes::Zero();
+    Lanes energy = Lanes::Zero();
   };
 
   struct HeaterState {
@@ -103,6 +105,7 @@ class Simulation {
   double advance_interval();
   void hold_air();
   void set_walls();
+  double outside_heat(const Wall& wall, double conductance) const;
   double film(const Wall& wall) const;
   void set_exchanges();
   void set_flows();
@@ -122,7 +125,7 @@ class Simulation {
   double stage_weight_;  // gamma x substep, s
   double air_capacity_;  // J/K
   double air_ = 0.0;     // degC, at the present time
-  std::vector<WallState> walls_;
+  std::vector<WallGroup> walls_;  // in the order of the zone's
   std::vector<Exchange> exchanges_;
   std::vector<HeaterState> heaters_;
   Airflow airflow_;

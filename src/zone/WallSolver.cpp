@@ -20,70 +20,100 @@ int count_cells(double thickness, double interval, double cells) {
   return std::max(1, static_cast<int>(std::ceil(3.5 * cells * std::sqrt(thickness / depth))));
 }
 
+/// Conductance (W/K) and capacity (J/K) of each cell of a wall, from inside to outside.
+struct Cells {
+  std::vector<double> conductance, capacity;
+};
+
+Cells make_cells(const Wall& wall, double interval, double cells) {
+  Cells out;
+  for (const Layer& layer : wall.layers) {
+    const int n = count_cells(layer.thickness, interval, cells);
+    const double width = layer.thickness / n;
+    out.capacity.insert(out.capacity.end(), n, wall.area * width * layer.capacity);
+    out.conductance.insert(out.conductance.end(), n, wall.area * layer.conductivity / width);
+  }
+  return out;
+}
+
 }  // namespace
 
-WallSolver::WallSolver(const Wall& wall, double interval, double cells) {
-  to_air_ = wall.area * wall.inside_convection;
-  to_star_ = wall.area * wall.inside_emissivity * 4.0 * stefan_boltzmann * std::pow(room_temperature, 3);
-  outside_conductance_ = wall.outside == no_column ? 0.0 : wall.area * wall.outside_film;
-  for (const Layer& layer : wall.layers) add_layer(layer, wall.area, interval, cells);
-
-  const auto n = static_cast<Eigen::Index>(cell_capacity_.size());
-  capacity_ = Eigen::ArrayXd::Zero(n + 1);
-  for (Eigen::Index j = 0; j < n; ++j) capacity_.segment(j, 2) += 0.5 * cell_capacity_[j];
-  state_ = stage_ = base_ = rhs_ = inverse_pivot_ = Eigen::ArrayXd::Zero(n + 1);
-  multiplier_ = Eigen::ArrayXd::Zero(n);
-}
-
-void WallSolver::add_layer(const Layer& layer, double area, double interval, double cells) {
-  const int n = count_cells(layer.thickness, interval, cells);
-  const double width = layer.thickness / n;
-  cell_capacity_.insert(cell_capacity_.end(), n, area * width * layer.capacity);
-  cell_conductance_.insert(cell_conductance_.end(), n, area * layer.conductivity / width);
-}
-
-void WallSolver::start_steady(double air, double outside) {
-  state_.setConstant(air);
-  if (outside_conductance_ == 0.0) return;
-  double resistance = 1.0 / (to_air_ + to_star_) + 1.0 / outside_conductance_;
-  for (double conductance : cell_conductance_) resistance += 1.0 / conductance;
-  const double flux = (air - outside) / resistance;
-  state_[0] = air - flux / (to_air_ + to_star_);
-  for (std::size_t j = 0; j < cell_conductance_.size(); ++j) {
-    state_[j + 1] = state_[j] - flux / cell_conductance_[j];
+WallSolver::WallSolver(const std::vector<const Wall*>& walls, double interval, double cells) {
+  std::vector<Cells> made;
+  std::size_t most = 0;
+  for (const Wall* wall : walls) {
+    made.push_back(make_cells(*wall, interval, cells));
+    most = std::max(most, made.back().capacity.size());
+  }
+  const auto nodes = static_cast<Eigen::Index>(most) + 1;
+  capacity_ = cell_conductance_ = is_last_ = Nodes::Zero(kLanes, nodes);
+  state_ = stage_ = base_ = rhs_ = inverse_pivot_ = multiplier_ = capacity_;
+  for (std::size_t k = 0; k < walls.size(); ++k) {
+    const Wall& wall = *walls[k];
+    const auto lane = static_cast<Eigen::Index>(k);
+    const auto n = static_cast<Eigen::Index>(made[k].capacity.size());
+    to_air_[lane] = wall.area * wall.inside_convection;
+    to_star_[lane] =
+        wall.area * wall.inside_emissivity * 4.0 * stefan_boltzmann * std::pow(room_temperature, 3);
+    if (wall.outside != no_column) outside_conductance_[lane] = wall.area * wall.outside_film;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const auto cell = static_cast<std::size_t>(j);
+      capacity_.row(lane).segment(j, 2) += 0.5 * made[k].capacity[cell];
+      cell_conductance_(lane, j) = made[k].conductance[cell];
+    }
+    is_last_(lane, n) = 1.0;
   }
 }
 
-void WallSolver::factorise(double weight, double outside_conductance) {
+void WallSolver::start_steady(int lane, double air, double outside) {
+  const auto conductance = cell_conductance_.row(lane);
+  const bool adiabatic = outside_conductance_[lane] == 0.0;
+  const double film = to_air_[lane] + to_star_[lane];
+  Eigen::Index last = 0;
+  double resistance = adiabatic ? 1.0 : 1.0 / film + 1.0 / outside_conductance_[lane];
+  while (conductance[last] > 0.0) resistance += 1.0 / conductance[last++];
+  const double flux = adiabatic ? 0.0 : (air - outside) / resistance;
+  state_(lane, 0) = adiabatic ? air : air - flux / film;
+  for (Eigen::Index j = 0; j < last; ++j) state_(lane, j + 1) = state_(lane, j) - flux / conductance[j];
+}
+
+void WallSolver::factorise(double weight, const Lanes& outside_conductance) {
   weight_ = weight;
   outside_conductance_ = outside_conductance;
-  const Eigen::Index n = multiplier_.size();
-  double pivot = capacity_[n] + weight * (cell_conductance_[n - 1] + outside_conductance);
-  inverse_pivot_[n] = 1.0 / pivot;
-  for (Eigen::Index j = n - 1; j >= 0; --j) {
-    const double across = weight * cell_conductance_[j];
-    const double inwards = j > 0 ? cell_conductance_[j - 1] : to_air_ + to_star_;
-    multiplier_[j] = across * inverse_pivot_[j + 1];
-    pivot = capacity_[j] + weight * inwards + across - across * multiplier_[j];
-    inverse_pivot_[j] = 1.0 / pivot;
+  Lanes inverse_next = Lanes::Zero();
+  for (Eigen::Index j = capacity_.cols() - 1; j >= 0; --j) {
+    const Lanes across = weight * cell_conductance_.col(j);
+    const Lanes inwards = j > 0 ? Lanes(cell_conductance_.col(j - 1)) : Lanes(to_air_ + to_star_);
+    multiplier_.col(j) = across * inverse_next;
+    const Lanes pivot = capacity_.col(j) + weight * (inwards + is_last_.col(j) * outside_conductance) +
+                        across - across * multiplier_.col(j);
+    inverse_next = (pivot > 0.0).select(pivot.inverse(), 0.0);
+    inverse_pivot_.col(j) = inverse_next;
   }
 }
 
-double WallSolver::eliminate(bool first, double inside, double outside) {
-  const Eigen::Index n = multiplier_.size();
-  rhs_ = capacity_ * (first ? state_ : base_);
-  rhs_[0] += weight_ * inside;
-  rhs_[n] += weight_ * outside;
-  for (Eigen::Index j = n - 1; j >= 0; --j) rhs_[j] += multiplier_[j] * rhs_[j + 1];
-  return rhs_[0] * inverse_pivot_[0];
+WallSolver::Lanes WallSolver::eliminate(bool first, const Lanes& inside, const Lanes& outside) {
+  const Nodes& base = first ? state_ : base_;
+  const Lanes heat = weight_ * outside;
+  Lanes carried = Lanes::Zero();
+  for (Eigen::Index j = capacity_.cols() - 1; j >= 0; --j) {
+    carried = capacity_.col(j) * base.col(j) + is_last_.col(j) * heat + multiplier_.col(j) * carried;
+    rhs_.col(j) = carried;
+  }
+  rhs_.col(0) += weight_ * inside;
+  return rhs_.col(0) * inverse_pivot_.col(0);
 }
 
-double WallSolver::substitute(double from_room) {
-  const Eigen::Index n = multiplier_.size();
-  rhs_[0] += weight_ * from_room;
-  stage_ = rhs_ * inverse_pivot_;
-  for (Eigen::Index j = 0; j < n; ++j) stage_[j + 1] += multiplier_[j] * stage_[j];
-  return stage_[n];
+WallSolver::Lanes WallSolver::substitute(const Lanes& from_room) {
+  Lanes value = (rhs_.col(0) + weight_ * from_room) * inverse_pivot_.col(0);
+  Lanes outer = is_last_.col(0) * value;
+  stage_.col(0) = value;
+  for (Eigen::Index j = 1; j < capacity_.cols(); ++j) {
+    value = rhs_.col(j) * inverse_pivot_.col(j) + multiplier_.col(j - 1) * value;
+    stage_.col(j) = value;
+    outer += is_last_.col(j) * value;
+  }
+  return outer;
 }
 
 }  // namespace amiss::zone

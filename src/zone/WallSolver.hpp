@@ -7,7 +7,8 @@
 
 namespace amiss::zone {
 
-/// Conduction through one wall by finite volumes, condensed onto its inner surface.
+/// Conduction through up to four walls, side by side in the lanes of a vector register, by finite volumes,
+/// each wall condensed onto its inner surface. Lanes without a wall are zero throughout.
 ///
 /// Nodes stand at the cell boundaries, node 0 on the inner surface, the last on the outer one; each holds
 /// half of the heat capacity of the cells beside it, so surfaces and interfaces of layers are nodes and the
@@ -20,32 +21,35 @@ namespace amiss::zone {
 /// know.
 class WallSolver {
  public:
-  /// `interval` in s and `cells` (refinement) set the number of cells.
-  WallSolver(const Wall& wall, double interval, double cells);
+  static constexpr int kLanes = 4;
+  using Lanes = Eigen::Array<double, kLanes, 1>;
 
-  /// Conductances from the inner surface to the air and to the star node, W/K.
-  double to_air() const { return to_air_; }
-  double to_star() const { return to_star_; }
+  /// `interval` in s and `cells` (refinement) set the number of cells. At most kLanes walls.
+  WallSolver(const std::vector<const Wall*>& walls, double interval, double cells);
 
-  /// Conductance of the outer film, W/K, changed by set_outside().
-  double outside_conductance() const { return outside_conductance_; }
+  /// Conductances from the inner surfaces to the air and to the star node, W/K.
+  const Lanes& to_air() const { return to_air_; }
+  const Lanes& to_star() const { return to_star_; }
 
-  /// Steady state between the air and the other side, both degC; uniform if adiabatic.
-  void start_steady(double air, double outside);
+  /// Conductances of the outer films, W/K, changed by factorise().
+  const Lanes& outside_conductance() const { return outside_conductance_; }
 
-  /// Factorises for the stage weight `weight` (s) and outer film conductance (W/K).
-  void factorise(double weight, double outside_conductance);
+  /// Steady state of the wall in a lane between the air and the other side, both degC; uniform if adiabatic.
+  void start_steady(int lane, double air, double outside);
+
+  /// Factorises for the stage weight `weight` (s) and outer film conductances (W/K).
+  void factorise(double weight, const Lanes& outside_conductance);
 
   /// dy0 / d(heat into the inner surface x weight), K/J.
-  double surface_response() const { return inverse_pivot_[0]; }
+  Lanes surface_response() const { return inverse_pivot_.col(0); }
 
   /// Eliminates from outside to inside with base `first ? state : second-stage base`; `inside` is the heat
-  /// absorbed by the inner surface (W), `outside` that brought by the outer side with the surface at 0 degC
-  /// (W). Returns the temperature of the inner surface with air and star at 0 degC.
-  double eliminate(bool first, double inside, double outside);
+  /// absorbed by the inner surfaces (W), `outside` that brought by the outer sides with the surface at 0 degC
+  /// (W). Returns the temperatures of the inner surfaces with air and star at 0 degC.
+  Lanes eliminate(bool first, const Lanes& inside, const Lanes& outside);
 
-  /// Completes the stage, with `from_room = gc Ta + gr Ts` (W). Returns the outer surface temperature, degC.
-  double substitute(double from_room);
+  /// Completes the stage, with `from_room = gc Ta + gr Ts` (W). Returns the outer surface temperatures, degC.
+  Lanes substitute(const Lanes& from_room);
 
   /// Base of the second stage: `state + ratio (stage - state)`.
   void set_second_base(double ratio) { base_ = state_ + ratio * (stage_ - state_); }
@@ -57,18 +61,18 @@ class WallSolver {
   double stored() const { return (capacity_ * state_).sum(); }
 
  private:
-  void add_layer(const Layer& layer, double area, double interval, double cells);
+  using Nodes = Eigen::Array<double, kLanes, Eigen::Dynamic>;
 
-  double to_air_ = 0.0;
-  double to_star_ = 0.0;
-  double outside_conductance_ = 0.0;
+  Lanes to_air_ = Lanes::Zero();
+  Lanes to_star_ = Lanes::Zero();
+  Lanes outside_conductance_ = Lanes::Zero();
   double weight_ = 0.0;
-  std::vector<double> cell_capacity_;     // J/K, of each cell
-  std::vector<double> cell_conductance_;  // W/K, across each cell
-  Eigen::ArrayXd capacity_;               // J/K, of each node
-  Eigen::ArrayXd inverse_pivot_;
-  Eigen::ArrayXd multiplier_;  // of node j + 1 in the row of node j, and the reverse
-  Eigen::ArrayXd state_, stage_, base_, rhs_;
+  Nodes cell_conductance_;  // W/K, from each node to the next; 0 beyond the last
+  Nodes capacity_;          // J/K, of each node
+  Nodes is_last_;           // 1 at the outer surface of each wall, else 0
+  Nodes inverse_pivot_;
+  Nodes multiplier_;  // of node j + 1 in the row of node j, and the reverse
+  Nodes state_, stage_, base_, rhs_;
 };
 
 }  // namespace amiss::zone

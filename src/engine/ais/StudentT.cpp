@@ -111,6 +111,8 @@ StudentT::StudentT(VectorXd location, MatrixXd root, double dof)
   const double d = static_cast<double>(location_.size());
   log_constant_ = std::lgamma(0.5 * (dof_ + d)) - std::lgamma(0.5 * dof_) - 0.5 * d * std::log(dof_ * kPi) -
                   root_.diagonal().array().log().sum();
+  inverse_root_ = MatrixXd::Identity(root_.rows(), root_.rows());
+  root_.triangularView<Eigen::Lower>().solveInPlace(inverse_root_);
 }
 
 StudentT StudentT::fit(const MatrixXd& x, const VectorXd& weights, double dof) {
@@ -120,7 +122,7 @@ StudentT StudentT::fit(const MatrixXd& x, const VectorXd& weights, double dof) {
 }
 
 VectorXd StudentT::whiten(const VectorXd& x) const {
-  return root_.triangularView<Eigen::Lower>().solve(x - location_);
+  return inverse_root_.triangularView<Eigen::Lower>() * (x - location_);
 }
 
 double StudentT::log_density(const VectorXd& x) const {

@@ -28,7 +28,7 @@ class StudentT {
   Eigen::VectorXd whiten(const Eigen::VectorXd& x) const;
 
   Eigen::VectorXd location_;
-  Eigen::MatrixXd root_;
+  Eigen::MatrixXd root_, inverse_root_;
   double dof_;
   double log_constant_;
 };

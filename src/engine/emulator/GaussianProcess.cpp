@@ -172,10 +172,11 @@ void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
                               Eigen::Ref<VectorXd> variance) const {
   const MatrixXd scaled = points * decay_rates(parameters_.logit_beta).cwiseSqrt().asDiagonal();
   const double amplitude = std::exp(parameters_.log_amplitude);
-  const MatrixXd cross = amplitude * gaussian_kernel(scaled_inputs_, scaled);  // M x n
-  mean.noalias() = cross.transpose() * weights_;
-  const MatrixXd half = root_inverse_.triangularView<Eigen::Lower>() * cross;
-  variance = (amplitude - half.colwise().squaredNorm().array()).max(kJitter * amplitude).matrix().transpose();
+  const MatrixXd kernel = gaussian_kernel(scaled_inputs_, scaled);  // M x n
+  mean.noalias() = amplitude * (kernel.transpose() * weights_);
+  const MatrixXd half = root_inverse_.triangularView<Eigen::Lower>() * kernel;
+  const double squared = amplitude * amplitude;
+  variance = (amplitude - squared * half.colwise().squaredNorm().array()).max(kJitter * amplitude).transpose();
 }
 
 void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {

@@ -20,11 +20,15 @@ constexpr double kRounding = 1e-14;  // a remainder that is none
 
 }  // namespace
 
+// -|a - b|^2 = [2a, -|a|^2, -1] [b, 1, |b|^2]': the squares ride along in the product.
 MatrixXd gaussian_kernel(const MatrixXd& a, const MatrixXd& b) {
-  MatrixXd r = 2.0 * a * b.transpose();
-  r.colwise() -= a.rowwise().squaredNorm();
-  r.rowwise() -= b.rowwise().squaredNorm().transpose();
-  return r.array().min(0.0).exp();
+  const Index c = a.cols();
+  MatrixXd left(a.rows(), c + 2), right(b.rows(), c + 2), r(a.rows(), b.rows());
+  left << 2.0 * a, -a.rowwise().squaredNorm(), VectorXd::Constant(a.rows(), -1.0);
+  right << b, VectorXd::Ones(b.rows()), b.rowwise().squaredNorm();
+  r.noalias() = left * right.transpose();
+  r = r.array().min(0.0).exp();
+  return r;
 }
 
 PivotedCholesky::PivotedCholesky(MatrixXd x) : x_(std::move(x)), left_(VectorXd::Ones(x_.rows())) {
