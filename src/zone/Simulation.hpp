@@ -121,10 +121,10 @@ class Simulation {
   const Eigen::Ref<const Eigen::VectorXd> hold_;
   Eigen::Index row_ = 0;
   int n_substeps_;
-  double substep_;       // s
-  double stage_weight_;  // gamma x substep, s
-  double air_capacity_;  // J/K
-  double air_ = 0.0;     // degC, at the present time
+  double substep_;                // s
+  double stage_weight_;           // gamma x substep, s
+  double air_capacity_;           // J/K
+  double air_ = 0.0;              // degC, at the present time
   std::vector<WallGroup> walls_;  // in the order of the zone's
   std::vector<Exchange> exchanges_;
   std::vector<HeaterState> heaters_;

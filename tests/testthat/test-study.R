@@ -61,7 +61,7 @@ test_that("an interrupted loop goes on where it stopped, with the same result", 
   resumed <- loop(fragile, kept)
   expect_identical(file.mtime(file.path(kept, before)), times)
   expect_identical(resumed$models[[2]]$fit$values, loop(study$catalogue)$models[[2]]$fit$values)
-  other <- upgrade_model(function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+  other <- upgrade_model(function_simulator(function(values, drivers) values[["offset"]] - values[["gain"]] * drivers[, "Te"],
                                             free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te"),
                          study$measurements, catalogue(), runs = 30, control = study$control, seed = 4, quiet = TRUE, checkpoint = kept)
   expect_false(identical(other$models[[1]]$fit$log_evidence, resumed$models[[1]]$fit$log_evidence))

@@ -176,7 +176,8 @@ void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
   mean.noalias() = amplitude * (kernel.transpose() * weights_);
   const MatrixXd half = root_inverse_.triangularView<Eigen::Lower>() * kernel;
   const double squared = amplitude * amplitude;
-  variance = (amplitude - squared * half.colwise().squaredNorm().array()).max(kJitter * amplitude).transpose();
+  variance =
+      (amplitude - squared * half.colwise().squaredNorm().array()).max(kJitter * amplitude).transpose();
 }
 
 void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {
