@@ -50,6 +50,10 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
   if (!identical(names(ensemble$parameters), names(fit$emulator$parameters))) {
     abort_input("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the ensemble {.val {names(ensemble$parameters)}}.")
   }
+  if (nrow(ensemble$outputs) != length(fit$rows)) {
+    abort_input(c("{.arg fit} was made on {length(fit$rows)} rows, the runs of {.arg ensemble} have {nrow(ensemble$outputs)}.",
+                  i = "Give the ensemble and the calibration of the same measurements."))
+  }
   drawn <- posterior_unit(fit)[systematic_draws(fit$weights, runs), , drop = FALSE]
   centre <- colMeans(drawn)
   unit <- pmin(pmax(sweep(1.5 * sweep(drawn, 2, centre), 2, centre, "+"), 0.001), 0.999)

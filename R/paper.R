@@ -38,7 +38,7 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #'   `hyperparameters` (draws of `alpha`, the fictitious condition last, `t2`, `lambda` and their weights), `lambda`
 #'   (draws of the precisions of equation 5), `index` (ranked table), `share` (draws of `R2`), `trust`, and `inside` and
 #'   `outside`, all that the sampler said of (5) and (6); `outside$approximation` tells the largest error among the
-#'   certified draws, the correction of the log evidence, and how many values were computed in which way. `tidy()` gives the table of the index, `coef()` the medians of
+#'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the last, and in the last by skeletons and directly. `tidy()` gives the table of the index, `coef()` the medians of
 #'   the parameters.
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)

@@ -1,17 +1,20 @@
 #!/usr/bin/env Rscript
-# How fast: Rscript bench/speed.R --out FILE [--only history,kernel,study]
-# One core. Required times are for a core on which dgemm (n = 1000) runs at 60 GFLOP/s; that rate is measured in the same
-# run and the times are scaled by it. The parts `history` and `kernel` build and run the micro-benchmarks of bench/micro
-# (Google Benchmark, for this machine's processor, in build/native); `study` uses the installed package.
-# FILE gets rows of name, value, unit, required, holds.
+# How fast: Rscript bench/speed.R --out FILE [--only history,kernel,ais,emulator,study,growth]
+# One core, unless a row says otherwise. Required times are for a core on which dgemm (n = 1000) runs at 60 GFLOP/s; that
+# rate is measured in the same run and the times are scaled by it. The parts are the files of bench/speed; those that time
+# single functions build and run the micro-benchmarks of bench/micro (Google Benchmark, for this machine's processor, in
+# build/native), the others use the installed package. FILE gets rows of name, value, unit, required, holds; parts that draw
+# figures put them beside it.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
 root <- normalizePath(file.path(here, ".."))
 out <- option("out", "speed.json")
-parts <- strsplit(option("only", "history,kernel,study"), ",")[[1]]
-unknown <- setdiff(parts, c("history", "kernel", "study"))
-if (length(unknown)) stop("--only knows history, kernel, study; got ", paste(unknown, collapse = ", "), call. = FALSE)
+known <- c("history", "kernel", "ais", "emulator", "study", "growth")
+parts <- strsplit(option("only", paste(known, collapse = ",")), ",")[[1]]
+unknown <- setdiff(parts, known)
+if (length(unknown)) stop("--only knows ", paste(known, collapse = ", "), "; got ", paste(unknown, collapse = ", "), call. = FALSE)
+suppressPackageStartupMessages(library(amiss))
 
 build <- file.path(root, "build", "native")
 run <- function(command, ...) {
@@ -44,45 +47,8 @@ scaled <- function(name, seconds, unit, required = NA) {
 }
 measured("dgemm, n = 1000, Eigen", gflops, "GFLOP/s")
 
-if ("history" %in% parts) {
-  r <- micro("micro_history")
-  likelihood <- vapply(c(384, 5760, 525600), function(n) r[[paste0("history/likelihood/", n)]]$seconds, 0)
-  for (i in 1:3) scaled(sprintf("history likelihood with gradient, p = 49, N = %d", c(384L, 5760L, 525600L)[i]), likelihood[i], "us", 100)
-  measured("greatest over least of these three", max(likelihood) / min(likelihood), "", 1.2)
-  scaled("history set-up of one error setting, N = 525600", r[["history/setup/525600"]]$seconds, "s", 10)
-}
-
-if ("kernel" %in% parts) {
-  r <- micro("micro_kernel")
-  scaled("equation (6), dense value, N = 384", r[["kernel/dense/384"]]$seconds, "ms")
-  measured("the same over one Cholesky factor (with kernel fill)", r[["kernel/dense/384"]]$seconds / r[["kernel/cholesky/384"]]$seconds, "")
-  scaled("equation (6), value from a skeleton, N = 384", r[["kernel/skeleton/384"]]$seconds, "ms", 0.5)
-  scaled("equation (6), value from a skeleton, N = 5760", r[["kernel/skeleton/5760"]]$seconds, "ms", 0.5)
-  scaled("equation (6), value at low rank, N = 5760", r[["kernel/low_rank/5760"]]$seconds, "ms")
-  required <- c("384/3" = 1, "5760/3" = 10, "5760/5" = 180, "8760/3" = 30, "11520/3" = 30)
-  for (case in names(required)) {
-    s <- r[[paste0("kernel/sampling/", case)]]
-    told <- sprintf("posterior and evidence, N = %s, %s conditions act", sub("/.*", "", case), sub(".*/", "", case))
-    scaled(told, s$seconds, "s", required[[case]])
-    measured(paste0(told, ": standard error"), s$standard_error, "nat", 0.05)
-    measured(paste0(told, ": effective draws"), s$effective_draws, "", 400, above = TRUE)
-    measured(paste0(told, ": likelihood values"), s$values, "", 10000)
-    measured(paste0(told, ": largest error of a certified draw"), s$largest_error, "nat", 0.05)
-    measured(paste0(told, ": second estimate less the frozen run, over its error"), s$annealed_less / s$annealed_error, "", 3)
-  }
-}
-
-if ("study" %in% parts) {
-  suppressPackageStartupMessages(library(amiss))
-  study <- read_study(system.file("studies", "paper_synthetic.yml", package = "amiss"))
-  m <- study$measurements
-  seconds <- system.time({
-    emulator <- train_emulator(simulate_design(study$models[["M3"]], m, study$runs, seed = 1), m)
-    paper <- calibrate_paper(emulator, m, seed = 1)
-    fit <- calibrate(emulator, m, seed = 1)
-    attribution <- attribute_discrepancy(fit, seed = 1)
-  })[["elapsed"]]
-  scaled("a paper-sized model: train, calibrate, both discrepancies, evidence", seconds, "s", 10)
-  measured("its evidence: standard error", paper$standard_error / log(10), "decade", 0.1)
+for (part in parts) {
+  cat("\n", part, "\n", sep = "")
+  sys.source(file.path(here, "speed", paste0(part, ".R")), new.env(parent = globalenv()))
 }
 write_rows(do.call(rbind, rows), out)

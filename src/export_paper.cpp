@@ -106,7 +106,7 @@ Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, co
   outside_list["hyperparameters"] = list_draws(draws, model.conditions());
   outside_list["approximation"] = Rcpp::List::create(
       Rcpp::_["largest_error"] = sample.largest_error, Rcpp::_["correction"] = sample.correction,
-      Rcpp::_["values"] = Rcpp::IntegerVector::create(Rcpp::_["thinned"] = sample.coarse,
+      Rcpp::_["values"] = Rcpp::IntegerVector::create(Rcpp::_["earlier"] = sample.coarse,
                                                       Rcpp::_["skeleton"] = sample.by_skeleton,
                                                       Rcpp::_["direct"] = sample.direct));
   inside_list["unit"] = inside_target.unit(inside.draws);

@@ -86,4 +86,6 @@ test_that("runs are added where the posterior lies, and the emulator is better t
   elsewhere <- suppressWarnings(ensemble(first$values, first$outputs))
   expect_error(refine_ensemble(elsewhere, fit), "elsewhere", class = "amiss_error_input")
   expect_error(refine_ensemble(first, "fit"), "fit", class = "amiss_error_input")
+  shorter <- simulate_design(bent, measurements(data[1:60, ], time = "hour", target = "Ti", boundary = ~ Te, noise_sd = 0.02), runs = 12, seed = 2)
+  expect_error(refine_ensemble(shorter, fit), "72 rows.*60", class = "amiss_error_input")
 })

@@ -105,7 +105,7 @@ test_that("a longer record is annealed through thinned ones, and its values are 
   approximation <- fast$outside$approximation
   expect_lt(approximation$largest_error, 0.1)
   expect_true(all(approximation$values > 0))
-  expect_identical(names(approximation$values), c("thinned", "skeleton", "direct"))
+  expect_identical(names(approximation$values), c("earlier", "skeleton", "direct"))
   dense <- paper_fit(data, control = list(tolerance = 0))
   expect_identical(dense$outside$approximation$values[["skeleton"]], 0L)
   expect_lt(abs(fast$log_evidence - dense$log_evidence), 4 * sqrt(fast$standard_error^2 + dense$standard_error^2))

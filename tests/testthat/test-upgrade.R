@@ -6,6 +6,26 @@ test_that("candidates that come near the best are calibrated in full, the others
   expect_equal(upgrade$named_cause$mechanism, "sun")
 })
 
+test_that("a third of the runs of a full calibration lies where the coarse posterior does", {
+  upgrade <- small_upgrade()
+  fit <- upgrade$models[[1]]$fit
+  design <- simulate_design(fit$emulator$simulator, upgrade$measurements, runs = 20, seed = 1)
+  expect_identical(dim(fit$emulator$processes$inputs), c(30L, 2L))
+  expect_identical(unname(fit$emulator$processes$inputs[1:20, ]), unname(design$unit))
+  spread <- function(rows) apply(fit$emulator$processes$inputs[rows, ], 2, sd)
+  expect_true(all(spread(21:30) < 0.5 * spread(1:20)))
+})
+
+test_that("a coarse candidate is compared with the coarse calibration of the current model", {
+  upgrade <- small_upgrade()
+  base <- upgrade$models[[1]]$fit
+  coarse <- amiss:::as_coarse(base)
+  expect_identical(coarse$log_evidence, base$coarse$log_evidence)
+  expect_false(coarse$log_evidence == base$log_evidence)
+  table <- amiss:::trial_table(list(sun = upgrade$models[[2]]$fit, drift = upgrade$models[[2]]$fit), upgrade$models[[1]], full = "sun")
+  expect_equal(diff(table$log10_bf), (base$log_evidence - coarse$log_evidence) / log(10), tolerance = 1e-10)
+})
+
 test_that("contenders are those within the margin, and none where nothing comes near adoption", {
   fit <- function(log10_evidence, se = 0.05, lag = 0) {
     posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "engine/ais/BridgedTarget.hpp"
+#include "engine/ais/SkewedMixture.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/parallel_for.hpp"
 
@@ -416,7 +417,7 @@ struct ImportanceSample {
 };
 
 // Adds n draws.
-void extend(ImportanceSample& sample, const Target& target, const StudentTMixture& mixture, Index n,
+void extend(ImportanceSample& sample, const Target& target, const Distribution& mixture, Index n,
             const Context& context, Stream& stream) {
   const Index before = sample.size(), total = before + n;
   sample.x.conservativeResize(target.dimension(), total);
@@ -441,31 +442,72 @@ void extend(ImportanceSample& sample, const Target& target, const StudentTMixtur
   sample.se = std::sqrt(std::max(0.0, size / sample.ess - 1.0) / (size - 1.0));
 }
 
+// Draws to which a mixture is fitted: weighted draws of one posterior from several samples, each of which
+// counts by its effective size.
+struct Pool {
+  MatrixXd x;
+  VectorXd weights;  // sum of each sample's: its effective size
+
+  void add(const MatrixXd& draws, const VectorXd& own) {
+    const Index before = x.cols();
+    x.conservativeResize(draws.rows(), before + draws.cols());
+    weights.conservativeResize(before + draws.cols());
+    x.rightCols(draws.cols()) = draws;
+    // Truncated (Ionides 2008), so that no single draw decides on the mixture.
+    const VectorXd kept = own.cwiseMin(1.0 / std::sqrt(static_cast<double>(own.size())));
+    weights.tail(draws.cols()) = kept * kept.sum() / kept.squaredNorm();
+  }
+};
+
+StudentTMixture fit_elliptic(const MatrixXd& x, const VectorXd& weights, const AisOptions& options,
+                             Stream& stream) {
+  return StudentTMixture::fit(x, weights, options.max_components, kImportanceDof, stream);
+}
+
+// A mixture that comes closer to the posterior, fitted to a weighted sample of it and, if it may be skewed,
+// to all samples before it.
+SkewedMixture refit(const ImportanceSample& sample, Pool& pool, const AisOptions& options, Stream& stream) {
+  if (!options.skewed)
+    return SkewedMixture(SkewMap(), fit_elliptic(sample.x, sample.weights, options, stream));
+  pool.add(sample.x, sample.weights);
+  return SkewedMixture::fit(pool.x, pool.weights / pool.weights.sum(), options.max_components, kImportanceDof,
+                            stream);
+}
+
 // Importance sample from a mixture fitted to the annealed draws, then from mixtures fitted to its own
 // weighted draws; the last mixture's draws alone are the estimator. Its effective size is 0 where no mixture
 // comes close.
-ImportanceSample importance_sample(const Target& target, const StudentTMixture& first,
+ImportanceSample importance_sample(const Target& target, const StudentTMixture& first, Pool pool,
                                    const AisOptions& options, const Context& context, Stream& stream,
                                    long& evaluations) {
   constexpr int kRounds = 4;
   constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
   constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
   constexpr Index kMost = 16;       // times the draws asked for, at most, for the sake of precision
+  constexpr Index kLeastAdded = 100;
   const Index n = options.importance_draws;
-  StudentTMixture mixture = first;
+  SkewedMixture mixture(SkewMap(), first);
   ImportanceSample sample;
-  extend(sample, target, mixture, n, context, stream);
-  evaluations += n;
+  const auto add = [&](Index draws) {
+    extend(sample, target, mixture, draws, context, stream);
+    evaluations += draws;
+  };
   const auto good = [&] { return sample.ess >= kGood * static_cast<double>(sample.size()); };
-  for (int round = 1; round < kRounds && sample.ess > kUsable && (round < 2 || !good()); ++round) {
-    mixture = StudentTMixture::fit(sample.x, sample.weights, options.max_components, kImportanceDof, stream);
+  const Index few = options.refit_draws > 0 ? std::min<Index>(options.refit_draws, n) : n;
+  add(few);
+  if (few < n && !(sample.ess > kUsable)) add(n - few);
+  const auto lacking = [&] {  // draws needed over those there are
+    return std::max(std::pow(sample.se / options.precision, 2), options.effective_draws / sample.ess);
+  };
+  for (int round = 1; round < kRounds && (options.skewed || sample.ess > kUsable); ++round) {
+    mixture = refit(sample, pool, options, stream);
     sample = ImportanceSample();
-    extend(sample, target, mixture, n, context, stream);
-    evaluations += n;
-  }
-  while (good() && !(sample.se <= options.precision) && sample.size() < kMost * n) {
-    extend(sample, target, mixture, n, context, stream);
-    evaluations += n;
+    add(n);
+    while (good() && lacking() > 1.0 && sample.size() < kMost * n) {
+      const double more = 1.1 * (lacking() - 1.0) * static_cast<double>(sample.size());
+      add(std::clamp<Index>(static_cast<Index>(more), kLeastAdded, n));
+    }
+    if (good()) break;
   }
   if (!good()) sample.ess = 0.0;
   return sample;
@@ -500,9 +542,11 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
                       AnnealedRun& annealed, AisResult& result) {
   Stream stream(context.seed, kImportance, 0);
   annealed.gather(result.draws, result.log_likelihood, result.weights);
-  const StudentTMixture mixture =
-      StudentTMixture::fit(result.draws, result.weights, options.max_components, kImportanceDof, stream);
-  ImportanceSample sample = importance_sample(target, mixture, options, context, stream, result.evaluations);
+  const StudentTMixture mixture = fit_elliptic(result.draws, result.weights, options, stream);
+  Pool pool;
+  pool.add(result.draws, result.weights);
+  ImportanceSample sample =
+      importance_sample(target, mixture, std::move(pool), options, context, stream, result.evaluations);
   if (sample.ess > 0) {
     result.second = sample.log_evidence;
     result.second_se = sample.se;
@@ -566,6 +610,8 @@ void AisOptions::check() const {
   if (importance_draws != 0 && importance_draws < 50) {
     throw std::invalid_argument("ais: importance_draws must be 0 (none) or at least 50");
   }
+  if (refit_draws < 0 || !(effective_draws >= 0))
+    throw std::invalid_argument("ais: refit_draws and effective_draws must not be negative");
   if (max_components < 1 || max_temperatures < 1) throw std::invalid_argument("ais: negative size");
 }
 

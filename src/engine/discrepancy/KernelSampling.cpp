@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "engine/ais/BridgedTarget.hpp"
+#include "engine/ais/SkewedMixture.hpp"
 #include "engine/discrepancy/LowRankKernel.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/parallel_for.hpp"
@@ -29,7 +30,9 @@ constexpr double kLargestSkeleton = 800.0, kWorthySkeleton = 0.65;  // the latte
 constexpr Index kReachDraws = 1000;
 constexpr double kCoarser = 10.0;               // tolerance while only draws are needed, over the final one
 constexpr int kPilotChains = 64, kChains = 16;  // unless asked otherwise
-constexpr std::uint64_t kStage = 128;           // purposes of the random streams
+constexpr int kRefitDraws = 300, kEffectiveDraws = 400;  // likewise
+constexpr double kRoughDrop = 0.6;     // conditional effective size while only draws are needed
+constexpr std::uint64_t kStage = 128;  // purposes of the random streams
 
 // Skeletons from small to large that together serve nearly all draws of a distribution: one for its bulk, one
 // for draws that are rough in one direction only, and the largest that is still worth it for the others.
@@ -138,22 +141,21 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
   }
 }
 
-StudentTMixture fit_population(const MatrixXd& draws, Stream& stream) {
+SkewedMixture fit_population(const MatrixXd& draws, Stream& stream) {
   const VectorXd weights = VectorXd::Constant(draws.cols(), 1.0 / static_cast<double>(draws.cols()));
-  return StudentTMixture::fit(draws, weights, kComponents, kDof, stream);
+  return SkewedMixture::fit(draws, weights, kComponents, kDof, stream);
 }
 
 // Where the posterior of this record lies, found by way of thinned ones.
-StudentTMixture sample_stage(const KernelModel& model, const AisOptions& options,
-                             const KernelSamplingOptions& sampling, const Context& context,
-                             long& evaluations) {
+SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
+                           const KernelSamplingOptions& sampling, const Context& context, long& evaluations) {
   Context own = context;
   own.seed = context.seed + kStage;
   Stream stream(own.seed, kStage, 0);
   const KernelTarget target(model);
   if (model.size() <= sampling.coarsest)
     return fit_population(sample_population(target, options, own, evaluations), stream);
-  const StudentTMixture before =
+  const SkewedMixture before =
       sample_stage(model.thinned(sampling.thinning), options, sampling, own, evaluations);
   const ApproximateTarget approximate(model, before, kCoarser * sampling.tolerance, context, stream);
   MatrixXd draws = sample_population(BridgedTarget(approximate, before), options, own, evaluations);
@@ -182,7 +184,12 @@ KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
   AisOptions own = options;
   if (own.pilot_chains == 0) own.pilot_chains = kPilotChains;
   if (own.chains == 0) own.chains = kChains;
-  const StudentTMixture before = sample_stage(model, own, sampling, context, sample.coarse);
+  if (own.refit_draws == 0) own.refit_draws = kRefitDraws;
+  if (own.effective_draws == 0) own.effective_draws = kEffectiveDraws;
+  own.skewed = true;
+  AisOptions rough = own;
+  rough.ess_drop = std::min(own.ess_drop, kRoughDrop);
+  const SkewedMixture before = sample_stage(model, rough, sampling, context, sample.coarse);
   Stream stream(context.seed, kStage, 0);
   const ApproximateTarget approximate(model, before, sampling.tolerance, context, stream);
   const BridgedTarget bridged(approximate, before);

@@ -27,6 +27,10 @@ struct KernelSample {
 /// evidence is that of the full record. Values come from a skeleton of the kernel that serves where the
 /// coarser posterior's draws lie, from a low rank or the dense factor elsewhere; a sample of the final draws
 /// is compared with certified values and the evidence corrected by what they say.
+///
+/// Where `options` leave them open: 64 pilot chains, groups of 16, 300 draws for the first round of the
+/// importance sample, 400 effective draws in the end. Its mixture is skewed: the prior limits, on one side,
+/// the alpha of every condition that does not act.
 KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
                            const KernelSamplingOptions& sampling, const Context& context);
 

@@ -33,7 +33,7 @@ double log_density(double dimension, double lambda, double log_det, double quadr
   return -0.5 * (dimension * (kLogTwoPi - std::log(lambda)) + log_det + lambda * quadratic);
 }
 
-// log|I + r G| and, given b, what the discrepancy explains: r b'(I + r G)^-1 b.
+// log|I + r G| and, given b, what the discrepancy explains: r b'(I + r G)^-1 b. Of G the lower triangle.
 struct Inside {
   double log_det, explained;
   VectorXd weights;  // r (I + r G)^-1 b
@@ -64,7 +64,6 @@ std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const 
     f -= basis * (basis.transpose() * f);
     MatrixXd gram = MatrixXd::Zero(f.cols(), f.cols());
     gram.selfadjointView<Eigen::Lower>().rankUpdate(f.transpose());
-    gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
     const Inside part = inside(gram, f.transpose() * model.outside(), ratio);
     const VectorXd w = model.outside() - f * part.weights;
     const double quadratic = model.outside().squaredNorm() - part.explained;
@@ -109,7 +108,7 @@ KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double 
   // U = C_:I C_II^-1 = L L_I^-1, L_I lower triangular in the order of the pivots.
   own.triangularView<Eigen::Lower>().solveInPlace<Eigen::OnTheRight>(u);
   u -= model.orthonormal() * (model.orthonormal().transpose() * u);
-  gram_.noalias() = u.transpose() * u;
+  root_ = Eigen::HouseholderQR<MatrixXd>(u).matrixQR().topRows(m).triangularView<Eigen::Upper>();
   projected_ = u.transpose() * model.outside();
   square_ = model.outside().squaredNorm();
   dimension_ = static_cast<double>(model.size() - model.orthonormal().cols());
@@ -124,8 +123,10 @@ double KernelSkeleton::log_likelihood(const KernelParameters& p) const {
   PivotedCholesky cholesky(scaled(pivots_, condition_, p.decay));
   cholesky.extend(0.1 * tolerance_ / ratio, rank());
   const MatrixXd root = cholesky.root();
-  const MatrixXd product = gram_ * root;
-  const Inside part = inside(root.transpose() * product, root.transpose() * projected_, ratio);
+  const MatrixXd product = root_.triangularView<Eigen::Upper>() * root;
+  MatrixXd gram = MatrixXd::Zero(root.cols(), root.cols());
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(product.transpose());
+  const Inside part = inside(gram, root.transpose() * projected_, ratio);
   return log_density(dimension_, p.lambda, part.log_det, square_ - part.explained);
 }
 

@@ -60,7 +60,7 @@ class KernelSkeleton {
   double ratio_, tolerance_;
   std::vector<int> condition_;
   Eigen::MatrixXd pivots_;     // m x columns: the conditions at I
-  Eigen::MatrixXd gram_;       // G
+  Eigen::MatrixXd root_;       // G
   Eigen::VectorXd projected_;  // g
   double square_ = 0.0;        // y'Py
   double dimension_ = 0.0;     // N - Q

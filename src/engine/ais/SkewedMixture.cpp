@@ -1,0 +1,122 @@
+#include "engine/ais/SkewedMixture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace amiss {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// Probabilities at which a distribution is matched, and the standard normal quantiles.
+const double kProbability[] = {0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98};
+const double kNormal[] = {-2.053749, -1.281552, -0.674490, 0.0, 0.674490, 1.281552, 2.053749};
+constexpr Index kKnots = 7;
+constexpr double kLeastPoints = 100.0;  // effective, from which quantiles can be told
+
+// The piece of a broken line on which v lies: from knot i to knot i + 1, the outer ones without end.
+template <class Knots>
+Index piece(const Knots& knots, double v) {
+  Index i = 0;
+  while (i + 2 < kKnots && v > knots[i + 1]) ++i;
+  return i;
+}
+
+// Quantiles at p (increasing) of weighted values, linear between the middles of their weights.
+ArrayXd weighted_quantiles(const VectorXd& values, const VectorXd& weights, const ArrayXd& p) {
+  const Index n = values.size();
+  std::vector<Index> order(static_cast<std::size_t>(n));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a] < values[b]; });
+  ArrayXd out(p.size());
+  double below = 0.0, middle_before = 0.0, value_before = values[order.front()];
+  Index k = 0;
+  for (Index i : order) {
+    const double middle = below + 0.5 * weights[i];
+    for (; k < p.size() && p[k] <= middle; ++k) {
+      const double share = middle > middle_before ? (p[k] - middle_before) / (middle - middle_before) : 1.0;
+      out[k] = value_before + share * (values[i] - value_before);
+    }
+    below += weights[i];
+    middle_before = middle;
+    value_before = values[i];
+  }
+  for (; k < p.size(); ++k) out[k] = value_before;
+  return out;
+}
+
+}  // namespace
+
+SkewMap SkewMap::fit(const MatrixXd& x, const VectorXd& weights) {
+  const ArrayXd p = Eigen::Map<const ArrayXd>(kProbability, kKnots);
+  SkewMap map;
+  map.even_knots_ = Eigen::Map<const VectorXd>(kNormal, kKnots);
+  map.knots_.resize(kKnots, x.rows());
+  for (Index j = 0; j < x.rows(); ++j) {
+    auto own = map.knots_.col(j);
+    own = weighted_quantiles(x.row(j).transpose(), weights, p);
+    for (Index i = 0; i + 1 < kKnots; ++i) {
+      if (!(own[i + 1] > own[i])) own = map.even_knots_;
+    }
+  }
+  return map;
+}
+
+VectorXd SkewMap::even(const VectorXd& x) const {
+  if (knots_.rows() == 0) return x;
+  VectorXd z(x.size());
+  for (Index j = 0; j < x.size(); ++j) {
+    const auto own = knots_.col(j);
+    const Index i = piece(own, x[j]);
+    z[j] = even_knots_[i] + (x[j] - own[i]) * (even_knots_[i + 1] - even_knots_[i]) / (own[i + 1] - own[i]);
+  }
+  return z;
+}
+
+VectorXd SkewMap::skewed(const VectorXd& z) const {
+  if (knots_.rows() == 0) return z;
+  VectorXd x(z.size());
+  for (Index j = 0; j < z.size(); ++j) {
+    const auto own = knots_.col(j);
+    const Index i = piece(even_knots_, z[j]);
+    x[j] = own[i] + (z[j] - even_knots_[i]) * (own[i + 1] - own[i]) / (even_knots_[i + 1] - even_knots_[i]);
+  }
+  return x;
+}
+
+VectorXd SkewMap::slope(const VectorXd& x) const {
+  VectorXd slope = VectorXd::Ones(x.size());
+  if (knots_.rows() == 0) return slope;
+  for (Index j = 0; j < x.size(); ++j) {
+    const auto own = knots_.col(j);
+    const Index i = piece(own, x[j]);
+    slope[j] = (even_knots_[i + 1] - even_knots_[i]) / (own[i + 1] - own[i]);
+  }
+  return slope;
+}
+
+SkewedMixture SkewedMixture::fit(const MatrixXd& x, const VectorXd& weights, int max_components, double dof,
+                                 Stream& stream) {
+  SkewMap map;
+  if (1.0 / weights.squaredNorm() >= kLeastPoints) map = SkewMap::fit(x, weights);
+  MatrixXd z(x.rows(), x.cols());
+  for (Index i = 0; i < x.cols(); ++i) z.col(i) = map.even(x.col(i));
+  return SkewedMixture(std::move(map), StudentTMixture::fit(z, weights, max_components, dof, stream));
+}
+
+double SkewedMixture::log_density(const VectorXd& x) const {
+  return mixture_.log_density(map_.even(x)) + map_.slope(x).array().log().sum();
+}
+
+VectorXd SkewedMixture::gradient(const VectorXd& x) const {
+  return map_.slope(x).cwiseProduct(mixture_.gradient(map_.even(x)));
+}
+
+VectorXd SkewedMixture::draw(Stream& stream) const { return map_.skewed(mixture_.draw(stream)); }
+
+}  // namespace amiss

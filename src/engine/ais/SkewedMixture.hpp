@@ -1,0 +1,45 @@
+#pragma once
+#include "engine/ais/StudentT.hpp"
+
+namespace amiss {
+
+/// Monotone maps from skewed coordinates x to even ones z, one for each coordinate: linear between quantiles,
+/// and beyond the outer ones.
+class SkewMap {
+ public:
+  /// The map that changes nothing.
+  SkewMap() = default;
+
+  /// Sends quantiles of weighted points (columns of x) to those of a standard normal distribution. A
+  /// coordinate of which many points share one value is left as it is.
+  static SkewMap fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights);
+
+  Eigen::VectorXd even(const Eigen::VectorXd& x) const;    ///< z of x
+  Eigen::VectorXd skewed(const Eigen::VectorXd& z) const;  ///< x of z
+  Eigen::VectorXd slope(const Eigen::VectorXd& x) const;   ///< dz/dx of each coordinate
+
+ private:
+  Eigen::MatrixXd knots_;  // of x, one column for each coordinate; no rows: the identity
+  Eigen::VectorXd even_knots_;
+};
+
+/// A mixture of Student t's in coordinates made even: for posteriors that a prior limits on one side, which
+/// no elliptic distribution comes close to.
+class SkewedMixture : public Distribution {
+ public:
+  SkewedMixture(SkewMap map, StudentTMixture mixture) : map_(std::move(map)), mixture_(std::move(mixture)) {}
+
+  /// As StudentTMixture::fit(), after SkewMap::fit().
+  static SkewedMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components,
+                           double dof, Stream& stream);
+
+  double log_density(const Eigen::VectorXd& x) const override;
+  Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override;
+  Eigen::VectorXd draw(Stream& stream) const override;
+
+ private:
+  SkewMap map_;
+  StudentTMixture mixture_;
+};
+
+}  // namespace amiss
