@@ -5,6 +5,10 @@ ais_ <- function(log_likelihood, gradient, dimension, control, context) {
     .Call(`_amiss_ais_`, log_likelihood, gradient, dimension, control, context)
 }
 
+cpu_has_avx2_ <- function() {
+    .Call(`_amiss_cpu_has_avx2_`)
+}
+
 make_basis_ <- function(outputs, control) {
     .Call(`_amiss_make_basis_`, outputs, control)
 }

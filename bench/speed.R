@@ -22,7 +22,7 @@ run <- function(command, ...) {
   if (status != 0) stop(paste(command, paste(c(...), collapse = " ")), " failed", call. = FALSE)
 }
 run("cmake", "-S", root, "-B", build, "-DCMAKE_BUILD_TYPE=Release", "-DAMISS_NATIVE=ON")
-run("cmake", "--build", build, "-j2", "--target", "micro_machine", "micro_history", "micro_kernel")
+run("cmake", "--build", build, "-j2", "--target", "micro_machine", "micro_history", "micro_kernel", "micro_emulator")
 
 # One row for each benchmark: its name, real time in seconds, and its counters.
 micro <- function(program, filter = ".") {

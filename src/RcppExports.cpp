@@ -26,6 +26,16 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// cpu_has_avx2_
+bool cpu_has_avx2_();
+RcppExport SEXP _amiss_cpu_has_avx2_() {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    rcpp_result_gen = Rcpp::wrap(cpu_has_avx2_());
+    return rcpp_result_gen;
+END_RCPP
+}
 // make_basis_
 Rcpp::List make_basis_(const Eigen::MatrixXd& outputs, const Rcpp::List& control);
 RcppExport SEXP _amiss_make_basis_(SEXP outputsSEXP, SEXP controlSEXP) {
@@ -210,6 +220,7 @@ END_RCPP
 
 static const R_CallMethodDef CallEntries[] = {
     {"_amiss_ais_", (DL_FUNC) &_amiss_ais_, 5},
+    {"_amiss_cpu_has_avx2_", (DL_FUNC) &_amiss_cpu_has_avx2_, 0},
     {"_amiss_make_basis_", (DL_FUNC) &_amiss_make_basis_, 2},
     {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 4},
     {"_amiss_predict_emulator_", (DL_FUNC) &_amiss_predict_emulator_, 2},

@@ -9,11 +9,17 @@ export R_LIBS="$library${R_LIBS:+:$R_LIBS}"
 say() { printf '\n== %s\n' "$*"; }
 fail() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
 
-# Installs the package into build/library from a copy of the sources, so that the clone stays clean.
+# Installs the package into build/library from a copy of the sources, so that the clone stays clean; for this machine's
+# processor, or with "portable" into build/portable/library as R CMD INSTALL alone does.
 # Objects are kept from one run to the next. make does not follow headers, so they are dropped when a header,
 # the build's own files or R have changed.
 install_package() {
-  local copy="$root/build/package" state
+  local copy="$root/build/package" library="$library" native=1 state
+  if [[ "${1:-}" == portable ]]; then
+    copy="$root/build/portable/package"
+    library="$root/build/portable/library"
+    native=
+  fi
   mkdir -p "$library" "$copy"
   find "$copy" -mindepth 1 -maxdepth 1 ! -name src ! -name .state -exec rm -rf {} +
   tar -C "$root" -c --exclude='*.o' --exclude='*.so' --exclude=./{build,demo,.git,tests,tools,bench} . |
@@ -25,6 +31,6 @@ install_package() {
     printf '%s\n' "$state" > "$copy/.state"
   fi
   rm -rf "$library/00LOCK-package"
-  MAKEFLAGS="${MAKEFLAGS:--j2}" R_MAKEVARS_USER="${R_MAKEVARS_USER:-$root/tools/Makevars}" R CMD INSTALL --no-multiarch --library="$library" "$copy" > "$root/build/install.log" 2>&1 ||
+  AMISS_NATIVE=$native MAKEFLAGS="${MAKEFLAGS:--j2}" R_MAKEVARS_USER="${R_MAKEVARS_USER:-$root/tools/Makevars}" R CMD INSTALL --no-multiarch --library="$library" "$copy" > "$root/build/install.log" 2>&1 ||
     { cat "$root/build/install.log" >&2; fail "the package could not be installed"; }
 }

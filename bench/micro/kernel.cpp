@@ -20,7 +20,7 @@ void dense(benchmark::State& state) {
   const KernelModel model = kernel_record(state.range(0), 3, 3);
   for (auto _ : state) benchmark::DoNotOptimize(model.log_likelihood(typical_point()));
 }
-BENCHMARK(dense)->Name("kernel/dense")->Arg(384)->Arg(1536)->Unit(benchmark::kMillisecond);
+BENCHMARK(dense)->Name("kernel/dense")->Arg(96)->Arg(384)->Arg(1536)->Unit(benchmark::kMillisecond);
 
 // The least that a dense value can cost: one Cholesky factor of that size.
 void factor(benchmark::State& state) {
@@ -32,7 +32,7 @@ void factor(benchmark::State& state) {
     benchmark::DoNotOptimize(Eigen::LLT<Eigen::Ref<MatrixXd>, Eigen::Lower>(work).matrixLLT().data());
   }
 }
-BENCHMARK(factor)->Name("kernel/cholesky")->Arg(384)->Arg(1536)->Unit(benchmark::kMillisecond);
+BENCHMARK(factor)->Name("kernel/cholesky")->Arg(96)->Arg(384)->Arg(1536)->Unit(benchmark::kMillisecond);
 
 void low_rank(benchmark::State& state) {
   const KernelModel model = kernel_record(state.range(0), 3, 3);

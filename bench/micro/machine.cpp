@@ -14,6 +14,29 @@ void dgemm(benchmark::State& state) {
   const double flops = 2.0 * static_cast<double>(n) * static_cast<double>(n) * static_cast<double>(n);
   state.counters["flops"] = benchmark::Counter(flops, benchmark::Counter::kIsIterationInvariantRate);
 }
+// The Cholesky factor, alone: the limit of a likelihood of so many values.
+void dpotrf(benchmark::State& state) {
+  const Eigen::Index n = state.range(0);
+  Eigen::MatrixXd a = Eigen::MatrixXd::Constant(n, n, 0.5);
+  a.diagonal().array() += 1.0;
+  Eigen::MatrixXd work(n, n);
+  for (auto _ : state) {
+    work = a;
+    benchmark::DoNotOptimize(Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(work).matrixLLT().data());
+  }
+  const double flops = static_cast<double>(n) * static_cast<double>(n) * static_cast<double>(n) / 3.0;
+  state.counters["flops"] = benchmark::Counter(flops, benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(dpotrf)
+    ->Name("machine/dpotrf")
+    ->Arg(50)
+    ->Arg(100)
+    ->Arg(200)
+    ->Arg(384)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->Unit(benchmark::kMillisecond);
+
 BENCHMARK(dgemm)->Name("machine/dgemm")->Arg(384)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 BENCHMARK_MAIN();

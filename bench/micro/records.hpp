@@ -1,4 +1,6 @@
 #pragma once
+#include <sys/resource.h>
+
 #include <cmath>
 #include <cstdint>
 
@@ -13,6 +15,13 @@ namespace amiss::bench {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+/// The most memory that this process has held so far, MB.
+inline double peak_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
 
 constexpr double kDay = 24.0, kTurn = 6.28318530717958648;
 
@@ -71,18 +80,18 @@ inline KernelModel kernel_record(Index n, int active, std::uint64_t seed) {
   return KernelModel(data, priors);
 }
 
-/// Seven conditions with seven filter columns each: p = 49.
-inline HistoryData history_record(Index n) {
+/// Conditions with seven filter columns each; seven of them give p = 49.
+inline HistoryData history_record(Index n, Index conditions = 7) {
   Stream stream(5, 1, 1);
   HistoryData data;
   data.basis = daily_basis(n);
-  data.responses = stream.normals(n, 49);
-  for (Index j = 0; j < 49; ++j) {
+  data.responses = stream.normals(n, 7 * conditions);
+  for (Index j = 0; j < 7 * conditions; ++j) {
     const double keep = 1.0 - 1.0 / static_cast<double>(1 + 3 * (j % 7));
     for (Index i = 1; i < n; ++i) data.responses(i, j) += keep * data.responses(i - 1, j);
     data.condition.push_back(static_cast<int>(j / 7));
   }
-  data.y = data.responses.col(3) + data.responses.col(20) + 0.5 * stream.normals(n);
+  data.y = data.responses.col(3) + data.responses.col(10) + 0.5 * stream.normals(n);
   data.axis.time = VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1));
   data.axis.new_segment.assign(static_cast<std::size_t>(n), false);
   data.axis.new_segment[0] = true;

@@ -6,6 +6,7 @@
 
 #include "engine/emulator/ModeSearch.hpp"
 #include "engine/linalg/GaussianKernel.hpp"
+#include "engine/linalg/triangular.hpp"
 
 namespace amiss {
 namespace {
@@ -78,7 +79,11 @@ double log_likelihood(const MatrixXd& inputs, const VectorXd& values, const Vect
 
   if (gradient.size() > 0) {
     // d value / d theta_j = 1/2 tr[(w w' - C^-1) dC/dtheta_j] (Rasmussen and Williams 2006, equation 5.9).
-    MatrixXd sensitivity = -factor.solve(MatrixXd::Identity(c.rows(), c.cols()));
+    MatrixXd sensitivity = factor.matrixLLT();
+    invert_lower(sensitivity);
+    square_lower(sensitivity);
+    symmetrise(sensitivity);
+    sensitivity *= -1.0;
     sensitivity.noalias() += weights * weights.transpose();
     const double trace = sensitivity.trace();
     c.diagonal().array() -= noise_variance(p);
@@ -128,9 +133,11 @@ GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values,
   const Eigen::LLT<MatrixXd> factor(covariance(scaled_inputs_, parameters_));
   if (factor.info() != Eigen::Success)
     throw std::runtime_error("emulator: covariance is not positive definite");
-  root_inverse_ = MatrixXd::Identity(values.size(), values.size());
-  factor.matrixL().solveInPlace(root_inverse_);
-  inverse_.noalias() = root_inverse_.transpose() * root_inverse_;
+  root_inverse_ = factor.matrixL();
+  invert_lower(root_inverse_);
+  inverse_ = root_inverse_;
+  square_lower(inverse_);
+  symmetrise(inverse_);
   weights_ = inverse_ * values_;
 }
 

@@ -1,0 +1,82 @@
+# How cost grows: time against the sizes of a problem, the exponent fitted to its upper half, and the limit: the flops of
+# the factorisations at the rate that this machine reaches for them.
+
+rate <- micro("micro_machine")
+dpotrf <- stats::approxfun(log(c(50, 100, 200, 384, 1000, 2000)), log(vapply(c(50, 100, 200, 384, 1000, 2000), function(n) {
+  rate[[paste0("machine/dpotrf/", n)]]$flops
+}, 0)), rule = 2)
+potrf_rate <- function(n) exp(dpotrf(log(n)))
+gemm_rate <- gflops * 1e9
+
+series <- list()
+against <- function(stage, size, of, at, seconds, limit = rep(NA_real_, length(at))) {
+  series[[length(series) + 1]] <<- data.frame(stage = stage, size = size, of = of, at = at, seconds = seconds, limit = limit)
+  upper <- at >= stats::median(at)
+  exponent <- stats::coef(stats::lm(log(seconds[upper]) ~ log(at[upper])))[[2]]
+  measured(sprintf("%s against %s: exponent", stage, size), exponent, "")
+  last <- length(at)
+  scaled(sprintf("%s, %s = %s", stage, size, format(at[last], big.mark = ",")), seconds[last], if (seconds[last] < 1e-3) "us" else "ms")
+  if (!is.na(limit[last])) measured(sprintf("%s over its limit, %s = %s", stage, size, format(at[last], big.mark = ",")), seconds[last] / limit[last], "")
+}
+seconds_of <- function(r, prefix, at, after = "") vapply(at, function(n) r[[paste0(prefix, "/", format(n, scientific = FALSE, trim = TRUE), after)]]$seconds, 0)
+
+# Per value and gradient of the emulator's density: a factor and an inverse, M^3 flops in all.
+emulator <- micro("micro_emulator")
+m <- c(50, 100, 200, 500, 1000, 2000)
+against("emulator, density and gradient", "runs M", "P = 8", m, seconds_of(emulator, "emulator/density", m, "/8"),
+        m^3 / 3 / potrf_rate(m) + 2 * m^3 / 3 / gemm_rate)
+p <- c(3, 5, 10, 20, 40)
+against("emulator, density and gradient", "parameters P", "M = 200", p, seconds_of(emulator, "emulator/density/200", p),
+        rep(200^3 / 3 / potrf_rate(200) + 2 * 200^3 / 3 / gemm_rate, length(p)))
+at <- c(50, 200, 384, 1000, 2000)
+against("emulator, prediction at 64 points", "runs M", "P = 8", at, seconds_of(emulator, "emulator/prediction", at), 64 * at^2 / gemm_rate)
+
+history <- micro("micro_history", "setup/(384|1440|5760|52560)$|conditions|likelihood")
+n <- c(384, 1440, 5760, 52560)
+against("history model, set-up of one error", "time steps N", "p = 49", n, seconds_of(history, "history/setup", n), n * (55^2 + 2 * 6 * 55) / gemm_rate)
+n <- c(384, 5760, 525600)
+against("history model, likelihood and gradient", "time steps N", "p = 49", n, seconds_of(history, "history/likelihood", n))
+s <- c(2, 4, 8, 16, 32, 40)
+columns <- 7 * s
+against("history model, likelihood and gradient", "conditions S", "7 columns each", s, seconds_of(history, "history/conditions", s),
+        columns^3 / 3 / potrf_rate(columns) + columns^3 / 3 / gemm_rate)
+kernel <- micro("micro_kernel", "dense/(96|384|1536)$|skeleton|low_rank")
+n <- c(96, 384, 1536)
+against("equation (6), dense value", "time steps N", "S = 5", n, seconds_of(kernel, "kernel/dense", n), n^3 / 3 / potrf_rate(n))
+n <- c(384, 1536, 5760)
+against("equation (6), value at low rank", "time steps N", "S = 5", n, seconds_of(kernel, "kernel/low_rank", n))
+
+# What is independent goes to the threads: runs of the simulator, and groups of chains.
+weather <- as.matrix(cbind(synthetic_weather(days = 14, step_h = 0.25, seed = 1)[c("Te", "Gv", "Ws", "Wd")], RHP = 50))
+box <- paper_box("M3")
+middle <- vapply(zone_parameters(box), function(p) (p$prior$lower + p$prior$upper) / 2, 0)
+runs <- c(25, 50, 100, 200)
+simulated <- function(n, threads) {
+  values <- matrix(middle, n, length(middle), byrow = TRUE, dimnames = list(NULL, names(middle)))
+  min(replicate(3, system.time(simulate_zone(box, values, weather, step_s = 900, threads = threads))[["elapsed"]]))
+}
+against("zone simulator, 14 days of quarters", "runs", "one thread", runs, vapply(runs, simulated, 0, threads = 1))
+
+# Memory of the history model's set-up: one process for each length, as only a process knows the most it held.
+n <- c(5760, 52560, 525600)
+peak <- vapply(n, function(n) {
+  micro("micro_history", sprintf("setup/%s$", format(n, scientific = FALSE)))[[1]]$peak_memory
+}, 0)
+for (i in seq_along(n)) {
+  measured(sprintf("history model, most memory held (data included), N = %s", format(n[i], big.mark = ",")), peak[i], "MB", if (n[i] == 525600) 1000 else NA)
+}
+
+table <- do.call(rbind, series)
+table$panel <- factor(paste0(table$stage, "\nagainst ", table$size, " (", table$of, ")"), unique(paste0(table$stage, "\nagainst ", table$size, " (", table$of, ")")))
+figure <- ggplot2::ggplot(table, ggplot2::aes(.data$at, 1e3 * .data$seconds)) +
+  ggplot2::geom_line(ggplot2::aes(y = 1e3 * .data$limit, colour = "flops of the factorisations at this machine's rate"), linetype = 2, na.rm = TRUE) +
+  ggplot2::geom_line(ggplot2::aes(colour = "measured")) +
+  ggplot2::geom_point(ggplot2::aes(colour = "measured"), size = 2) +
+  ggplot2::facet_wrap("panel", scales = "free", ncol = 3) +
+  ggplot2::scale_x_log10(labels = function(x) format(x, big.mark = ",", scientific = FALSE, trim = TRUE)) +
+  ggplot2::scale_y_log10(labels = function(x) format(x, scientific = FALSE, trim = TRUE, drop0trailing = TRUE)) +
+  ggplot2::scale_colour_manual(NULL, values = c(measured = "#08519C", "flops of the factorisations at this machine's rate" = "grey45")) +
+  ggplot2::labs(x = NULL, y = "milliseconds", title = "How the cost of each stage grows") +
+  ggplot2::theme_minimal(base_size = 11) +
+  ggplot2::theme(legend.position = "top", panel.grid.minor = ggplot2::element_blank(), plot.title.position = "plot")
+ggplot2::ggsave(sub("\\.json$", "-growth.png", out), figure, width = 11, height = 10, dpi = 110, bg = "white")
