@@ -151,23 +151,28 @@ TEST(CalibrationTarget, ReferenceIsTheMixtureTimesThePriorOfTheParameters) {
   for (Index d = 4; d < 6; ++d) EXPECT_NEAR(sd[d], 1.0, 0.05);
 }
 
-TEST(CalibrationTarget, EvidenceEqualsQuadratureWhateverTheReference) {
-  const Emulator emulator = make_emulator(1);
-  const HistoryModel model = make_model({});
-  const HistoryTarget history(model, {});  // coordinates: sigma and one parameter
-  const CalibrationTarget exact(history, make_reference(1, 1.0), emulator);
-  // Trapezoidal rule over prior times likelihood, accurate to rounding for a smooth integrand.
+// Log evidence of a target of two coordinates: trapezoidal rule over prior times likelihood, accurate to
+// rounding for a smooth integrand.
+double evidence_by_quadrature(const CalibrationTarget& target) {
   const int m = 400;
   const double h = 16.0 / m;
   VectorXd log_terms((m + 1) * (m + 1));
   MatrixXd row(2, m + 1);
   for (int i = 0; i <= m; ++i) {
     for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
-    const VectorXd ll = exact.log_likelihood(row);
-    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + exact.log_reference(row.col(j));
+    const VectorXd ll = target.log_likelihood(row);
+    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + target.log_reference(row.col(j));
   }
   const double top = log_terms.maxCoeff();
-  const double truth = top + std::log((log_terms.array() - top).exp().sum() * h * h);
+  return top + std::log((log_terms.array() - top).exp().sum() * h * h);
+}
+
+TEST(CalibrationTarget, EvidenceEqualsQuadratureWhateverTheReference) {
+  const Emulator emulator = make_emulator(1);
+  const HistoryModel model = make_model({});
+  const HistoryTarget history(model, {});  // coordinates: sigma and one parameter
+  const CalibrationTarget exact(history, make_reference(1, 1.0), emulator);
+  const double truth = evidence_by_quadrature(exact);
   for (double width : {0.6, 1.0, 1.5}) {
     const CalibrationTarget target(history, make_reference(1, width), emulator);
     const AisResult result = sample_ais(target, {}, Context());
@@ -290,17 +295,7 @@ TEST(CalibrationTarget, AContradictedHistoryPosteriorDoesNotMislead) {
       history, StudentTMixture::fit(outside.draws, outside.weights, 3, 8.0, stream), emulator);
   const AisResult result = sample_calibration(target, outside, {}, Context());
   const CalibrationTarget exact = target.from_prior();
-  const int m = 400;  // trapezoidal rule, as above
-  const double h = 16.0 / m;
-  VectorXd log_terms((m + 1) * (m + 1));
-  MatrixXd row(2, m + 1);
-  for (int i = 0; i <= m; ++i) {
-    for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
-    const VectorXd ll = exact.log_likelihood(row);
-    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + exact.log_reference(row.col(j));
-  }
-  const double top = log_terms.maxCoeff();
-  const double truth = top + std::log((log_terms.array() - top).exp().sum() * h * h);
+  const double truth = evidence_by_quadrature(exact);
   EXPECT_TRUE(result.trusted) << result.verdict;
   EXPECT_LT(std::abs(result.log_evidence - truth), std::max(4 * result.standard_error, 0.02));
   EXPECT_LT(result.standard_error, 0.12);
