@@ -1,5 +1,5 @@
 #!/usr/bin/env Rscript
-# How fast: Rscript bench/speed.R --out FILE [--only history,kernel,ais,emulator,study,growth]
+# How fast: Rscript bench/speed.R --out FILE [--only history,kernel,ais,emulator,study,peers,growth,instructions]
 # One core, unless a row says otherwise. Required times are for a core on which dgemm (n = 1000) runs at 60 GFLOP/s; that
 # rate is measured in the same run and the times are scaled by it. The parts are the files of bench/speed; those that time
 # single functions build and run the micro-benchmarks of bench/micro (Google Benchmark, for this machine's processor, in
@@ -10,7 +10,7 @@ here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE
 source(file.path(here, "options.R"))
 root <- normalizePath(file.path(here, ".."))
 out <- option("out", "speed.json")
-known <- c("history", "kernel", "ais", "emulator", "study", "growth")
+known <- c("history", "kernel", "ais", "emulator", "study", "peers", "growth", "instructions")
 parts <- strsplit(option("only", paste(known, collapse = ",")), ",")[[1]]
 unknown <- setdiff(parts, known)
 if (length(unknown)) stop("--only knows ", paste(known, collapse = ", "), "; got ", paste(unknown, collapse = ", "), call. = FALSE)
