@@ -14,10 +14,9 @@ suppressPackageStartupMessages(library(amiss))
 
 keep <- paste0(out, ".worlds")
 dir.create(keep, showWarnings = FALSE, recursive = TRUE)
-one_world <- function(seed, here, keep, worlds) {
-  file <- file.path(keep, sprintf("%09d.rds", seed))
-  kept <- if (file.exists(file)) readRDS(file)
-  if (!is.null(kept) && is.null(kept$error)) return(kept)
+file_of <- function(seed) file.path(keep, sprintf("%09d.rds", seed))
+finished <- function(seed) file.exists(file_of(seed)) && is.null(readRDS(file_of(seed))$error)
+one_world <- function(seed, here, keep, file, worlds) {
   suppressPackageStartupMessages(library(amiss))
   scope <- new.env(parent = globalenv())
   for (part in c("worlds.R", "score.R")) sys.source(file.path(here, "hidden_effects", part), scope)
@@ -27,12 +26,15 @@ one_world <- function(seed, here, keep, worlds) {
   file.rename(part, file)
   said <- if (is.null(row$error)) sprintf("%s x%g: %s %s", row$kind, row$strength, row$verdict, row$mechanism) else row$error
   message(sprintf("%d of %d, world %d, %s", length(list.files(keep, "rds$")), worlds, seed, said))
-  row
 }
 
 if (!is.null(workers)) future::plan(future::multisession, workers = as.integer(workers))
+keep <- normalizePath(keep)
 seeds <- first + seq_len(worlds) - 1L
-rows <- future.apply::future_lapply(seeds, one_world, here = normalizePath(here), keep = normalizePath(keep), worlds = worlds, future.seed = NULL, future.scheduling = Inf)
+missing <- Filter(Negate(finished), seeds)
+invisible(future.apply::future_mapply(one_world, missing, file = vapply(missing, file_of, ""), MoreArgs = list(here = normalizePath(here), keep = keep, worlds = worlds),
+                                      future.seed = NULL, future.scheduling = Inf))
+rows <- lapply(seeds, function(seed) readRDS(file_of(seed)))
 scope <- new.env(parent = globalenv())
 for (part in c("worlds.R", "score.R", "figures.R")) sys.source(file.path(here, "hidden_effects", part), scope)
 failed <- Filter(function(r) !is.null(r$error), rows)
