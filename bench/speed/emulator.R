@@ -7,6 +7,7 @@ all <- run_with_peers(root, "borehole.R", c("rlibkriging", "hetGP", "laGP", "Dic
 over_seeds <- function(column, f) stats::aggregate(all[column], all[c("runs", "emulator")], f, na.action = stats::na.pass)
 table <- merge(over_seeds(c("seconds", "error"), stats::median), over_seeds("coverage", mean))
 table$worked <- stats::complete.cases(table)
+if (!any(table$worked[table$emulator != "amiss"])) stop("there is no peer to compare with", call. = FALSE)
 
 for (runs in unique(table$runs)) {
   rows <- table[table$runs == runs, ]
@@ -23,29 +24,38 @@ for (runs in unique(table$runs)) {
   measured(name("how far from 92 to 97 %", "amiss"), 100 * max(0, 0.92 - ours$coverage, ours$coverage - 0.97), "%", 0)
 }
 
-# Labels beside their points, drawn apart vertically until no two overlap (both axes are logarithmic).
+# Labels beside their points: on the left of those with another point close on their right, and drawn apart vertically until
+# no two overlap (both axes are logarithmic).
 apart <- function(y, gap) {
-  order <- order(y)
-  placed <- y[order]
+  placed <- sort(y)
   for (pass in 1:100) {
     short <- pmax(0, gap - diff(placed)) / 2
     placed <- placed - c(short, 0) + c(0, short)
   }
-  placed[order(order)]
+  placed[rank(y, ties.method = "first")]
 }
 drawn <- table[table$worked, ]
+drawn$seconds <- drawn$seconds / slower
 drawn$panel <- sprintf("%d runs", as.integer(drawn$runs))
-drawn$label <- 10^stats::ave(log10(drawn$error), drawn$panel, FUN = function(y) apart(y, 0.045 * diff(range(log10(drawn$error)))))
+x <- log10(drawn$seconds)
+y <- log10(drawn$error)
+drawn$label <- 10^stats::ave(y, drawn$panel, FUN = function(y) apart(y, 0.045 * diff(range(y))))
+crowded <- function(i) any(drawn$runs == drawn$runs[i] & x > x[i] & x < x[i] + 1 & abs(y - y[i]) < 0.035)
+drawn$side <- ifelse(vapply(seq_along(x), crowded, NA), -1, 1)
+drawn$text <- sub("gauss + ", "", drawn$emulator, fixed = TRUE)
 drawn$ours <- drawn$emulator == "amiss"
+plain <- function(x) format(x, drop0trailing = TRUE, scientific = FALSE, trim = TRUE)
 figure <- ggplot2::ggplot(drawn, ggplot2::aes(.data$seconds, .data$error, colour = .data$ours)) +
-  ggplot2::facet_wrap(~panel) +
-  ggplot2::geom_segment(ggplot2::aes(xend = 1.2 * .data$seconds, yend = .data$label), linewidth = 0.3) +
+  ggplot2::facet_wrap(~panel, scales = "free") +
+  ggplot2::geom_segment(ggplot2::aes(xend = .data$seconds * 1.2^.data$side, yend = .data$label), linewidth = 0.3) +
   ggplot2::geom_point(size = 2.4) +
-  ggplot2::geom_text(ggplot2::aes(1.25 * .data$seconds, .data$label, label = .data$emulator), hjust = 0, size = 3.4) +
-  ggplot2::scale_x_log10("seconds to fit, one core", expand = ggplot2::expansion(c(0.05, 0.45)), labels = function(x) format(x, drop0trailing = TRUE, scientific = FALSE, trim = TRUE)) +
-  ggplot2::scale_y_log10("error at held-out points over the standard deviation", labels = function(x) format(x, drop0trailing = TRUE, scientific = FALSE, trim = TRUE)) +
+  ggplot2::geom_text(ggplot2::aes(.data$seconds * 1.25^.data$side, .data$label, label = .data$text, hjust = (1 - .data$side) / 2),
+                     size = 3.4) +
+  ggplot2::scale_x_log10("seconds to fit, one core of 60 GFLOP/s", expand = ggplot2::expansion(c(0.4, 0.45)), labels = plain) +
+  ggplot2::scale_y_log10("error at held-out points over the standard deviation", labels = plain) +
   ggplot2::scale_colour_manual(values = c("FALSE" = "grey35", "TRUE" = "#08519C"), guide = "none") +
-  ggplot2::labs(title = "Emulators of the borehole function", subtitle = "Medians of three Latin hypercubes; further down and to the left is better.") +
+  ggplot2::labs(title = "Emulators of the borehole function",
+                subtitle = "Medians of three Latin hypercubes; down and to the left is better. Nugget: gauss with an estimated one.") +
   ggplot2::theme_minimal(base_size = 13) +
   ggplot2::theme(plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(), panel.spacing = ggplot2::unit(2, "lines"))
-ggplot2::ggsave(paste0(sub("[.]json$", "", out), "-emulator.png"), figure, width = 11, height = 5.5, dpi = 110, bg = "white")
+ggplot2::ggsave(paste0(sub("[.]json$", "", out), "-emulator.png"), figure, width = 12, height = 7, dpi = 110, bg = "white")
