@@ -19,6 +19,12 @@ scaled("models M1 to M6, the same", elapsed(for (name in paste0("M", 1:6)) whole
 one <- elapsed(whole_model(paper_box("M5"), 1))
 measured("two threads over one, a paper-sized model", one / elapsed(whole_model(paper_box("M5"), 2)), "", 1.8, above = TRUE)
 
+# The whole attribution of a house's base model: all conditions, the evidence without each, surrogates.
+open_house <- read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))
+emulator <- train_emulator(simulate_design(open_house$model, open_house$measurements, 150, seed = 1, threads = 2), open_house$measurements, threads = 2)
+fit <- calibrate(emulator, open_house$measurements, seed = 1, threads = 2)
+scaled("history attribution of O5", elapsed(attribute_discrepancy(fit, seed = 1)), "s", 2)
+
 # Each house in a session of its own, with two threads: seconds, and the most memory the session held (MB).
 house <- function(name) {
   code <- sprintf('suppressPackageStartupMessages(library(amiss))
