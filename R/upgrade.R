@@ -40,6 +40,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   check_input(checkmate::check_number(control$refine, lower = 0, upper = 0.8), "control$refine")
   check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin")
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening")
+  check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  check_enough_runs(runs - round(control$refine * runs), length(free_parameters(simulator)), of = runs)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   say <- progress(quiet)
@@ -92,7 +94,10 @@ first_runs <- function(simulator, runs, settings) {
 }
 
 fit_runs <- function(ensemble, settings, calibration = settings$control$calibration) {
-  emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
+  calibrate_runs(train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads), settings, calibration)
+}
+
+calibrate_runs <- function(emulator, settings, calibration = settings$control$calibration) {
   settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
 }
 
@@ -114,8 +119,11 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
   if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
   settings$keep(list("full", name, plain(simulator)), {
     first <- first %||% screen_model(simulator, name, settings)
-    ensemble <- if (more > 0) refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads) else first$ensemble
-    fit <- fit_runs(ensemble, settings)
+    fit <- if (more > 0) {
+      fit_runs(refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads), settings)
+    } else {
+      calibrate_runs(first$fit$emulator, settings)
+    }
     fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     fit
   })

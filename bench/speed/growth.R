@@ -14,7 +14,7 @@ series <- list()
 against <- function(stage, size, of, at, seconds, limit = rep(NA_real_, length(at))) {
   upper <- at >= stats::median(at)
   exponent <- stats::coef(stats::lm(log(seconds[upper]) ~ log(at[upper])))[[2]]
-  title <- sprintf("%s\n%s against %s, as its power %.2f", stage, of, size, exponent)
+  title <- sprintf("%s\nagainst %s (%s): as its power %.2f", stage, size, of, exponent)
   series[[length(series) + 1]] <<- data.frame(title = title, at = at, seconds = seconds, limit = limit)
   measured(sprintf("%s against %s: exponent", stage, size), exponent, "")
   last <- length(at)

@@ -26,6 +26,15 @@ test_that("a coarse candidate is compared with the coarse calibration of the cur
   expect_equal(diff(table$log10_bf), (base$log_evidence - coarse$log_evidence) / log(10), tolerance = 1e-10)
 })
 
+test_that("the coarse calibration follows screening, whatever is asked of the full one", {
+  upgrade <- small_upgrade()
+  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1, keep = function(name, value) value,
+                   control = modifyList(amiss:::upgrade_control, list(calibration = list(ais = list(precision = 0.01, pilot_chains = 24)))))
+  coarse <- amiss:::screen_model(upgrade$models[[1]]$fit$emulator$simulator, "base", settings)
+  expect_equal(coarse$fit$control$ais$precision, amiss:::upgrade_control$screening$precision)
+  expect_equal(ncol(coarse$ensemble$outputs), 20)
+})
+
 test_that("contenders are those within the margin, and none where nothing comes near adoption", {
   fit <- function(log10_evidence, se = 0.05, lag = 0) {
     posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
@@ -55,4 +64,7 @@ test_that("screening can be left out, and bad settings are refused before anythi
   expect_equal(full$candidates$log10_bf[both], upgrade$candidates$log10_bf[own], tolerance = 1e-8)  # the same full calibration
   expect_error(do.call(upgrade_model, c(arguments, list(control = list(screening = list(chains = -1))))), "chains", class = "amiss_error_input")
   expect_error(do.call(upgrade_model, c(arguments, list(control = list(margin = -1)))), "margin", class = "amiss_error_input")
+  with_runs <- function(runs) do.call(upgrade_model, utils::modifyList(arguments, list(runs = runs)))
+  expect_error(with_runs("many"), "runs", class = "amiss_error_input")
+  expect_error(with_runs(6), "Of the 6 runs.*4", class = "amiss_error_input")
 })
