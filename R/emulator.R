@@ -23,7 +23,9 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #' the training runs do: both belong to the variance of a prediction and of a run left out. The series of a run also
 #' holds what the basis leaves out. Its standard deviation at each step, `basis$discarded_sd`, comes from the training
 #' runs; as the basis was chosen with them, it is raised by `M / (M - Q + 1)`, as in generalised cross-validation
-#' (Golub, Heath and Wahba 1979).
+#' (Golub, Heath and Wahba 1979). The mode knows neither the uncertainty of the hyper-parameters nor that the covariance is
+#' but a model: where the leave-one-out errors of a coefficient are larger than stated, all its variances are multiplied by
+#' the mean square of these errors in units of their standard deviations (Bachoc 2013). Means stay as they are.
 #'
 #' @param ensemble An ensemble: [simulate_design()] or [ensemble()].
 #' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know it: the basis
@@ -42,7 +44,9 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #'   each coefficient and parameter: its `beta` and, after forward selection, the `step` in which it got its own.
 #' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models with
 #'   high-dimensional outputs and boundary conditions. Welch, Buck, Sacks, Wynn, Mitchell and Morris (1992), Screening,
-#'   predicting, and computer experiments, Technometrics 34, 15-25.
+#'   predicting, and computer experiments, Technometrics 34, 15-25. Bachoc (2013), Cross validation and maximum likelihood
+#'   estimations of hyper-parameters of Gaussian processes with model misspecification, Computational Statistics and Data
+#'   Analysis 66, 55-69.
 #' @export
 train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")

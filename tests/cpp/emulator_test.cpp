@@ -146,6 +146,37 @@ TEST(GaussianProcess, LeaveOneOutEqualsRefitsWithOnePointLess) {
   }
 }
 
+// Mean square of the leave-one-out errors in units of their standard deviations.
+double loo_square(const GaussianProcess& process, const VectorXd& values) {
+  VectorXd mean, variance;
+  process.leave_one_out(mean, variance);
+  return ((values - mean).array().square() / variance.array()).mean();
+}
+
+TEST(GaussianProcess, WidenedVariancesAreThoseOfTheLeaveOneOutErrors) {
+  const Sample s;
+  const MatrixXd points = uniform_matrix(10, 3, 26);
+  const VectorXd values = 3 * s.values;  // nine times the variance that the parameters state
+  const GaussianProcess own(s.inputs, values, s.own);
+  GaussianProcess widened = own;
+  widened.widen();
+  const double factor = loo_square(own, values);
+  EXPECT_GT(factor, 4.0);
+  EXPECT_NEAR(loo_square(widened, values), 1.0, 1e-12);
+  EXPECT_NEAR(widened.noise(), factor * own.noise(), 1e-12);
+  const GaussianProcess again(s.inputs, values, widened.parameters());  // as from a stored state
+  VectorXd mean(10), variance(10), m(10), v(10);
+  own.predict(points, mean, variance);
+  for (const auto& process : {widened, again}) {
+    process.predict(points, m, v);
+    EXPECT_LT((m - mean).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT((v - factor * variance).cwiseAbs().maxCoeff(), 1e-9);
+  }
+  GaussianProcess wide(s.inputs, 0.1 * values, s.own);  // which states more than its errors
+  wide.widen();
+  EXPECT_EQ(wide.parameters().pack(), s.own.pack());
+}
+
 TEST(GaussianProcess, FitEndsAtAMaximumOfTheDensity) {
   const MatrixXd inputs = uniform_matrix(40, 2, 24);
   VectorXd values(40);
@@ -352,7 +383,10 @@ TEST(Emulator, TrainsEachCoefficientWithTheStatedNoisePrior) {
           {shape, rate / (basis.vectors.col(q).squaredNorm() * sd * sd)}, {}, {}, options.priors.beta};
       const VectorXd own = state.parameters.row(q).transpose();
       VectorXd none(0);
-      const double fitted = GaussianProcess::fit(trained.inputs, standard, prior, {}).log_joint;
+      GaussianProcess process = GaussianProcess::fit(trained.inputs, standard, prior, {});
+      process.widen();
+      const double fitted =
+          GaussianProcess::log_density(trained.inputs, standard, prior, process.parameters().pack(), none);
       EXPECT_NEAR(GaussianProcess::log_density(trained.inputs, standard, prior, own, none), fitted,
                   1e-4 * std::abs(fitted))
           << "coefficient " << q;

@@ -47,15 +47,48 @@ struct Level {
 // Not a number, and infinity, count as likelihood zero.
 double finite_or_zero(double v) { return std::isfinite(v) ? v : -std::numeric_limits<double>::infinity(); }
 
-VectorXd evaluate(const Target& target, const MatrixXd& x) {
-  return target.log_likelihood(x).unaryExpr(&finite_or_zero);
+// Columns 0 ... n-1 in blocks that the threads share: task(first, count). Their size is fixed, so that no
+// result depends on the number of threads.
+template <class Task>
+void for_blocks(Index n, const Context& context, const Task& task) {
+  constexpr Index kBlock = 32;
+  parallel_for(static_cast<int>((n + kBlock - 1) / kBlock), context, [&](int b) {
+    const Index first = b * kBlock;
+    task(first, std::min(kBlock, n - first));
+  });
 }
 
-Chains start(const Target& target, int n, Stream& stream) {
+VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& context) {
+  VectorXd ll(x.cols());
+  for_blocks(x.cols(), context, [&](Index first, Index count) {
+    ll.segment(first, count) = target.log_likelihood(x.middleCols(first, count)).unaryExpr(&finite_or_zero);
+  });
+  return ll;
+}
+
+VectorXd evaluate(const Target& target, const MatrixXd& x, MatrixXd& gradient, const Context& context) {
+  VectorXd ll(x.cols());
+  for_blocks(x.cols(), context, [&](Index first, Index count) {
+    MatrixXd slope(x.rows(), count);
+    ll.segment(first, count) =
+        target.log_likelihood(x.middleCols(first, count), slope).unaryExpr(&finite_or_zero);
+    gradient.middleCols(first, count) = slope;
+  });
+  return ll;
+}
+
+// Inside a task that has a thread already.
+Context alone(const Context& context) {
+  Context own;
+  own.seed = context.seed;
+  return own;
+}
+
+Chains start(const Target& target, int n, Stream& stream, const Context& context) {
   Chains chains;
   chains.x.resize(target.dimension(), n);
   for (int i = 0; i < n; ++i) chains.x.col(i) = target.draw_reference(stream);
-  chains.ll = evaluate(target, chains.x);
+  chains.ll = evaluate(target, chains.x, context);
   chains.log_w = VectorXd::Zero(n);
   return chains;
 }
@@ -103,11 +136,12 @@ void resample(Chains& chains, Stream& stream) {
 }
 
 // One Crank-Nicolson move of every chain; returns the share accepted.
-double move(const Target& target, Chains& chains, const Level& level, Stream& stream) {
+double move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+            const Context& context) {
   const Index n = chains.size();
   MatrixXd proposed(chains.x.rows(), n);
   for (Index i = 0; i < n; ++i) proposed.col(i) = level.proposal.step(chains.x.col(i), level.step, stream);
-  const VectorXd ll = evaluate(target, proposed);
+  const VectorXd ll = evaluate(target, proposed, context);
   int accepted = 0;
   for (Index i = 0; i < n; ++i) {
     const double log_u = std::log(stream.uniform());
@@ -131,13 +165,14 @@ bool hamiltonian(const Target& target, const AisOptions& options) {
 
 // One Hamiltonian move of every chain: leapfrog steps in the coordinates in which the proposal's scale is the
 // identity (Neal 2011); returns the share accepted.
-double hamiltonian_move(const Target& target, Chains& chains, const Level& level, Stream& stream) {
+double hamiltonian_move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+                        const Context& context) {
   const Index n = chains.size(), d = chains.x.rows();
   const auto root = level.proposal.root().triangularView<Eigen::Lower>();
   MatrixXd x = chains.x, slope(d, n), momentum = stream.normals(d, n);
   VectorXd ll;
   const auto force = [&] {  // L' gradient of the log density at this temperature
-    ll = target.log_likelihood(x, slope).unaryExpr(&finite_or_zero);
+    ll = evaluate(target, x, slope, context);
     slope *= level.beta;
     for (Index i = 0; i < n; ++i) slope.col(i) += target.reference_gradient(x.col(i));
     slope = root.transpose() * slope;
@@ -185,16 +220,17 @@ VectorXd ranks(const VectorXd& values) {
 
 // Moves the chains, tuning the step, until their likelihoods have forgotten where they began. The first sweep
 // is still far from the right step and is not counted.
-void tune(const Target& target, const AisOptions& options, Chains& chains, Level& level, Stream& stream) {
+void tune(const Target& target, const AisOptions& options, Chains& chains, Level& level, Stream& stream,
+          const Context& context) {
   const VectorXd before = ranks(chains.ll);
   for (level.sweeps = 0; level.sweeps < options.max_sweeps; ++level.sweeps) {
     if (level.sweeps >= options.sweeps && before.dot(ranks(chains.ll)) < kMemory) return;
     const int repeats = level.sweeps == 0 ? 2 : 1;
     for (int i = 0; i < repeats; ++i) {
-      const double accepted = move(target, chains, level, stream);
+      const double accepted = move(target, chains, level, stream, context);
       level.step = std::min(1.0, std::max(0.003, level.step * std::exp(accepted - kAcceptance)));
       if (!hamiltonian(target, options)) continue;
-      const double moved = hamiltonian_move(target, chains, level, stream);
+      const double moved = hamiltonian_move(target, chains, level, stream, context);
       level.hamiltonian_step =
           std::min(1.5, std::max(0.001, level.hamiltonian_step * std::exp(moved - kHamiltonianAcceptance)));
     }
@@ -204,7 +240,7 @@ void tune(const Target& target, const AisOptions& options, Chains& chains, Level
 std::vector<Level> pilot(const Target& target, const AisOptions& options, const Context& context,
                          std::uint64_t purpose, Chains& chains, long& evaluations) {
   Stream stream(context.seed, kPilot + purpose, 0);
-  chains = start(target, options.pilot_chains, stream);
+  chains = start(target, options.pilot_chains, stream, context);
   evaluations += options.pilot_chains;
   if (!std::isfinite(chains.ll.maxCoeff()))
     throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
@@ -220,7 +256,7 @@ std::vector<Level> pilot(const Target& target, const AisOptions& options, const 
     levels.push_back(
         {beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step, hamiltonian_step, 0});
     resample(chains, stream);
-    tune(target, options, chains, levels.back(), stream);
+    tune(target, options, chains, levels.back(), stream, context);
     evaluations += chains.size() * (levels.back().sweeps + 1) * sweep_cost(target, options);
     step = levels.back().step;
     hamiltonian_step = levels.back().hamiltonian_step;
@@ -235,9 +271,9 @@ struct Group {
 };
 
 Group frozen_run(const Target& target, const std::vector<Level>& levels, const AisOptions& options,
-                 Stream stream) {
+                 Stream stream, const Context& context) {
   Group group;
-  group.chains = start(target, options.chains, stream);
+  group.chains = start(target, options.chains, stream, context);
   group.acceptance = VectorXd::Zero(static_cast<Index>(levels.size()));
   group.ess = VectorXd::Zero(static_cast<Index>(levels.size()));
   double beta = 0.0;
@@ -256,8 +292,8 @@ Group frozen_run(const Target& target, const std::vector<Level>& levels, const A
     }
     double accepted = 0.0;
     for (int sweep = 0; sweep < levels[k].sweeps; ++sweep) {
-      accepted += move(target, group.chains, levels[k], stream);
-      if (hamiltonian(target, options)) hamiltonian_move(target, group.chains, levels[k], stream);
+      accepted += move(target, group.chains, levels[k], stream, context);
+      if (hamiltonian(target, options)) hamiltonian_move(target, group.chains, levels[k], stream, context);
     }
     group.acceptance[k] = accepted / levels[k].sweeps;
   }
@@ -384,7 +420,8 @@ class AnnealedRun {
     parallel_for(n, context_, [&](int i) {
       const int g = first + i;
       groups_[g] = frozen_run(target_, levels_, options_,
-                              Stream(context_.seed, kFrozen + purpose_, static_cast<std::uint64_t>(g)));
+                              Stream(context_.seed, kFrozen + purpose_, static_cast<std::uint64_t>(g)),
+                              alone(context_));
     });
     evaluations_ += n * moves();
     const VectorXd values = estimates();
@@ -427,12 +464,7 @@ void extend(ImportanceSample& sample, const Target& target, const Distribution& 
     sample.x.col(i) = mixture.draw(stream);
     sample.log_w[i] = target.log_reference(sample.x.col(i)) - mixture.log_density(sample.x.col(i));
   }
-  // Blocks of fixed size, so that the result does not depend on how many threads share them.
-  constexpr Index kBlock = 64;
-  parallel_for(static_cast<int>((n + kBlock - 1) / kBlock), context, [&](int b) {
-    const Index first = before + b * kBlock, count = std::min(kBlock, total - first);
-    sample.ll.segment(first, count) = evaluate(target, sample.x.middleCols(first, count));
-  });
+  sample.ll.tail(n) = evaluate(target, sample.x.rightCols(n), context);
   sample.log_w.tail(n) += sample.ll.tail(n);
   if (!std::isfinite(sample.log_w.maxCoeff())) return;
   sample.log_evidence = log_mean_exp(sample.log_w);

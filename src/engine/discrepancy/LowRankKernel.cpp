@@ -21,6 +21,7 @@ constexpr int kExtensions = 3;  // of a factor whose certificate is not yet good
 // measured.
 constexpr double kCheap = 0.33;
 constexpr Index kSmall = 600;
+constexpr Index kRows = 1024;  // taken at a time
 
 // Conditions times the root of their decays: zeta is a Gaussian kernel in them.
 MatrixXd scaled(const MatrixXd& columns, const std::vector<int>& condition, const VectorXd& decay) {
@@ -47,6 +48,19 @@ Inside inside(const MatrixXd& gram, const VectorXd& b, double ratio) {
   return {2.0 * factor.matrixLLT().diagonal().array().log().sum(), b.dot(weights), weights};
 }
 
+// F'F of F = (I - OO') L, of which `within` is O'L; its lower triangle. Some rows at a time: F would need the
+// memory of L once more.
+MatrixXd gram_outside(const Eigen::Ref<const MatrixXd>& root, const MatrixXd& basis, const MatrixXd& within) {
+  MatrixXd gram = MatrixXd::Zero(root.cols(), root.cols()), some;
+  for (Index i = 0; i < root.rows(); i += kRows) {
+    const Index n = std::min(kRows, root.rows() - i);
+    some = root.middleRows(i, n);
+    some.noalias() -= basis.middleRows(i, n) * within;
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(some.transpose());
+  }
+  return gram;
+}
+
 }  // namespace
 
 std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const KernelParameters& p,
@@ -60,12 +74,10 @@ std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const 
   double trace = 2.0 * tolerance / ratio;
   for (int i = 0;; ++i) {
     if (!cholesky.extend(trace, max_rank)) return std::nullopt;
-    MatrixXd f = cholesky.root();
-    f -= basis * (basis.transpose() * f);
-    MatrixXd gram = MatrixXd::Zero(f.cols(), f.cols());
-    gram.selfadjointView<Eigen::Lower>().rankUpdate(f.transpose());
-    const Inside part = inside(gram, f.transpose() * model.outside(), ratio);
-    const VectorXd w = model.outside() - f * part.weights;
+    const auto root = cholesky.root();
+    const MatrixXd within = basis.transpose() * root;
+    const Inside part = inside(gram_outside(root, basis, within), root.transpose() * model.outside(), ratio);
+    const VectorXd w = model.outside() - root * part.weights + basis * (within * part.weights);
     const double quadratic = model.outside().squaredNorm() - part.explained;
     const double below = 0.5 * ratio * cholesky.trace();
     const double above = p.lambda * below * w.squaredNorm();
@@ -91,15 +103,16 @@ std::optional<KernelSkeleton> KernelSkeleton::make(const KernelModel& model, con
                                                    double ratio, double tolerance, Index max_rank) {
   PivotedCholesky cholesky(scaled(model.columns(), model.condition(), decay));
   if (!cholesky.extend(tolerance / ratio, max_rank)) return std::nullopt;
-  return KernelSkeleton(model, decay, ratio, tolerance, cholesky);
+  return KernelSkeleton(model, decay, ratio, tolerance, std::move(cholesky));
 }
 
 KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double ratio, double tolerance,
-                               const PivotedCholesky& cholesky)
+                               PivotedCholesky cholesky)
     : decay_(std::move(decay)), ratio_(ratio), tolerance_(tolerance), condition_(model.condition()) {
   const std::vector<Index>& rows = cholesky.pivots();
   const Index m = cholesky.rank();
-  MatrixXd u = cholesky.root(), own(m, m);
+  Eigen::Ref<MatrixXd> u = cholesky.root();  // in its place: of a long record it is large
+  MatrixXd own(m, m);
   pivots_.resize(m, model.columns().cols());
   for (Index i = 0; i < m; ++i) {
     own.row(i) = u.row(rows[static_cast<std::size_t>(i)]);
@@ -107,9 +120,9 @@ KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double 
   }
   // U = C_:I C_II^-1 = L L_I^-1, L_I lower triangular in the order of the pivots.
   own.triangularView<Eigen::Lower>().solveInPlace<Eigen::OnTheRight>(u);
-  u -= model.orthonormal() * (model.orthonormal().transpose() * u);
-  root_ = Eigen::HouseholderQR<MatrixXd>(u).matrixQR().topRows(m).triangularView<Eigen::Upper>();
+  u.noalias() -= model.orthonormal() * (model.orthonormal().transpose() * u).eval();
   projected_ = u.transpose() * model.outside();
+  root_ = Eigen::HouseholderQR<Eigen::Ref<MatrixXd>>(u).matrixQR().topRows(m).triangularView<Eigen::Upper>();
   square_ = model.outside().squaredNorm();
   dimension_ = static_cast<double>(model.size() - model.orthonormal().cols());
 }

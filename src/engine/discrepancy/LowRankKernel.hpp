@@ -54,7 +54,7 @@ class KernelSkeleton {
 
  private:
   KernelSkeleton(const KernelModel& model, Eigen::VectorXd decay, double ratio, double tolerance,
-                 const PivotedCholesky& cholesky);
+                 PivotedCholesky cholesky);
 
   Eigen::VectorXd decay_;
   double ratio_, tolerance_;

@@ -50,6 +50,7 @@ Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const Emula
     HyperPriors priors = options.priors;
     priors.lambda = {shape, rate / norm};
     fitted[q] = GaussianProcess::fit(inputs, values, priors, options.search);
+    fitted[q]->widen();
   });
   for (auto& process : fitted) emulator.processes_.push_back(std::move(*process));
   return emulator;

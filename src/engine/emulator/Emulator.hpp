@@ -28,7 +28,8 @@ class Emulator {
   explicit Emulator(const EmulatorState& state);
 
   /// Trains all Q processes; work is shared over the threads of the context. The prior of lambda_q is
-  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2.
+  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2. Their variances are
+  /// widened to their leave-one-out errors (GaussianProcess::widen()).
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context);
 

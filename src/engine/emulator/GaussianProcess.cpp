@@ -192,4 +192,17 @@ void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {
   mean = values_ - weights_.cwiseProduct(variance);
 }
 
+void GaussianProcess::widen() {
+  VectorXd mean, variance;
+  leave_one_out(mean, variance);
+  const double factor = ((values_ - mean).array().square() / variance.array()).mean();
+  if (!(factor > 1.0)) return;
+  parameters_.log_amplitude += std::log(factor);
+  parameters_.log_nugget += std::log(factor);
+  parameters_.log_lambda -= std::log(factor);
+  inverse_ /= factor;
+  root_inverse_ /= std::sqrt(factor);
+  weights_ /= factor;
+}
+
 }  // namespace amiss

@@ -88,6 +88,12 @@ class GaussianProcess {
   /// Leave-one-out prediction of each value, closed form (Rasmussen and Williams 2006, equation 5.12).
   void leave_one_out(Eigen::VectorXd& mean, Eigen::VectorXd& variance) const;
 
+  /// Multiplies all variances by the mean square of the leave-one-out errors in units of their own standard
+  /// deviations (Bachoc 2013, Computational Statistics and Data Analysis 66), where that exceeds 1; means
+  /// stay as they are. The mode of the hyper-parameters knows neither their uncertainty nor that the
+  /// covariance is but a model, and its intervals tend to be too narrow.
+  void widen();
+
   const GaussianProcessParameters& parameters() const { return parameters_; }
   /// Variance of a value about the smooth part: nugget + 1 / lambda.
   double noise() const;

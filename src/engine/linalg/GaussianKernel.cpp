@@ -116,7 +116,7 @@ void PivotedCholesky::add_block(Index most) {
   if (r > 0) columns.noalias() -= root_.leftCols(r) * pivot_root.transpose();
   triangle.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(columns);
   if (r + k > root_.cols())
-    root_.conservativeResize(n, std::min(n, std::max(2 * root_.cols(), r + 2 * kBlock)));
+    root_.conservativeResize(n, std::min(n, std::max(root_.cols() * 3 / 2, r + 2 * kBlock)));
   root_.middleCols(r, k) = columns;
   left_ = (left_ - columns.rowwise().squaredNorm()).cwiseMax(0.0);
   for (Index i = r; i < r + k; ++i) left_[pivots_[static_cast<std::size_t>(i)]] = 0.0;
