@@ -67,6 +67,7 @@ void sampling(benchmark::State& state) {
   state.counters["values"] = static_cast<double>(sample.posterior.evaluations);
   state.counters["direct"] = static_cast<double>(sample.direct);
   state.counters["largest_error"] = sample.largest_error;
+  state.counters["peak_memory"] = peak_memory();
 }
 BENCHMARK(sampling)
     ->Name("kernel/sampling")
