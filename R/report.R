@@ -229,6 +229,7 @@ remaining_sentences <- function(upgrade) {
   edge <- rows$label[rows$at_edge]
   last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
   c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers)) else "The remaining error answers to no boundary condition.",
+    if (contradicts_inside(upgrade$models[[length(upgrade$models)]]$fit)) "In courses of time that the simulator can produce, no choice of parameters comes near the measurements: something is still missing, and the parameters are bent to make up for it.",
     if (last$large) sprintf("In calibration it is %s times the stated noise%s", short(last$ratio),
                             if (is.null(last$pattern)) ": either the noise is stated too small, or something else is missing."
                             else paste0("; ", last$pattern$what, ". ", last$pattern$where)),

@@ -160,7 +160,8 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   const CalibrationTarget target(
       history, StudentTMixture::fit(outside.draws, outside.weights, options.max_components, 8.0, stream),
       emulator);
-  const AisResult joint = sample_calibration(target, outside, options, second);
+  const CalibrationSample sample = sample_calibration(target, outside, options, second);
+  const AisResult& joint = sample.posterior;
 
   Rcpp::List outside_list = convert::ais_list(outside), joint_list = convert::ais_list(joint);
   add_history_draws(
@@ -170,7 +171,7 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   joint_list["unit"] = target.unit(joint.draws);
   using Rcpp::_;
   return Rcpp::List::create(_["history"] = outside_list, _["posterior"] = joint_list,
-                            _["centre"] = VectorXd(model.centre().transpose()),
+                            _["misfit"] = sample.misfit, _["centre"] = VectorXd(model.centre().transpose()),
                             _["scale"] = VectorXd(model.scale().transpose()),
                             _["null_setting"] = null_setting(model));
 }

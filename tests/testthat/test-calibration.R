@@ -6,6 +6,19 @@ test_that("calibration finds the parameters and says so", {
   expect_equal(sd(residuals(fit)), 0.1, tolerance = 0.15)  # of 240 values: standard error 5 %
 })
 
+test_that("a record that no parameters reach inside the simulation space is told", {
+  fit <- linear_fit()
+  expect_gt(fit$inside$p, 0.01)  # two vectors, two parameters: hardly any misfit is left
+  expect_identical(fit$inside$vectors, 2L)
+  expect_no_match(printed(fit), "bent")
+  data <- linear_data()
+  data$Ti <- data$Ti + 1.6 * data$Te  # the gain is 2, beyond its prior
+  beyond <- linear_fit(linear_measurements(data))
+  expect_lt(beyond$inside$p, 1e-6)
+  expect_match(printed(beyond), "its parameters are bent")
+  expect_identical(glance(beyond)$misfit_p, beyond$inside$p)
+})
+
 test_that("same seed, one or two threads: same bits", {
   m <- linear_measurements()
   expect_identical(linear_fit(m, threads = 1)[c("values", "log_evidence")], linear_fit(m, threads = 2)[c("values", "log_evidence")])

@@ -112,26 +112,29 @@ std::vector<HistoryParameters> spread_points(const HistoryTarget& target, const 
 
 }  // namespace
 
-AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history,
-                             const AisOptions& options, const Context& context) {
+CalibrationSample sample_calibration(const CalibrationTarget& target, const AisResult& history,
+                                     const AisOptions& options, const Context& context) {
   Stream stream(context.seed, kReference, 0);
   const ParameterModes modes = parameter_modes(
       target, spread_points(target.history_target(), history, kHistoryPoints), ModeOptions(), stream);
-  if (!(modes.misfit < kContradiction)) {
+  CalibrationSample sample;
+  sample.misfit = modes.misfit;
+  AisResult& posterior = sample.posterior;
+  // Log-likelihoods are told as seen from the target's own reference.
+  if (!(modes.misfit < kContradiction * static_cast<double>(target.emulator().n_outputs()))) {
     const CalibrationTarget wide = target.from_prior();
-    AisResult result = sample_ais(wide, options, context);
-    result.evaluations += modes.evaluations;
-    for (Index i = 0; i < result.log_likelihood.size(); ++i)  // as seen from the target's own reference
-      result.log_likelihood[i] +=
-          wide.log_reference(result.draws.col(i)) - target.log_reference(result.draws.col(i));
-    return result;
+    posterior = sample_ais(wide, options, context);
+    for (Index i = 0; i < posterior.log_likelihood.size(); ++i)
+      posterior.log_likelihood[i] +=
+          wide.log_reference(posterior.draws.col(i)) - target.log_reference(posterior.draws.col(i));
+  } else {
+    const DefensiveTarget closer(target, modes.mixture, target.history_target().dimension());
+    posterior = sample_ais(closer, options, context);
+    for (Index i = 0; i < posterior.log_likelihood.size(); ++i)
+      posterior.log_likelihood[i] += closer.log_ratio(posterior.draws.col(i));
   }
-  const DefensiveTarget closer(target, modes.mixture, target.history_target().dimension());
-  AisResult result = sample_ais(closer, options, context);
-  result.evaluations += modes.evaluations;
-  for (Index i = 0; i < result.log_likelihood.size(); ++i)  // as seen from the target's own reference
-    result.log_likelihood[i] += closer.log_ratio(result.draws.col(i));
-  return result;
+  posterior.evaluations += modes.evaluations;
+  return sample;
 }
 
 }  // namespace amiss

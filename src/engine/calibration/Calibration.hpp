@@ -58,10 +58,19 @@ class CalibrationTarget : public Target {
   std::vector<Eigen::MatrixXd> unit_covariance_;  // (R'R)^-1 of each error setting
 };
 
+struct CalibrationSample {
+  AisResult posterior;
+  /// How far the record lies from what any parameters give inside the simulation space, where the error is
+  /// what the history posterior says: (estimate - w')'(S + sigma^2 (R'R)^-1)^-1 (estimate - w') at the best
+  /// parameters. If the model holds, at most a chi-squared variable with one degree of freedom for each
+  /// basis vector; parameters that fit lower it.
+  double misfit = 0.0;
+};
+
 /// The joint posterior, annealed from the history posterior times the modes of the parameters
 /// (parameter_modes()); from the prior of all coordinates where no parameters agree with the history
 /// posterior.
-AisResult sample_calibration(const CalibrationTarget& target, const AisResult& history,
-                             const AisOptions& options, const Context& context);
+CalibrationSample sample_calibration(const CalibrationTarget& target, const AisResult& history,
+                                     const AisOptions& options, const Context& context);
 
 }  // namespace amiss

@@ -144,7 +144,7 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
     VectorXd log_mass(static_cast<Index>(found.size()));
     double least = std::numeric_limits<double>::infinity();
     for (const Mode& mode : found) least = std::min(least, mode.misfit);
-    misfit += least / static_cast<double>(points.size() * target.emulator().n_outputs());
+    misfit += least / static_cast<double>(points.size());
     for (std::size_t k = 0; k < found.size(); ++k) log_mass[static_cast<Index>(k)] = found[k].log_mass;
     for (std::size_t k = 0; k < found.size(); ++k) {
       const double share =

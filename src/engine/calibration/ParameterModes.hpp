@@ -18,8 +18,8 @@ struct ModeOptions {
 /// approximation of its mass, half equal.
 struct ParameterModes {
   StudentTMixture mixture;
-  /// (estimate - w')'C^-1 (estimate - w') / Q at the best mode, mean over the points. Far above one, the
-  /// record contradicts the history posterior whatever the parameters: the joint posterior lies elsewhere.
+  /// (estimate - w')'C^-1 (estimate - w') at the best mode, mean over the points. Far above Q, the record
+  /// contradicts the history posterior whatever the parameters: the joint posterior lies elsewhere.
   double misfit;
   long evaluations;  ///< emulated points
 };
