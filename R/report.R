@@ -64,7 +64,7 @@ diagnosis_verdict <- function(upgrade) {
   }
   doubts <- cause_doubts(upgrade)
   if (!length(doubts)) return(list(verdict = "named", tag = if (length(upgrade$models) > 2) "Causes named" else "Cause named", headline = cause_headline(upgrade)))
-  list(verdict = "likely", tag = paste("Likely cause, but", listed(doubts)), headline = paste("Most likely:", cause_headline(upgrade)))
+  list(verdict = "likely", tag = paste("Likely cause, but", paste(doubts, collapse = "; ")), headline = paste("Most likely:", cause_headline(upgrade)))
 }
 
 # The sentences of all mechanisms adopted.
@@ -78,7 +78,7 @@ cause_doubts <- function(upgrade) {
   rough <- !(best$trusted && upgrade$models[[1]]$fit$trust$trusted)
   c(if (best$probability < 0.95) "others are possible",
     if (rough && best$lower95 < upgrade$control$decisive) "the estimate is rough",
-    if (!improves_held_out(upgrade)) "not confirmed by held-out data",
+    if (!improves_held_out(upgrade)) "held-out data do not confirm it",
     if (much_remains(upgrade)) "a good part of the error remains",
     if (drift_rivals(upgrade)) "a drift of the sensor would explain it as well")
 }
