@@ -90,7 +90,9 @@ fitted_once <- function(name, runs, seed) {
              error = sqrt(mean((p$mean - truth)^2)) / stats::sd(truth), coverage = mean(p$lower <= truth & truth <= p$upper))
 }
 
-cases <- expand.grid(seed = 1:3, runs = c(200, 500), name = names(emulators), stringsAsFactors = FALSE)
+# Small designs differ much in how well their intervals hold: more of them.
+cases <- rbind(expand.grid(seed = 1:10, runs = 200, name = names(emulators), stringsAsFactors = FALSE),
+               expand.grid(seed = 1:3, runs = 500, name = names(emulators), stringsAsFactors = FALSE))
 rows <- Map(function(name, runs, seed) {
   tryCatch(fitted_once(name, runs, seed), error = function(e) {
     cat(name, ", M = ", runs, ", seed ", seed, ": ", conditionMessage(e), "\n", sep = "")
