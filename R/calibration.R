@@ -18,10 +18,12 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   `ess_drop`, `resample`, `importance_draws`, `max_components`).
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
-#' @return An object of class `amiss_calibration`. Its `inside` says how far the record lies from what any parameters give inside
-#'   the simulation space, by the error that the part outside shows: `misfit`, chi-squared with `vectors` degrees of freedom at
-#'   most if the model holds, and `p`, the probability of such a misfit then. Where it is small, the model lacks something that
-#'   its parameters are bent to make up for, and its evidence hangs on how many vectors the basis has; `print()` says so below 0.001.
+#' @return An object of class `amiss_calibration`. Its `misfit` says how far the record lies from what any parameters give inside
+#'   the simulation space, measured against the error seen in the part outside: `chi_squared`, the misfit at the best parameters,
+#'   which has about `df` degrees of freedom if the model holds, one for each basis vector, or less, and `p`, the probability of
+#'   such a misfit (both means over errors drawn from their posterior; `p` is `misfit_p` in `glance()`). Where `p` is small, the
+#'   model lacks something or its emulator is off; then the parameters have taken values that partly hide it, and the evidence
+#'   hangs on how many vectors the basis has. `print()` and reports say so below 0.001.
 #' @export
 calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
   rows <- emulated_rows(emulator, measurements)
@@ -42,7 +44,7 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
                  weights = posterior$weights, history = history, posterior = posterior, errors = errors, priors = priors,
                  coefficients = call_engine(history_coefficients_(data, priors, errors)),
                  centre = result$centre, scale = result$scale, null_setting = result$null_setting,
-                 inside = inside_misfit(result$misfit, ncol(data$basis)),
+                 misfit = misfit_inside(result$misfits, ncol(data$basis)),
                  log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
                  interval = posterior$interval, trust = trust(history, posterior)), class = "amiss_calibration")
 }
@@ -99,11 +101,11 @@ systematic_draws <- function(weights, n) {
   findInterval((seq_len(n) - 0.5) / n, cumsum(weights / sum(weights)), left.open = TRUE) + 1L
 }
 
-inside_misfit <- function(misfit, vectors) {
-  list(misfit = misfit, vectors = vectors, p = stats::pchisq(misfit, vectors, lower.tail = FALSE))
+misfit_inside <- function(misfits, vectors) {
+  list(chi_squared = mean(misfits), df = vectors, p = mean(stats::pchisq(misfits, vectors, lower.tail = FALSE)))
 }
 
-contradicts_inside <- function(fit) isTRUE(fit$inside$p < 0.001)
+misses_inside <- function(fit) isTRUE(fit$misfit$p < 0.001)
 
 trust <- function(history, posterior) {
   why <- c(if (!history$trusted) paste("discrepancy:", history$verdict),
@@ -116,8 +118,8 @@ print.amiss_calibration <- function(x, ...) {
   cli::cli_text("{.strong Calibration} on {length(x$rows)} rows of {.val {x$measurements$name}}")
   cli::cli_text("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)}, {round(x$interval[2] / log(10), 2)}], {x$trust$verdict}")
   print(parameter_table(x), digits = 3, row.names = FALSE)
-  if (contradicts_inside(x)) {
-    cli::cli_bullets(c("!" = "no parameters come near the record inside the simulation space (chi-squared {signif(x$inside$misfit, 2)} with {x$inside$vectors} degrees of freedom): the model lacks something, for which its parameters are bent"))
+  if (misses_inside(x)) {
+    cli::cli_bullets(c("!" = "no parameters reproduce the record, even in what the simulator can vary (chi-squared {signif(x$misfit$chi_squared, 2)}, {x$misfit$df} degrees of freedom): the model lacks something, or its emulator is off; do not trust the parameters"))
   }
   cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
   invisible(x)
@@ -154,6 +156,6 @@ tidy.amiss_calibration <- function(x, ...) parameter_table(x)
 #' @export
 glance.amiss_calibration <- function(x, ...) {
   data.frame(log10_evidence = x$log_evidence / log(10), lower95 = x$interval[1] / log(10), upper95 = x$interval[2] / log(10),
-             trusted = x$trust$trusted, misfit_p = x$inside$p %||% NA_real_, n = length(x$rows), vectors = ncol(x$emulator$basis$vectors),
+             trusted = x$trust$trusted, misfit_p = x$misfit$p %||% NA_real_, n = length(x$rows), vectors = ncol(x$emulator$basis$vectors),
              runs = nrow(x$emulator$processes$inputs))
 }

@@ -7,7 +7,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #' The runs are put on a basis (singular vectors of the centred runs and a vector of ones) and each
 #' coefficient gets a Gaussian process over the parameters.
 #'
-#' *Mode.* The hyper-parameters are those of the greatest joint density (equation 3 of the paper): likelihood times
+#' *Mode.* The hyper-parameters, before variances are widened (*Errors*), are those of the greatest joint density (equation 3 of the paper): likelihood times
 #' priors, as a density of `s2`, `eta2`, `beta` (all in (0, 1)) and `lambda` themselves. The search runs on logits and
 #' logarithms, but no Jacobian enters: with the uniform default priors, `s2`, `eta2` and `beta` are those of the greatest
 #' likelihood.
@@ -23,9 +23,10 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #' the training runs do: both belong to the variance of a prediction and of a run left out. The series of a run also
 #' holds what the basis leaves out. Its standard deviation at each step, `basis$discarded_sd`, comes from the training
 #' runs; as the basis was chosen with them, it is raised by `M / (M - Q + 1)`, as in generalised cross-validation
-#' (Golub, Heath and Wahba 1979). The mode knows neither the uncertainty of the hyper-parameters nor that the covariance is
-#' but a model: where the leave-one-out errors of a coefficient are larger than stated, all its variances are multiplied by
-#' the mean square of these errors in units of their standard deviations (Bachoc 2013). Means stay as they are.
+#' (Golub, Heath and Wahba 1979). The mode ignores the uncertainty of the hyper-parameters and that the covariance function
+#' is only a model: where the leave-one-out errors of a coefficient are larger than stated, all its variances are multiplied by
+#' the mean square of these errors in units of their standard deviations (Bachoc 2013); the factor is 1 to 1.2 where the
+#' stated ones are right. Means stay as they are.
 #'
 #' @param ensemble An ensemble: [simulate_design()] or [ensemble()].
 #' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know it: the basis
@@ -39,7 +40,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #' @param threads Number of threads; results do not depend on it.
 #' @return An object of class `amiss_emulator`: `basis`, `processes`, `selection` (data frame of the steps of the forward
 #'   selection: `vector`, `step`, `parameter`, `gain` of the log density), `diagnostics`, all leave-one-out (`coefficients`, with
-#'   `r2` and `coverage95` of each; `coverage95` of all coefficients; `series_rmse`, `series_r2` and `series_coverage95` of
+#'   `r2` and `coverage95` of each and the factor by which its variances were `widened`; `coverage95`, after widening, of all coefficients; `series_rmse`, `series_r2` and `series_coverage95` of
 #'   the reconstructed series), and `trust` (`trusted`, and `verdict`: what is wrong with it). `tidy()` gives one row for
 #'   each coefficient and parameter: its `beta` and, after forward selection, the `step` in which it got its own.
 #' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models with
@@ -121,7 +122,7 @@ emulator_diagnostics <- function(trained, basis, outputs) {
   r2 <- 1 - colSums(error^2) / pmax(colSums(scale(trained$coefficients, scale = FALSE)^2), .Machine$double.xmin)
   covered <- within95(error, trained$loo_variance)
   series <- tcrossprod(basis$vectors, error) + discarded_part(basis, outputs)
-  list(coefficients = data.frame(vector = seq_len(ncol(error)), r2 = r2, coverage95 = colMeans(covered)), coverage95 = mean(covered),
+  list(coefficients = data.frame(vector = seq_len(ncol(error)), r2 = r2, coverage95 = colMeans(covered), widened = trained$widened), coverage95 = mean(covered),
        series_rmse = sqrt(mean(series^2)), series_r2 = 1 - sum(series^2) / sum((outputs - rowMeans(outputs))^2),
        series_coverage95 = mean(within95(series, series_variance(basis, trained$loo_variance))))
 }
@@ -134,6 +135,9 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
     if (noise_sd > 0 && basis$discarded_rms > noise_sd)
       sprintf("the basis of %d vectors leaves %s (RMS) of the runs out, more than the noise of %s", ncol(basis$vectors),
               format(signif(basis$discarded_rms, 3)), format(signif(noise_sd, 3))),
+    if (max(diagnostics$coefficients$widened) > 4)
+      sprintf("its leave-one-out errors are up to %s times as large as its hyper-parameters would have them, by which its intervals are widened",
+              format(signif(sqrt(max(diagnostics$coefficients$widened)), 2))),
     if (beyond_chance)
       sprintf("its 95 %% intervals hold only %.0f %% of the coefficients left out", 100 * diagnostics$coverage95),
     uncovered_statement(ensemble))

@@ -59,6 +59,10 @@ diagnosis_verdict <- function(upgrade) {
                   headline = sprintf("Something is missing from the model that no mechanism of the catalogue explains: its error is %s times the stated noise; %s.",
                                      short(remainder$ratio), remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
     }
+    if (misses_inside(upgrade$models[[1]]$fit)) {
+      return(list(verdict = "unexplained", tag = "Unexplained",
+                  headline = "Something is missing from the model that no mechanism of the catalogue explains: even the best parameters miss the measurements by more than the noise allows."))
+    }
     return(list(verdict = "nothing", tag = "Nothing decisive",
                 headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition."))
   }
@@ -76,11 +80,12 @@ cause_headline <- function(upgrade) {
 cause_doubts <- function(upgrade) {
   best <- first_trials(upgrade)[1, ]
   rough <- !(best$trusted && upgrade$models[[1]]$fit$trust$trusted)
-  c(if (best$probability < 0.95) "others are possible",
-    if (rough && best$lower95 < upgrade$control$decisive) "the estimate is rough",
+  c(if (best$probability < 0.95) "other causes are possible",
+    if (rough && best$lower95 < upgrade$control$decisive) "its odds are only rough",
     if (!improves_held_out(upgrade)) "held-out data do not confirm it",
     if (much_remains(upgrade)) "a good part of the error remains",
-    if (drift_rivals(upgrade)) "a drift of the sensor would explain it as well")
+    if (misses_inside(upgrade$models[[length(upgrade$models)]]$fit)) "even the extended model cannot follow the measurements",
+    if (drift_rivals(upgrade)) "a drifting sensor would explain the error as well")
 }
 
 # TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The mechanism
@@ -229,11 +234,11 @@ remaining_sentences <- function(upgrade) {
   edge <- rows$label[rows$at_edge]
   last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
   c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers)) else "The remaining error answers to no boundary condition.",
-    if (contradicts_inside(upgrade$models[[length(upgrade$models)]]$fit)) "In courses of time that the simulator can produce, no choice of parameters comes near the measurements: something is still missing, and the parameters are bent to make up for it.",
-    if (last$large) sprintf("In calibration it is %s times the stated noise%s", short(last$ratio),
-                            if (is.null(last$pattern)) ": either the noise is stated too small, or something else is missing."
+    if (last$large) sprintf("In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
+                            if (is.null(last$pattern)) ": either the stated noise is too small, or something else is missing."
                             else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that they make up for something else.", listed(edge))
+    if (misses_inside(upgrade$models[[length(upgrade$models)]]$fit)) "Even with the best parameters the simulation misses the measurements by more than the noise allows, in what the parameters do influence. Something is still missing, and the parameters have taken values that partly hide it: do not read them as physical.",
+    if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these parameters make up for something else.", listed(edge))
     else "No parameter is at the edge of its range.",
     sprintf("The search stopped because %s%s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
             if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))

@@ -1,4 +1,6 @@
 // Annealed importance sampling of a posterior whose likelihood is an R function: convert, call, convert.
+#include <limits>
+
 #include "export_convert.h"
 
 #include "engine/random/transform.hpp"
@@ -21,6 +23,8 @@ class FunctionTarget : public Target {
       throw std::invalid_argument("log_likelihood returned another number of values than it got points");
     return values;
   }
+  // A call costs more than a value, and R has one thread.
+  Eigen::Index block() const override { return std::numeric_limits<Eigen::Index>::max(); }
   bool has_gradient() const override { return gradient_.isNotNull(); }
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override {
     const Eigen::MatrixXd unit = x.transpose().unaryExpr(&normal_cdf);

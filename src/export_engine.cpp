@@ -124,7 +124,8 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
   using Rcpp::_;
   return Rcpp::List::create(_["inputs"] = state.inputs, _["coefficients"] = state.coefficients,
                             _["hyperparameters"] = state.parameters, _["loo_mean"] = mean,
-                            _["loo_variance"] = variance, _["evaluations"] = emulator.evaluations(),
+                            _["loo_variance"] = variance, _["widened"] = emulator.widened(),
+                            _["evaluations"] = emulator.evaluations(),
                             _["selection"] = selection_table(emulator));
 }
 
@@ -171,7 +172,7 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   joint_list["unit"] = target.unit(joint.draws);
   using Rcpp::_;
   return Rcpp::List::create(_["history"] = outside_list, _["posterior"] = joint_list,
-                            _["misfit"] = sample.misfit, _["centre"] = VectorXd(model.centre().transpose()),
+                            _["misfits"] = sample.misfits, _["centre"] = VectorXd(model.centre().transpose()),
                             _["scale"] = VectorXd(model.scale().transpose()),
                             _["null_setting"] = null_setting(model));
 }
@@ -218,13 +219,10 @@ Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const st
   const AisOptions options = convert::ais_options(control["ais"]);
   const int drops = static_cast<int>(drop.size());
   std::vector<AisResult> dropped(drop.size());
-  Context inner = context;  // conditions share the threads; each has its own seed
-  inner.threads = 1;
-  inner.poll = nullptr;
   parallel_for(drops, context, [&](int i) {
     std::vector<int> active = all_conditions(model);
     active.erase(active.begin() + drop[i]);
-    Context own = inner;
+    Context own = context.alone();  // conditions share the threads; each has its own seed
     own.seed = context.seed + 1 + static_cast<std::uint64_t>(drop[i]);
     dropped[i] = sample_ais(HistoryTarget(model, active), options, own);
   });

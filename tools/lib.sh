@@ -10,15 +10,17 @@ say() { printf '\n== %s\n' "$*"; }
 fail() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
 
 # Installs the package into build/library from a copy of the sources, so that the clone stays clean; for this machine's
-# processor, or with "portable" into build/portable/library as R CMD INSTALL alone does.
+# processor; with "portable" into build/portable/library as R CMD INSTALL alone does; with "blas" into build/blas/library,
+# for this processor and with R's BLAS.
 # Objects are kept from one run to the next. make does not follow headers, so they are dropped when a header,
 # the build's own files or R have changed.
 install_package() {
-  local copy="$root/build/package" library="$library" native=1 state
-  if [[ "${1:-}" == portable ]]; then
-    copy="$root/build/portable/package"
-    library="$root/build/portable/library"
-    native=
+  local copy="$root/build/package" library="$library" native=1 blas= state
+  if [[ $# -gt 0 ]]; then
+    copy="$root/build/$1/package"
+    library="$root/build/$1/library"
+    [[ "$1" == portable ]] && native=
+    [[ "$1" == blas ]] && blas=1
   fi
   mkdir -p "$library" "$copy"
   find "$copy" -mindepth 1 -maxdepth 1 ! -name src ! -name .state -exec rm -rf {} +
@@ -31,6 +33,6 @@ install_package() {
     printf '%s\n' "$state" > "$copy/.state"
   fi
   rm -rf "$library/00LOCK-package"
-  AMISS_NATIVE=$native MAKEFLAGS="${MAKEFLAGS:--j2}" R_MAKEVARS_USER="${R_MAKEVARS_USER:-$root/tools/Makevars}" R CMD INSTALL --no-multiarch --library="$library" "$copy" > "$root/build/install.log" 2>&1 ||
+  AMISS_NATIVE=$native AMISS_BLAS=$blas MAKEFLAGS="${MAKEFLAGS:--j2}" R_MAKEVARS_USER="${R_MAKEVARS_USER:-$root/tools/Makevars}" R CMD INSTALL --no-multiarch --library="$library" "$copy" > "$root/build/install.log" 2>&1 ||
     { cat "$root/build/install.log" >&2; fail "the package could not be installed"; }
 }

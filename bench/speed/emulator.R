@@ -1,6 +1,6 @@
 # Emulators of the borehole function (8 inputs) on Latin hypercubes of 200 and 500 runs: ours against those of other packages,
-# each as its users would fit it (bench/peers/borehole.R), with OpenBLAS. CPU seconds of one core; medians of ten and of
-# three designs, 1000 held-out points each; of how often intervals hold, the mean.
+# each as its users would fit it (bench/peers/borehole.R), with OpenBLAS. CPU seconds of one core; medians of ten
+# designs of 200 runs and three of 500, 1000 held-out points each; of how often intervals hold, the mean.
 
 source(file.path(root, "bench", "peers", "install.R"), local = TRUE)
 all <- run_with_peers(root, "borehole.R", c("rlibkriging", "hetGP", "laGP", "DiceKriging", "RobustGaSP"))
@@ -55,7 +55,7 @@ figure <- ggplot2::ggplot(drawn, ggplot2::aes(.data$seconds, .data$error, colour
   ggplot2::scale_y_log10("error at held-out points over the standard deviation", labels = plain) +
   ggplot2::scale_colour_manual(values = c("FALSE" = "grey35", "TRUE" = "#08519C"), guide = "none") +
   ggplot2::labs(title = "Emulators of the borehole function",
-                subtitle = "Medians of ten and of three Latin hypercubes; down and to the left is better. Nugget: gauss with an estimated one.") +
+                subtitle = "Medians of ten designs of 200 runs and three of 500; down and to the left is better. Nugget: gauss with an estimated one.") +
   ggplot2::theme_minimal(base_size = 13) +
   ggplot2::theme(plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(), panel.spacing = ggplot2::unit(2, "lines"))
 ggplot2::ggsave(paste0(sub("[.]json$", "", out), "-emulator.png"), figure, width = 12, height = 7, dpi = 110, bg = "white")

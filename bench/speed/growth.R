@@ -2,7 +2,8 @@
 # the factorisations at the rate that this machine reaches for them or, against threads, the time of one shared by all. Where
 # a stage is more than three times from it: small matrices do not reach the rate of large ones, and what is no factorisation
 # counts (the emulator's exponentials and its gradient by each parameter, the gathering of the history model's matrix, the
-# filter that whitens the record, a recursion in time); of many threads all but one wait for the sampler's pilot and the basis.
+# filter that whitens the record, a recursion in time); of many threads all but one wait while the basis is made, modes are
+# sought, and the sampler draws, resamples and fits.
 
 rate <- micro("micro_machine")
 dpotrf <- stats::approxfun(log(c(50, 100, 200, 384, 1000, 2000)), log(vapply(c(50, 100, 200, 384, 1000, 2000), function(n) {

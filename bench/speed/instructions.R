@@ -1,11 +1,10 @@
 # What the instruction sets bring: the package as R CMD INSTALL builds it, without and with its AVX2 library, and compiled
-# for this processor (as tools/ does). The former is built into build/portable if it is not there. Then what a BLAS for the
-# matrix products brings (AMISS_BLAS=1, built into build/blas likewise): R's own and OpenBLAS (bench/peers/install.R), each
-# beside Eigen's products in a session that has the same BLAS for R's.
+# for this processor (as tools/ does). Then what a BLAS for the matrix products brings (AMISS_BLAS=1): R's own and OpenBLAS
+# (bench/peers/install.R), each beside Eigen's products in a session that has the same BLAS for R's.
 
-portable <- file.path(root, "build", "portable", "library")
-if (!dir.exists(file.path(portable, "amiss"))) {
-  run("bash", "-c", shQuote(sprintf("source %s && install_package portable", shQuote(file.path(root, "tools", "lib.sh")))))
+installed <- function(variant) {
+  run("bash", "-c", shQuote(sprintf("source %s && install_package %s", shQuote(file.path(root, "tools", "lib.sh")), variant)))
+  file.path(root, "build", variant, "library")
 }
 whole <- 'suppressPackageStartupMessages(library(amiss))
   study <- read_study(system.file("studies", "paper_synthetic.yml", package = "amiss"))
@@ -19,6 +18,7 @@ seconds <- function(library, simd = "", preload = "") {
   one <- function(i) as.numeric(system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(whole)), stdout = TRUE, env = env))
   stats::median(vapply(1:3, one, 0))
 }
+portable <- installed("portable")
 baseline <- seconds(portable, "baseline")
 scaled("simulate 300 runs, train, calibrate: any x86-64 processor", baseline, "s")
 measured("AVX2 chosen at load: times as fast", baseline / seconds(portable), "")
@@ -26,21 +26,11 @@ native <- seconds(.libPaths()[1])
 measured("compiled for this processor: times as fast", baseline / native, "")
 
 source(file.path(root, "bench", "peers", "install.R"), local = TRUE)
-blas <- file.path(root, "build", "blas")
-if (!dir.exists(file.path(blas, "library", "amiss"))) {
-  copy <- file.path(blas, "package")  # so that the clone stays clean
-  for (folder in c(copy, file.path(blas, "library"))) dir.create(folder, showWarnings = FALSE, recursive = TRUE)
-  file.copy(file.path(root, c("DESCRIPTION", "NAMESPACE", "R", "src", "inst")), copy, recursive = TRUE)
-  makevars <- Sys.getenv("R_MAKEVARS_USER", file.path(root, "tools", "Makevars"))
-  log <- file.path(blas, "install.log")
-  status <- system2(file.path(R.home("bin"), "R"), c("CMD", "INSTALL", "--no-multiarch", shQuote(c(paste0("--library=", blas, "/library"), copy))),
-                    stdout = log, stderr = log, env = c("AMISS_BLAS=1", "AMISS_NATIVE=1", "MAKEFLAGS=-j2", paste0("R_MAKEVARS_USER=", shQuote(makevars))))
-  if (status != 0) stop("the package could not be installed with AMISS_BLAS=1: see ", log, call. = FALSE)
-}
+blas <- installed("blas")
 own <- basename(extSoftVersion()[["BLAS"]])
-measured(sprintf("products by R's own BLAS (%s) instead of Eigen: times as fast", own), native / seconds(file.path(blas, "library")), "")
+measured(sprintf("products by R's own BLAS (%s) instead of Eigen: times as fast", own), native / seconds(blas), "")
 open_blas <- peer_blas(root)
 if (nzchar(open_blas)) {
   measured("products by OpenBLAS instead of Eigen: times as fast",
-           seconds(.libPaths()[1], preload = open_blas) / seconds(file.path(blas, "library"), preload = open_blas), "")
+           seconds(.libPaths()[1], preload = open_blas) / seconds(blas, preload = open_blas), "")
 }

@@ -9,6 +9,9 @@ struct Context {
   std::uint64_t seed = 1;      ///< root of every random stream of the call
   int threads = 1;             ///< worker threads; results do not depend on it
   std::function<void()> poll;  ///< called on the calling thread now and then; throws to interrupt
+
+  /// For a task that runs on one of the threads already: that thread alone, and no poll.
+  Context alone() const { return {seed, 1, nullptr}; }
 };
 
 }  // namespace amiss

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <thread>
+
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <limits>
@@ -101,6 +104,48 @@ TEST(SampleAis, OneAndTwoThreadsGiveTheSameBits) {
   EXPECT_EQ(a.draws, b.draws);
   EXPECT_EQ(a.weights, b.weights);
   EXPECT_EQ(a.evaluations, b.evaluations);
+}
+
+TEST(SampleAis, PollsOnTheCallingThreadOnly) {
+  const LinearGaussian model(4, 0.5);
+  for (int threads : {1, 2}) {
+    Context context = seeded(3, threads);
+    const auto caller = std::this_thread::get_id();
+    std::atomic<int> polls{0}, elsewhere{0};
+    context.poll = [&] { ++(std::this_thread::get_id() == caller ? polls : elsewhere); };
+    sample_ais(model.target(), {}, context);
+    EXPECT_GT(polls, 0);
+    EXPECT_EQ(elsewhere, 0);
+  }
+}
+
+// A target that counts how often it is asked, and for how many points at most.
+class CountingTarget : public Target {
+ public:
+  explicit CountingTarget(Index block) : block_(block) {}
+  Index dimension() const override { return 2; }
+  Index block() const override { return block_; }
+  VectorXd log_likelihood(const MatrixXd& x) const override {
+    ++calls;
+    largest = std::max(largest, x.cols());
+    return -5 * (x.array() - 1).matrix().colwise().squaredNorm();
+  }
+  mutable long calls = 0;
+  mutable Index largest = 0;
+
+ private:
+  Index block_;
+};
+
+TEST(SampleAis, ATargetIsAskedForAsManyPointsAsItWants) {
+  AisOptions options;
+  options.pilot_chains = 256;
+  const CountingTarget few(16), all(100000);
+  const AisResult a = sample_ais(few, options, seeded(3)), b = sample_ais(all, options, seeded(3));
+  EXPECT_EQ(a.evaluations, b.evaluations);
+  EXPECT_EQ(few.largest, 16);
+  EXPECT_GE(all.largest, 256);
+  EXPECT_LT(3 * all.calls, few.calls);
 }
 
 TEST(SampleAis, SeedsGiveDifferentRuns) {

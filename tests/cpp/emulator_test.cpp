@@ -395,6 +395,20 @@ TEST(Emulator, TrainsEachCoefficientWithTheStatedNoisePrior) {
   }
 }
 
+// Steep at one edge and flat elsewhere, which no covariance that is the same everywhere expects.
+TEST(Emulator, VariancesAreWidenedToTheLeaveOneOutErrors) {
+  const MatrixXd inputs = uniform_matrix(60, 2, 35);
+  Basis basis;
+  basis.vectors = MatrixXd::Ones(3, 1);
+  basis.coefficients = (0.05 + inputs.col(0).array()).inverse() + inputs.col(1).array();
+  basis.singular_values = VectorXd::Ones(1);
+  const Emulator emulator = Emulator::train(inputs, basis, {}, Context());
+  MatrixXd mean, variance;
+  emulator.leave_one_out(mean, variance);
+  EXPECT_GT(emulator.widened()[0], 1.1);
+  EXPECT_NEAR(((basis.coefficients - mean).array().square() / variance.array()).mean(), 1.0, 1e-9);
+}
+
 TEST(Emulator, StateMakesTheSameEmulatorAgain) {
   const Emulator emulator = Trained().emulator();
   const Emulator again(emulator.state());

@@ -8,15 +8,16 @@ test_that("calibration finds the parameters and says so", {
 
 test_that("a record that no parameters reach inside the simulation space is told", {
   fit <- linear_fit()
-  expect_gt(fit$inside$p, 0.01)  # two vectors, two parameters: hardly any misfit is left
-  expect_identical(fit$inside$vectors, 2L)
-  expect_no_match(printed(fit), "bent")
+  expect_gt(fit$misfit$p, 0.01)  # two vectors, two parameters: hardly any misfit is left
+  expect_identical(fit$misfit$df, 2L)
+  expect_no_match(printed(fit), "lacks something")
   data <- linear_data()
   data$Ti <- data$Ti + 1.6 * data$Te  # the gain is 2, beyond its prior
   beyond <- linear_fit(linear_measurements(data))
-  expect_lt(beyond$inside$p, 1e-6)
-  expect_match(printed(beyond), "its parameters are bent")
-  expect_identical(glance(beyond)$misfit_p, beyond$inside$p)
+  expect_lt(beyond$misfit$p, 1e-6)
+  expect_match(printed(beyond), "the model lacks something")
+  expect_match(amiss:::model_doubts(list(fit = beyond, best = list(converged = TRUE))), "even the best parameters", all = FALSE)
+  expect_identical(glance(beyond)$misfit_p, beyond$misfit$p)
 })
 
 test_that("same seed, one or two threads: same bits", {

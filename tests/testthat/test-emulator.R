@@ -81,9 +81,9 @@ test_that("95 % intervals of runs left out hold 95 % of them, coefficients and s
   expect_lt(coefficients, 0.97)
   expect_gt(series, 0.93)
   expect_lt(series, 0.97)
-  # A selection that is caught where the nugget has no slope is over-confident: 0.78 here. Of 140 coefficients left
-  # out the binomial standard deviation is 0.018: five of them below 0.95.
-  expect_gt(train_emulator(runs[[7]], 1, list(selection = "forward"))$diagnostics$coverage95, 0.86)
+  # A selection that is caught where the nugget has no slope is over-confident: its intervals held 0.78 here, which asks for
+  # a factor of (1.96 / 1.23)^2 = 2.5.
+  expect_lt(max(train_emulator(runs[[7]], 1, list(selection = "forward"))$diagnostics$coefficients$widened), 1.6)
 })
 
 test_that("a prediction's sd is that of a run: emulator, nugget and what the basis leaves out", {

@@ -50,7 +50,18 @@ test_that("a large error that answers to nothing makes the verdict unexplained",
   expect_equal(verdict$verdict, "unexplained")
   expect_match(verdict$headline, "every day around")
   upgrade$models[[1]]$prediction$observed <- p$mean + withr::with_seed(1, rnorm(nrow(p), 0, 0.05))
+  upgrade$models[[1]]$fit$misfit$p <- 0.5
   expect_equal(amiss:::diagnosis_verdict(upgrade)$verdict, "nothing")
+  upgrade$models[[1]]$fit$misfit$p <- 1e-4
+  expect_equal(amiss:::diagnosis_verdict(upgrade)$verdict, "unexplained")
+})
+
+test_that("a model that cannot follow the measurements even inside the simulation space is doubted", {
+  upgrade <- small_upgrade()
+  expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "best parameters")
+  upgrade$models[[2]]$fit$misfit$p <- 1e-4
+  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "cannot follow the measurements")
+  expect_match(paste(summary(upgrade)$remains, collapse = " "), "Even with the best parameters")
 })
 
 test_that("a cause that leaves a good part of the error is only likely", {
@@ -75,7 +86,7 @@ test_that("a cause is only likely where a drift would explain the record as well
   upgrade$models[[1]]$prediction$observed <- p$mean + noise + 3 * (hours / max(hours))^2
   upgrade$models[[2]]$prediction$observed <- upgrade$models[[2]]$prediction$mean + 1.5 * noise
   expect_true(amiss:::drift_rivals(upgrade))
-  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a drift of the sensor would explain it as well")
+  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a drifting sensor would explain the error as well")
 })
 
 test_that("slopes of the output are those of the emulated series", {

@@ -38,7 +38,7 @@ test_that("a cause with rivals, or without gain on held-out data, is only likely
   upgrade <- small_upgrade()
   doubtful <- upgrade
   doubtful$candidates$probability <- c(0.6, 0.3)
-  expect_match(summary(doubtful)$tag, "others are possible")
+  expect_match(summary(doubtful)$tag, "other causes are possible")
   doubtful <- upgrade
   doubtful$models[[2]]$scores$validate[["rmse"]] <- 2 * doubtful$models[[1]]$scores$validate[["rmse"]]
   told <- summary(doubtful)

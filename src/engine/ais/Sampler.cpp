@@ -50,17 +50,17 @@ double finite_or_zero(double v) { return std::isfinite(v) ? v : -std::numeric_li
 // Columns 0 ... n-1 in blocks that the threads share: task(first, count). Their size is fixed, so that no
 // result depends on the number of threads.
 template <class Task>
-void for_blocks(Index n, const Context& context, const Task& task) {
-  constexpr Index kBlock = 32;
-  parallel_for(static_cast<int>((n + kBlock - 1) / kBlock), context, [&](int b) {
-    const Index first = b * kBlock;
-    task(first, std::min(kBlock, n - first));
+void for_blocks(const Target& target, Index n, const Context& context, const Task& task) {
+  const Index block = std::min(n, target.block());
+  parallel_for(static_cast<int>((n + block - 1) / block), context, [&](int b) {
+    const Index first = b * block;
+    task(first, std::min(block, n - first));
   });
 }
 
 VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& context) {
   VectorXd ll(x.cols());
-  for_blocks(x.cols(), context, [&](Index first, Index count) {
+  for_blocks(target, x.cols(), context, [&](Index first, Index count) {
     ll.segment(first, count) = target.log_likelihood(x.middleCols(first, count)).unaryExpr(&finite_or_zero);
   });
   return ll;
@@ -68,20 +68,13 @@ VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& contex
 
 VectorXd evaluate(const Target& target, const MatrixXd& x, MatrixXd& gradient, const Context& context) {
   VectorXd ll(x.cols());
-  for_blocks(x.cols(), context, [&](Index first, Index count) {
+  for_blocks(target, x.cols(), context, [&](Index first, Index count) {
     MatrixXd slope(x.rows(), count);
     ll.segment(first, count) =
         target.log_likelihood(x.middleCols(first, count), slope).unaryExpr(&finite_or_zero);
     gradient.middleCols(first, count) = slope;
   });
   return ll;
-}
-
-// Inside a task that has a thread already.
-Context alone(const Context& context) {
-  Context own;
-  own.seed = context.seed;
-  return own;
 }
 
 Chains start(const Target& target, int n, Stream& stream, const Context& context) {
@@ -421,7 +414,7 @@ class AnnealedRun {
       const int g = first + i;
       groups_[g] = frozen_run(target_, levels_, options_,
                               Stream(context_.seed, kFrozen + purpose_, static_cast<std::uint64_t>(g)),
-                              alone(context_));
+                              context_.alone());
     });
     evaluations_ += n * moves();
     const VectorXd values = estimates();

@@ -16,6 +16,9 @@ class Target {
   /// not finite counts as likelihood zero.
   virtual Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const = 0;
 
+  /// How many points are asked for at once, at most; several such blocks share the threads.
+  virtual Eigen::Index block() const { return 16; }
+
   virtual Eigen::VectorXd draw_reference(Stream& stream) const { return stream.normals(dimension()); }
   virtual double log_reference(const Eigen::VectorXd& x) const {
     return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));

@@ -118,10 +118,10 @@ CalibrationSample sample_calibration(const CalibrationTarget& target, const AisR
   const ParameterModes modes = parameter_modes(
       target, spread_points(target.history_target(), history, kHistoryPoints), ModeOptions(), stream);
   CalibrationSample sample;
-  sample.misfit = modes.misfit;
+  sample.misfits = modes.misfits;
   AisResult& posterior = sample.posterior;
   // Log-likelihoods are told as seen from the target's own reference.
-  if (!(modes.misfit < kContradiction * static_cast<double>(target.emulator().n_outputs()))) {
+  if (!(modes.misfits.mean() < kContradiction * static_cast<double>(target.emulator().n_outputs()))) {
     const CalibrationTarget wide = target.from_prior();
     posterior = sample_ais(wide, options, context);
     for (Index i = 0; i < posterior.log_likelihood.size(); ++i)

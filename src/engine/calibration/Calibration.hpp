@@ -60,11 +60,11 @@ class CalibrationTarget : public Target {
 
 struct CalibrationSample {
   AisResult posterior;
-  /// How far the record lies from what any parameters give inside the simulation space, where the error is
-  /// what the history posterior says: (estimate - w')'(S + sigma^2 (R'R)^-1)^-1 (estimate - w') at the best
-  /// parameters. If the model holds, at most a chi-squared variable with one degree of freedom for each
-  /// basis vector; parameters that fit lower it.
-  double misfit = 0.0;
+  /// How far the record lies from what any parameters give inside the simulation space, for some errors drawn
+  /// from the history posterior: (estimate - w')'(S + sigma^2 (R'R)^-1)^-1 (estimate - w') at the best
+  /// parameters. If the model holds, about chi-squared with one degree of freedom for each basis vector, or
+  /// less, as parameters that fit lower it. Not a number where no mode was found.
+  Eigen::VectorXd misfits;
 };
 
 /// The joint posterior, annealed from the history posterior times the modes of the parameters

@@ -124,7 +124,8 @@ bool same(const Mode& a, const Mode& b) {
 ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
                                const ModeOptions& options, Stream& stream) {
   long evaluations = 0;
-  double misfit = 0.0;
+  VectorXd misfits(static_cast<Index>(points.size()));
+  Index tried = 0;
   const MatrixXd starts = stream.normals(target.emulator().n_inputs(), options.starts);
   std::vector<Mode> modes;
   std::vector<double> shares;
@@ -144,7 +145,7 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
     VectorXd log_mass(static_cast<Index>(found.size()));
     double least = std::numeric_limits<double>::infinity();
     for (const Mode& mode : found) least = std::min(least, mode.misfit);
-    misfit += least / static_cast<double>(points.size());
+    misfits[tried++] = found.empty() ? std::numeric_limits<double>::quiet_NaN() : least;
     for (std::size_t k = 0; k < found.size(); ++k) log_mass[static_cast<Index>(k)] = found[k].log_mass;
     for (std::size_t k = 0; k < found.size(); ++k) {
       const double share =
@@ -175,7 +176,7 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
                             options.dof);
     weights.push_back(1.0);
   }
-  return {StudentTMixture(std::move(components), std::move(weights)), misfit, evaluations};
+  return {StudentTMixture(std::move(components), std::move(weights)), misfits, evaluations};
 }
 
 }  // namespace amiss

@@ -18,9 +18,10 @@ struct ModeOptions {
 /// approximation of its mass, half equal.
 struct ParameterModes {
   StudentTMixture mixture;
-  /// (estimate - w')'C^-1 (estimate - w') at the best mode, mean over the points. Far above Q, the record
-  /// contradicts the history posterior whatever the parameters: the joint posterior lies elsewhere.
-  double misfit;
+  /// Least (estimate - w')'C^-1 (estimate - w') of the modes, for each point; not a number where no mode was
+  /// found. Far above Q, the record contradicts the history posterior whatever the parameters: the joint
+  /// posterior lies elsewhere.
+  Eigen::VectorXd misfits;
   long evaluations;  ///< emulated points
 };
 

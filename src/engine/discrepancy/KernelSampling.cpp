@@ -189,7 +189,7 @@ KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
   own.skewed = true;
   AisOptions rough = own;
   rough.ess_drop = std::min(own.ess_drop, kRoughDrop);
-  rough.sweeps = 1;  // and as many more as the likelihoods need to forget where they were
+  if (options.sweeps == AisOptions().sweeps) rough.sweeps = 1;  // and more, while likelihoods remember
   const SkewedMixture before = sample_stage(model, rough, sampling, context, sample.coarse);
   Stream stream(context.seed, kStage, 0);
   const ApproximateTarget approximate(model, before, sampling.tolerance, context, stream);

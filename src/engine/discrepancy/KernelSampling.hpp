@@ -28,7 +28,8 @@ struct KernelSample {
 /// coarser posterior's draws lie, from a low rank or the dense factor elsewhere; a sample of the final draws
 /// is compared with certified values and the evidence corrected by what they say.
 ///
-/// Where `options` leave them open: 64 pilot chains, groups of 16, 300 draws for the first round of the
+/// Where `options` leave them open: 64 pilot chains, groups of 16, at least one move while only draws are
+/// needed, 300 draws for the first round of the
 /// importance sample, 400 effective draws in the end. Its mixture is skewed: the prior limits, on one side,
 /// the alpha of every condition that does not act.
 KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,

@@ -48,8 +48,8 @@ Inside inside(const MatrixXd& gram, const VectorXd& b, double ratio) {
   return {2.0 * factor.matrixLLT().diagonal().array().log().sum(), b.dot(weights), weights};
 }
 
-// F'F of F = (I - OO') L, of which `within` is O'L; its lower triangle. Some rows at a time: F would need the
-// memory of L once more.
+// Lower triangle of F'F, F = (I - OO') L, given L (`root`), O and O'L (`within`). Some rows at a time: F
+// would need the memory of L once more.
 MatrixXd gram_outside(const Eigen::Ref<const MatrixXd>& root, const MatrixXd& basis, const MatrixXd& within) {
   MatrixXd gram = MatrixXd::Zero(root.cols(), root.cols()), some;
   for (Index i = 0; i < root.rows(); i += kRows) {
@@ -109,10 +109,9 @@ std::optional<KernelSkeleton> KernelSkeleton::make(const KernelModel& model, con
 KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double ratio, double tolerance,
                                PivotedCholesky cholesky)
     : decay_(std::move(decay)), ratio_(ratio), tolerance_(tolerance), condition_(model.condition()) {
-  const std::vector<Index>& rows = cholesky.pivots();
+  const std::vector<Index> rows = cholesky.pivots();
   const Index m = cholesky.rank();
-  Eigen::Ref<MatrixXd> u = cholesky.root();  // in its place: of a long record it is large
-  MatrixXd own(m, m);
+  MatrixXd u = std::move(cholesky).take_root(), own(m, m);
   pivots_.resize(m, model.columns().cols());
   for (Index i = 0; i < m; ++i) {
     own.row(i) = u.row(rows[static_cast<std::size_t>(i)]);
@@ -122,6 +121,7 @@ KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double 
   own.triangularView<Eigen::Lower>().solveInPlace<Eigen::OnTheRight>(u);
   u.noalias() -= model.orthonormal() * (model.orthonormal().transpose() * u).eval();
   projected_ = u.transpose() * model.outside();
+  // In the place of U, which is large for a long record.
   root_ = Eigen::HouseholderQR<Eigen::Ref<MatrixXd>>(u).matrixQR().topRows(m).triangularView<Eigen::Upper>();
   square_ = model.outside().squaredNorm();
   dimension_ = static_cast<double>(model.size() - model.orthonormal().cols());

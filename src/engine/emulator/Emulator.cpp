@@ -83,6 +83,12 @@ EmulatorState Emulator::state() const {
   return {inputs_, coefficients_, parameters};
 }
 
+VectorXd Emulator::widened() const {
+  VectorXd factors(n_outputs());
+  for (Index q = 0; q < n_outputs(); ++q) factors[q] = processes_[static_cast<std::size_t>(q)].widened;
+  return factors;
+}
+
 int Emulator::evaluations() const {
   int total = 0;
   for (const auto& process : processes_) total += process.evaluations;

@@ -28,8 +28,8 @@ class Emulator {
   explicit Emulator(const EmulatorState& state);
 
   /// Trains all Q processes; work is shared over the threads of the context. The prior of lambda_q is
-  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2. Their variances are
-  /// widened to their leave-one-out errors (GaussianProcess::widen()).
+  /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2. The variances of
+  /// each process are widened to its leave-one-out errors (GaussianProcess::widen()).
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context);
 
@@ -43,7 +43,8 @@ class Emulator {
   EmulatorState state() const;
   Eigen::Index n_inputs() const { return inputs_.cols(); }
   Eigen::Index n_outputs() const { return coefficients_.cols(); }
-  int evaluations() const;  ///< of the joint density, while training
+  int evaluations() const;          ///< of the joint density, while training
+  Eigen::VectorXd widened() const;  ///< factor of the variances of each process, if trained
   /// Of the forward selection while training, one for each coefficient.
   std::vector<std::vector<SelectionStep>> selections() const;
 

@@ -197,6 +197,7 @@ void GaussianProcess::widen() {
   leave_one_out(mean, variance);
   const double factor = ((values_ - mean).array().square() / variance.array()).mean();
   if (!(factor > 1.0)) return;
+  widened = factor;
   parameters_.log_amplitude += std::log(factor);
   parameters_.log_nugget += std::log(factor);
   parameters_.log_lambda -= std::log(factor);

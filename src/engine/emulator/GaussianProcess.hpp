@@ -90,14 +90,15 @@ class GaussianProcess {
 
   /// Multiplies all variances by the mean square of the leave-one-out errors in units of their own standard
   /// deviations (Bachoc 2013, Computational Statistics and Data Analysis 66), where that exceeds 1; means
-  /// stay as they are. The mode of the hyper-parameters knows neither their uncertainty nor that the
-  /// covariance is but a model, and its intervals tend to be too narrow.
+  /// stay as they are. The mode of the hyper-parameters ignores their uncertainty and that the covariance
+  /// function is only a model: its intervals tend to be too narrow.
   void widen();
 
   const GaussianProcessParameters& parameters() const { return parameters_; }
   /// Variance of a value about the smooth part: nugget + 1 / lambda.
   double noise() const;
-  double log_joint = 0.0;                ///< value of (3) at the mode, if fitted
+  double log_joint = 0.0;                ///< value of (3) at the mode, if fitted; before widen()
+  double widened = 1.0;                  ///< what widen() multiplied the variances by
   int evaluations = 0;                   ///< of (3), while fitting
   std::vector<SelectionStep> selection;  ///< if fitted by forward selection
 

@@ -35,6 +35,11 @@ PivotedCholesky::PivotedCholesky(MatrixXd x) : x_(std::move(x)), left_(VectorXd:
   if (x_.rows() <= kShort) kernel_ = gaussian_kernel(x_, x_);
 }
 
+MatrixXd PivotedCholesky::take_root() && {
+  root_.conservativeResize(Eigen::NoChange, rank());
+  return std::move(root_);
+}
+
 bool PivotedCholesky::extend(double tolerance, Index max_rank) {
   const Index most = std::min(max_rank, x_.rows());
   while (trace() > tolerance && left_.maxCoeff() > kRounding) {

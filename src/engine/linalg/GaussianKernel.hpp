@@ -22,7 +22,7 @@ class PivotedCholesky {
 
   Eigen::Index rank() const { return static_cast<Eigen::Index>(pivots_.size()); }
   auto root() const { return root_.leftCols(rank()); }  ///< L, N x r
-  auto root() { return root_.leftCols(rank()); }        ///< to work in its place
+  Eigen::MatrixXd take_root() &&;                       ///< L without a copy
   const std::vector<Eigen::Index>& pivots() const { return pivots_; }
   double trace() const { return left_.sum(); }  ///< of E
 
