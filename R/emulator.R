@@ -25,8 +25,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #' runs; as the basis was chosen with them, it is raised by `M / (M - Q + 1)`, as in generalised cross-validation
 #' (Golub, Heath and Wahba 1979). The mode ignores the uncertainty of the hyper-parameters and that the covariance function
 #' is only a model: where the leave-one-out errors of a coefficient are larger than stated, all its variances are multiplied by
-#' the mean square of these errors in units of their standard deviations (Bachoc 2013); the factor is 1 to 1.2 where the
-#' stated ones are right. Means stay as they are.
+#' the mean square of these errors in units of their standard deviations (Bachoc 2013). Means stay as they are.
 #'
 #' @param ensemble An ensemble: [simulate_design()] or [ensemble()].
 #' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know it: the basis

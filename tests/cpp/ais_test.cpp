@@ -108,12 +108,14 @@ TEST(SampleAis, OneAndTwoThreadsGiveTheSameBits) {
 
 TEST(SampleAis, PollsOnTheCallingThreadOnly) {
   const LinearGaussian model(4, 0.5);
+  AisOptions options;
+  options.chains = 16;  // one block, so that a group of chains evaluates it on its own thread
   for (int threads : {1, 2}) {
     Context context = seeded(3, threads);
     const auto caller = std::this_thread::get_id();
     std::atomic<int> polls{0}, elsewhere{0};
     context.poll = [&] { ++(std::this_thread::get_id() == caller ? polls : elsewhere); };
-    sample_ais(model.target(), {}, context);
+    sample_ais(model.target(), options, context);
     EXPECT_GT(polls, 0);
     EXPECT_EQ(elsewhere, 0);
   }
