@@ -1,4 +1,4 @@
-ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision = 0.1, chains = NULL, sweeps = 3, max_sweeps = 30,
+ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision = 0.1, chains = NULL, sweeps = NULL, max_sweeps = 30,
                     ess_drop = 0.7, gradient = FALSE, resample = TRUE, importance_draws = 1000, max_components = 3)
 
 #' Annealed importance sampling of any posterior
@@ -21,7 +21,8 @@ ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision 
 #' @param control List of options:
 #'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at least 32);
 #'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below `precision` (0.1);
-#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, 30);
+#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned records
+#'     of [calibrate_paper()] 1; 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
 #'   * `gradient`: Hamiltonian moves where the likelihood has a gradient ([calibrate()]'s discrepancy; `FALSE`: they make
 #'     the annealed run more reliable at several times its cost). [ais()] makes them if it is given a gradient;
@@ -70,20 +71,21 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
   structure(c(list(format_version = format_version, seed = seed), result), class = "amiss_ais")
 }
 
-# The numbers of chains stay 0 where they follow from the dimension, which the engine knows. Limits that were not
+# The numbers of chains and moves stay 0 where they follow from the target, which the engine knows. Limits that were not
 # given follow those that were: more groups than `max_groups` raise it.
 fill_ais_control <- function(control, what = "control", call = rlang::caller_env()) {
   filled <- merge_control(ais_control, control, what, call = call)
   filled$pilot_chains <- filled$pilot_chains %||% 0
   filled$chains <- filled$chains %||% 0
+  filled$sweeps <- filled$sweeps %||% 0
   for (limit in c("groups", "sweeps")) {
     upper <- paste0("max_", limit)
     if (is.null(control[[upper]])) filled[[upper]] <- max(filled[[upper]], filled[[limit]])
   }
   check <- function(name, result, hint = NULL) check_input(result, paste0(what, "$", name), hint, call = call)
-  counts <- list(pilot_chains = 8, groups = 2, max_groups = filled$groups, chains = 4, sweeps = 1, max_sweeps = filled$sweeps,
+  counts <- list(pilot_chains = 8, groups = 2, max_groups = filled$groups, chains = 4, sweeps = 1, max_sweeps = max(1, filled$sweeps),
                  importance_draws = 50, max_components = 1)
-  absent <- c("pilot_chains", "chains", "importance_draws")
+  absent <- c("pilot_chains", "chains", "sweeps", "importance_draws")
   for (name in names(counts)) {
     value <- filled[[name]]
     if (name %in% absent && (identical(value, 0) || identical(value, 0L))) next

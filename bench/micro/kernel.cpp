@@ -18,7 +18,8 @@ KernelParameters typical_point() {
 
 void dense(benchmark::State& state) {
   const KernelModel model = kernel_record(state.range(0), 3, 3);
-  for (auto _ : state) benchmark::DoNotOptimize(model.log_likelihood(typical_point()));
+  KernelModel::Memory memory;
+  for (auto _ : state) benchmark::DoNotOptimize(model.log_likelihood(typical_point(), memory));
 }
 BENCHMARK(dense)->Name("kernel/dense")->Arg(96)->Arg(384)->Arg(1536)->Unit(benchmark::kMillisecond);
 
@@ -46,7 +47,8 @@ void skeleton(benchmark::State& state) {
   const KernelModel model = kernel_record(state.range(0), 3, 3);
   const KernelParameters p = typical_point();
   const auto made = KernelSkeleton::make(model, 1.5 * p.decay, 2.0 * p.amplitude * p.lambda, 0.01, model.size());
-  for (auto _ : state) benchmark::DoNotOptimize(made->log_likelihood(p));
+  KernelSkeleton::Memory memory;
+  for (auto _ : state) benchmark::DoNotOptimize(made->log_likelihood(p, memory));
   state.counters["pivots"] = static_cast<double>(made->rank());
 }
 BENCHMARK(skeleton)->Name("kernel/skeleton")->Arg(384)->Arg(5760)->Arg(11520)->Unit(benchmark::kMillisecond);

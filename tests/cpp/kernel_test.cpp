@@ -78,6 +78,20 @@ TEST(PivotedCholesky, RemainderIsPositiveAndWhatItsTraceSays) {
   }
 }
 
+TEST(PivotedCholesky, MemoryUsedBeforeChangesNothing) {
+  PivotedCholesky used;
+  for (Index n : {200, 120, 500, 80}) {
+    const MatrixXd x = 1.3 * uniform_matrix(n, 3, 23);
+    PivotedCholesky fresh(x);
+    ASSERT_TRUE(fresh.extend(1e-4, n));
+    used.start(x);
+    ASSERT_TRUE(used.extend(1e-4, n));
+    EXPECT_EQ(used.pivots(), fresh.pivots());
+    EXPECT_EQ(used.root(), fresh.root());
+    EXPECT_EQ(used.trace(), fresh.trace());
+  }
+}
+
 TEST(PivotedCholesky, BlocksCostLittleRank) {
   const Index n = 600;
   const MatrixXd x = 2.0 * uniform_matrix(n, 2, 22);
@@ -115,20 +129,23 @@ TEST(LowRankKernel, ExactValueLiesWithinTheBounds) {
       }
     }
     EXPECT_FALSE(low_rank_likelihood(model, p, 1e-6, Certificate::both, 5).has_value());
-    EXPECT_EQ(bounded_likelihood(model, p, 0.01).value, exact);  // short: dense
+    KernelModel::Memory memory;
+    EXPECT_EQ(bounded_likelihood(model, p, 0.01, Certificate::both, memory).value, exact);  // short: dense
   }
 }
 
 TEST(LowRankKernel, LongRecordsTakeTheLowRank) {
   const KernelModel model = make_model(900);
   for (const KernelParameters& p : make_points()) {
-    const BoundedValue v = bounded_likelihood(model, p, 0.01);
+    KernelModel::Memory memory;
+    const BoundedValue v = bounded_likelihood(model, p, 0.01, Certificate::both, memory);
     EXPECT_NEAR(v.value, model.log_likelihood(p), 0.01);
     EXPECT_GT(v.below, 0.0);
   }
 }
 
 TEST(KernelSkeleton, ServesSmootherKernelsAtAnyLength) {
+  KernelSkeleton::Memory memory;  // of both lengths
   for (Index n : {300, 900}) {
     const KernelModel model = make_model(n);
     const KernelParameters rough = make_point({0.4, 0.5, 0.95, 0.99}, 20.0, 120.0);
@@ -139,7 +156,7 @@ TEST(KernelSkeleton, ServesSmootherKernelsAtAnyLength) {
       EXPECT_EQ(skeleton->serves(p), inside);
       // Interpolation is not certified: many times the tolerance where the model fits badly.
       if (inside) {
-        EXPECT_NEAR(skeleton->log_likelihood(p), model.log_likelihood(p), 0.05);
+        EXPECT_NEAR(skeleton->log_likelihood(p, memory), model.log_likelihood(p), 0.05);
       }
     }
     EXPECT_TRUE(skeleton->serves(make_points()[2]));

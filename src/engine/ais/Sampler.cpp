@@ -21,6 +21,7 @@ using Eigen::VectorXd;
 
 constexpr double kMoveDof = 6.0;        // of the proposals while annealing
 constexpr double kImportanceDof = 8.0;  // of the final mixture
+constexpr int kSweeps = 3;              // unless asked otherwise
 constexpr double kAcceptance = 0.35;    // aimed at by the step length
 constexpr double kHamiltonianAcceptance = 0.75;
 constexpr int kLeapfrogs = 4;    // of one Hamiltonian move
@@ -629,8 +630,9 @@ void AisOptions::check() const {
     throw std::invalid_argument("ais: need pilot_chains >= 8, groups >= 2, chains >= 4");
   if (max_groups < groups) throw std::invalid_argument("ais: max_groups must not be below groups");
   if (!(precision > 0)) throw std::invalid_argument("ais: precision must be positive");
-  if (sweeps < 1 || max_sweeps < sweeps)
-    throw std::invalid_argument("ais: sweeps must be positive, max_sweeps not below them");
+  if (sweeps < 0 || max_sweeps < 1 || max_sweeps < sweeps)
+    throw std::invalid_argument("ais: sweeps must not be negative, max_sweeps positive and not below them");
+
   if (!(ess_drop > 0 && ess_drop < 1)) throw std::invalid_argument("ais: ess_drop must lie in (0, 1)");
   if (importance_draws != 0 && importance_draws < 50) {
     throw std::invalid_argument("ais: importance_draws must be 0 (none) or at least 50");
@@ -643,6 +645,7 @@ void AisOptions::check() const {
 AisOptions AisOptions::for_dimension(Index d) const {
   AisOptions filled = *this;
   if (pilot_chains == 0) filled.pilot_chains = static_cast<int>(std::max<Index>(256, 16 * d));
+  if (sweeps == 0) filled.sweeps = std::min(kSweeps, max_sweeps);
   if (chains == 0) filled.chains = static_cast<int>(std::max<Index>(32, 3 * d));
   return filled;
 }

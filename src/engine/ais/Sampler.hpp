@@ -14,7 +14,7 @@ struct AisOptions {
   int max_groups = 64;   ///< more are run, at most so many, until ...
   double precision = 0.1;  ///< ... the standard error of the log evidence has come down to this, in nats
   int chains = 0;          ///< in a group; 0: 3 per dimension, at least 32
-  int sweeps = 3;          ///< least number of moves of every chain at every temperature
+  int sweeps = 0;          ///< least number of moves of every chain at every temperature; 0: 3
   int max_sweeps = 30;     ///< greatest; the pilot finds how many the likelihood needs to forget where it was
   double ess_drop = 0.7;   ///< the pilot's next temperature leaves this conditional effective size per chain
   bool gradient = true;    ///< Hamiltonian moves too, where the target has a gradient
@@ -28,7 +28,7 @@ struct AisOptions {
   int max_temperatures = 400;
 
   void check() const;
-  AisOptions for_dimension(Eigen::Index d) const;  ///< with the numbers of chains filled in
+  AisOptions for_dimension(Eigen::Index d) const;  ///< with chains and sweeps filled in
 };
 
 /// What happened at one temperature of the ladder.

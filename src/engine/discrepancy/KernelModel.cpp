@@ -193,17 +193,7 @@ void KernelModel::sort_conditions() {
   order_.push_back(conditions_);
 }
 
-// With B = lambda* A = LL' and W = L^-1 [O, Hv]: O'B^-1 O = RR' and the coordinates of the projection.
-struct KernelModel::Factor {
-  MatrixXd b;        // B, then L in its lower triangle
-  MatrixXd half;     // N x (Q+1): L^-1 [O, Hv]
-  MatrixXd root;     // Q x Q: R, lower
-  VectorXd project;  // Q: R^-1 O'B^-1 Hv
-  double log_det = 0.0;
-  double quadratic = 0.0;  // of B
-};
-
-bool KernelModel::factorise(const KernelParameters& p, Factor& work) const {
+bool KernelModel::factorise(const KernelParameters& p, Memory& work) const {
   const double ratio = p.amplitude * p.lambda;
   if (!(ratio <= largest_ratio)) return false;
   const Index n = size(), q = orthonormal_.cols(), c = columns_.cols();
@@ -245,28 +235,21 @@ bool KernelModel::factorise(const KernelParameters& p, Factor& work) const {
 }
 
 double KernelModel::log_likelihood(const KernelParameters& parameters) const {
-  return log_likelihood(std::vector<KernelParameters>{parameters})[0];
+  Memory memory;
+  return log_likelihood(parameters, memory);
 }
 
 // |H'AH| = lambda*^-(N-Q) |H'BH|.
-VectorXd KernelModel::log_likelihood(const std::vector<KernelParameters>& points) const {
-  const double n = static_cast<double>(size() - orthonormal_.cols());
-  VectorXd values(static_cast<Index>(points.size()));
-  Factor work;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double lambda = points[i].lambda;
-    values[static_cast<Index>(i)] =
-        factorise(points[i], work)
-            ? -0.5 * (n * (kLogTwoPi - std::log(lambda)) + work.log_det + lambda * work.quadratic)
-            : -std::numeric_limits<double>::infinity();
-  }
-  return values;
+double KernelModel::log_likelihood(const KernelParameters& parameters, Memory& memory) const {
+  if (!factorise(parameters, memory)) return -std::numeric_limits<double>::infinity();
+  const double n = static_cast<double>(size() - orthonormal_.cols()), lambda = parameters.lambda;
+  return -0.5 * (n * (kLogTwoPi - std::log(lambda)) + memory.log_det + lambda * memory.quadratic);
 }
 
 // H'zeta H (H'AH)^-1 v = v - (H'BH)^-1 v, and H (H'BH)^-1 v = B^-1 (Hv - O beta), beta = (O'B^-1 O)^-1 O'B^-1
 // Hv.
 VectorXd KernelModel::discrepancy(const KernelParameters& parameters) const {
-  Factor work;
+  Memory work;
   if (!factorise(parameters, work))
     throw std::runtime_error("kernel: covariance of the discrepancy is not positive definite");
   const Index q = orthonormal_.cols();
@@ -292,10 +275,10 @@ KernelParameters KernelTarget::parameters(const VectorXd& x) const {
 }
 
 VectorXd KernelTarget::log_likelihood(const MatrixXd& x) const {
-  std::vector<KernelParameters> points;
-  points.reserve(static_cast<std::size_t>(x.cols()));
-  for (Index i = 0; i < x.cols(); ++i) points.push_back(parameters(x.col(i)));
-  return model_.log_likelihood(points);
+  VectorXd values(x.cols());
+  KernelModel::Memory memory;
+  for (Index i = 0; i < x.cols(); ++i) values[i] = model_.log_likelihood(parameters(x.col(i)), memory);
+  return values;
 }
 
 }  // namespace amiss

@@ -92,11 +92,22 @@ class KernelModel {
 
   KernelModel(KernelData data, KernelPriors priors);
 
+  /// What a value works in: with B = lambda* A = LL' and W = L^-1 [O, Hv], O'B^-1 O = RR' and the coordinates
+  /// of the projection.
+  struct Memory {
+    Eigen::MatrixXd b;        // B, then L in its lower triangle
+    Eigen::MatrixXd half;     // N x (Q+1): W
+    Eigen::MatrixXd root;     // Q x Q: R, lower
+    Eigen::VectorXd project;  // Q: R^-1 O'B^-1 Hv
+    double log_det = 0.0;
+    double quadratic = 0.0;  // of B
+  };
+
   /// Log density of v. -infinity where amplitude * lambda* exceeds largest_ratio: rounding would decide
   /// there.
   double log_likelihood(const KernelParameters& parameters) const;
-  /// The same for n points; working memory is shared.
-  Eigen::VectorXd log_likelihood(const std::vector<KernelParameters>& points) const;
+  /// The same in memory that many values share.
+  double log_likelihood(const KernelParameters& parameters, Memory& memory) const;
 
   /// Posterior mean of the discrepancy over time, H v' (N), v' = H'zeta H (H'AH)^-1 v (equation 8).
   Eigen::VectorXd discrepancy(const KernelParameters& parameters) const;
@@ -116,8 +127,7 @@ class KernelModel {
   KernelModel thinned(Eigen::Index k) const;
 
  private:
-  struct Factor;
-  bool factorise(const KernelParameters& parameters, Factor& work) const;
+  bool factorise(const KernelParameters& parameters, Memory& work) const;
   void sort_rows(KernelData& data);
   void sort_conditions();
 

@@ -11,6 +11,7 @@
 #include "engine/ais/SkewedMixture.hpp"
 #include "engine/discrepancy/LowRankKernel.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
+#include "engine/parallel/MemoryPool.hpp"
 #include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
@@ -31,6 +32,7 @@ constexpr Index kReachDraws = 1000;
 constexpr double kCoarser = 10.0;               // tolerance while only draws are needed, over the final one
 constexpr int kPilotChains = 64, kChains = 16;  // unless asked otherwise
 constexpr int kRefitDraws = 300, kEffectiveDraws = 400;  // likewise
+constexpr int kRoughSweeps = 1;                          // likewise, while only draws are needed
 constexpr double kRoughDrop = 0.6;     // conditional effective size while only draws are needed
 constexpr std::uint64_t kStage = 128;  // purposes of the random streams
 
@@ -83,28 +85,35 @@ class ApproximateTarget : public Target {
 
   Index dimension() const override { return exact_.dimension(); }
   VectorXd log_likelihood(const MatrixXd& x) const override {
+    const MemoryPool<Memory>::Loan memory(memory_);
     VectorXd values(x.cols());
-    for (Index i = 0; i < x.cols(); ++i) values[i] = value(exact_.parameters(x.col(i)));
+    for (Index i = 0; i < x.cols(); ++i) values[i] = value(exact_.parameters(x.col(i)), *memory);
     return values;
   }
 
   mutable std::atomic<long> direct{0}, by_skeleton{0};
 
  private:
-  double value(const KernelParameters& p) const {
+  struct Memory {
+    KernelModel::Memory dense;
+    KernelSkeleton::Memory skeleton;
+  };
+
+  double value(const KernelParameters& p, Memory& memory) const {
     for (const KernelSkeleton& skeleton : skeletons_) {
       if (!skeleton.serves(p)) continue;
       ++by_skeleton;
-      return skeleton.log_likelihood(p);
+      return skeleton.log_likelihood(p, memory.skeleton);
     }
     ++direct;
-    return bounded_likelihood(model_, p, tolerance_, Certificate::determinant).value;
+    return bounded_likelihood(model_, p, tolerance_, Certificate::determinant, memory.dense).value;
   }
 
   KernelTarget exact_;
   const KernelModel& model_;
   std::vector<KernelSkeleton> skeletons_;
   double tolerance_;
+  mutable MemoryPool<Memory> memory_;
 };
 
 // Compares approximate values with certified ones at draws spread over the posterior, and mends the evidence:
@@ -125,7 +134,9 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
   parallel_for(n, context, [&](int i) {
     const Index own = picked[static_cast<std::size_t>(i)];
     const KernelParameters p = target.parameters(posterior.draws.col(own));
-    difference[i] = bounded_likelihood(model, p, sampling.tolerance).value - posterior.log_likelihood[own];
+    KernelModel::Memory memory;
+    const double value = bounded_likelihood(model, p, sampling.tolerance, Certificate::both, memory).value;
+    difference[i] = value - posterior.log_likelihood[own];
   });
   sample.largest_error = difference.cwiseAbs().maxCoeff();
   sample.correction = log_mean_exp(difference);
@@ -189,7 +200,7 @@ KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
   own.skewed = true;
   AisOptions rough = own;
   rough.ess_drop = std::min(own.ess_drop, kRoughDrop);
-  if (options.sweeps == AisOptions().sweeps) rough.sweeps = 1;  // and more, while likelihoods remember
+  if (options.sweeps == 0) rough.sweeps = kRoughSweeps;  // and more, while likelihoods remember
   const SkewedMixture before = sample_stage(model, rough, sampling, context, sample.coarse);
   Stream stream(context.seed, kStage, 0);
   const ApproximateTarget approximate(model, before, sampling.tolerance, context, stream);

@@ -34,18 +34,19 @@ double log_density(double dimension, double lambda, double log_det, double quadr
   return -0.5 * (dimension * (kLogTwoPi - std::log(lambda)) + log_det + lambda * quadratic);
 }
 
-// log|I + r G| and, given b, what the discrepancy explains: r b'(I + r G)^-1 b. Of G the lower triangle.
+// log|I + r G| and, given b, what the discrepancy explains: r b'(I + r G)^-1 b. Of G the lower triangle,
+// which is overwritten.
 struct Inside {
   double log_det, explained;
   VectorXd weights;  // r (I + r G)^-1 b
 };
 
-Inside inside(const MatrixXd& gram, const VectorXd& b, double ratio) {
-  MatrixXd matrix = ratio * gram;
-  matrix.diagonal().array() += 1.0;
-  const Eigen::LLT<MatrixXd> factor(matrix);
+Inside inside(Eigen::Ref<MatrixXd> gram, const VectorXd& b, double ratio) {
+  gram.triangularView<Eigen::Lower>() *= ratio;
+  gram.diagonal().array() += 1.0;
+  const Eigen::LLT<Eigen::Ref<MatrixXd>, Eigen::Lower> factor(gram);
   const VectorXd weights = ratio * factor.solve(b);
-  return {2.0 * factor.matrixLLT().diagonal().array().log().sum(), b.dot(weights), weights};
+  return {2.0 * gram.diagonal().array().log().sum(), b.dot(weights), weights};
 }
 
 // Lower triangle of F'F, F = (I - OO') L, given L (`root`), O and O'L (`within`). Some rows at a time: F
@@ -76,7 +77,8 @@ std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const 
     if (!cholesky.extend(trace, max_rank)) return std::nullopt;
     const auto root = cholesky.root();
     const MatrixXd within = basis.transpose() * root;
-    const Inside part = inside(gram_outside(root, basis, within), root.transpose() * model.outside(), ratio);
+    MatrixXd gram = gram_outside(root, basis, within);
+    const Inside part = inside(gram, root.transpose() * model.outside(), ratio);
     const VectorXd w = model.outside() - root * part.weights + basis * (within * part.weights);
     const double quadratic = model.outside().squaredNorm() - part.explained;
     const double below = 0.5 * ratio * cholesky.trace();
@@ -90,13 +92,13 @@ std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const 
 }
 
 BoundedValue bounded_likelihood(const KernelModel& model, const KernelParameters& parameters,
-                                double tolerance, Certificate certificate) {
+                                double tolerance, Certificate certificate, KernelModel::Memory& memory) {
   const auto most = static_cast<Index>(kCheap * static_cast<double>(model.size()));
   if (model.size() >= kSmall) {
     if (const auto value = low_rank_likelihood(model, parameters, tolerance, certificate, most))
       return *value;
   }
-  return {model.log_likelihood(parameters), 0.0, 0.0};
+  return {model.log_likelihood(parameters, memory), 0.0, 0.0};
 }
 
 std::optional<KernelSkeleton> KernelSkeleton::make(const KernelModel& model, const VectorXd& decay,
@@ -111,7 +113,9 @@ KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double 
     : decay_(std::move(decay)), ratio_(ratio), tolerance_(tolerance), condition_(model.condition()) {
   const std::vector<Index> rows = cholesky.pivots();
   const Index m = cholesky.rank();
-  MatrixXd u = std::move(cholesky).take_root(), own(m, m);
+  VectorXd memory = std::move(cholesky).take_root();
+  Eigen::Map<MatrixXd> u(memory.data(), model.size(), m);
+  MatrixXd own(m, m);
   pivots_.resize(m, model.columns().cols());
   for (Index i = 0; i < m; ++i) {
     own.row(i) = u.row(rows[static_cast<std::size_t>(i)]);
@@ -131,13 +135,15 @@ bool KernelSkeleton::serves(const KernelParameters& p) const {
   return p.amplitude * p.lambda <= ratio_ && (p.decay.array() <= decay_.array()).all();
 }
 
-double KernelSkeleton::log_likelihood(const KernelParameters& p) const {
+double KernelSkeleton::log_likelihood(const KernelParameters& p, Memory& memory) const {
   const double ratio = p.amplitude * p.lambda;
-  PivotedCholesky cholesky(scaled(pivots_, condition_, p.decay));
-  cholesky.extend(0.1 * tolerance_ / ratio, rank());
-  const MatrixXd root = cholesky.root();
-  const MatrixXd product = root_.triangularView<Eigen::Upper>() * root;
-  MatrixXd gram = MatrixXd::Zero(root.cols(), root.cols());
+  memory.cholesky.start(scaled(pivots_, condition_, p.decay));
+  memory.cholesky.extend(0.1 * tolerance_ / ratio, rank());
+  const auto root = memory.cholesky.root();
+  auto product = memory.product.matrix(rank(), root.cols());
+  product.noalias() = root_.triangularView<Eigen::Upper>() * root;
+  auto gram = memory.gram.matrix(root.cols(), root.cols());
+  gram.triangularView<Eigen::Lower>().setZero();
   gram.selfadjointView<Eigen::Lower>().rankUpdate(product.transpose());
   const Inside part = inside(gram, root.transpose() * projected_, ratio);
   return log_density(dimension_, p.lambda, part.log_det, square_ - part.explained);

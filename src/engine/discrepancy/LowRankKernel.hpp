@@ -4,6 +4,7 @@
 
 #include "engine/discrepancy/KernelModel.hpp"
 #include "engine/linalg/GaussianKernel.hpp"
+#include "engine/linalg/Scratch.hpp"
 
 namespace amiss {
 
@@ -33,7 +34,7 @@ std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const 
 
 /// The same, or the dense value where the rank is so high that it costs less.
 BoundedValue bounded_likelihood(const KernelModel& model, const KernelParameters& parameters,
-                                double tolerance, Certificate certificate = Certificate::both);
+                                double tolerance, Certificate certificate, KernelModel::Memory& memory);
 
 /// Log density (6) for many parameters at a cost that does not grow with N. Pivots I and the interpolation
 /// U = C_:I C_II^-1 are those of one rough kernel; for every smoother one C ~ U C_II U', and with G = (PU)'PU
@@ -47,9 +48,15 @@ class KernelSkeleton {
   static std::optional<KernelSkeleton> make(const KernelModel& model, const Eigen::VectorXd& decay,
                                             double ratio, double tolerance, Eigen::Index max_rank);
 
+  /// What a value works in, for skeletons of any size.
+  struct Memory {
+    PivotedCholesky cholesky;
+    Scratch product, gram;
+  };
+
   bool serves(const KernelParameters& parameters) const;
   /// @pre serves(parameters)
-  double log_likelihood(const KernelParameters& parameters) const;
+  double log_likelihood(const KernelParameters& parameters, Memory& memory) const;
   Eigen::Index rank() const { return pivots_.rows(); }  ///< m
 
  private:

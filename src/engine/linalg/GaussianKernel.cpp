@@ -21,30 +21,40 @@ constexpr double kRounding = 1e-14;  // a remainder that is none
 }  // namespace
 
 // -|a - b|^2 = [2a, -|a|^2, -1] [b, 1, |b|^2]': the squares ride along in the product.
-MatrixXd gaussian_kernel(const MatrixXd& a, const MatrixXd& b) {
+void gaussian_kernel(const MatrixXd& a, const MatrixXd& b, Eigen::Ref<MatrixXd> kernel) {
   const Index c = a.cols();
-  MatrixXd left(a.rows(), c + 2), right(b.rows(), c + 2), r(a.rows(), b.rows());
+  MatrixXd left(a.rows(), c + 2), right(b.rows(), c + 2);
   left << 2.0 * a, -a.rowwise().squaredNorm(), VectorXd::Constant(a.rows(), -1.0);
   right << b, VectorXd::Ones(b.rows()), b.rowwise().squaredNorm();
-  r.noalias() = left * right.transpose();
-  r = r.array().min(0.0).exp();
-  return r;
+  kernel.noalias() = left * right.transpose();
+  kernel = kernel.array().min(0.0).exp();
 }
 
-PivotedCholesky::PivotedCholesky(MatrixXd x) : x_(std::move(x)), left_(VectorXd::Ones(x_.rows())) {
-  if (x_.rows() <= kShort) kernel_ = gaussian_kernel(x_, x_);
+MatrixXd gaussian_kernel(const MatrixXd& a, const MatrixXd& b) {
+  MatrixXd kernel(a.rows(), b.rows());
+  gaussian_kernel(a, b, kernel);
+  return kernel;
 }
 
-MatrixXd PivotedCholesky::take_root() && {
-  root_.conservativeResize(Eigen::NoChange, rank());
-  return std::move(root_);
+void PivotedCholesky::start(MatrixXd x) {
+  x_ = std::move(x);
+  left_.setOnes(x_.rows());
+  pivots_.clear();
+  if (x_.rows() <= kShort) gaussian_kernel(x_, x_, kernel_.matrix(x_.rows(), x_.rows()));
+}
+
+// The memory of L with so many columns at least; those it has are kept.
+Eigen::Map<MatrixXd> PivotedCholesky::root_for(Index rank) {
+  const Index n = x_.rows(), have = root_.size() / n;
+  if (rank > have) root_.conservativeResize(n * std::min(n, std::max(have * 3 / 2, rank + kBlock)));
+  return {root_.data(), n, rank};
 }
 
 bool PivotedCholesky::extend(double tolerance, Index max_rank) {
   const Index most = std::min(max_rank, x_.rows());
   while (trace() > tolerance && left_.maxCoeff() > kRounding) {
     if (rank() >= most) return rank() == x_.rows();
-    if (kernel_.size() > 0) {
+    if (x_.rows() <= kShort) {
       add_pivot();
     } else {
       add_block(std::min(kBlock, most - rank()));
@@ -53,14 +63,20 @@ bool PivotedCholesky::extend(double tolerance, Index max_rank) {
   return true;
 }
 
+// Column by column in panels (LAPACK's dpstrf): what the panels before this one took off is already missing
+// from kernel_, in one symmetric product for each.
 void PivotedCholesky::add_pivot() {
-  const Index r = rank();
+  const Index r = rank(), n = x_.rows(), panel = r - r % kBlock, width = r - panel;
+  auto root = root_for(r + 1);
+  auto kernel = kernel_.matrix(n, n);
+  if (width == 0 && r > 0)
+    kernel.selfadjointView<Eigen::Lower>().rankUpdate(root.middleCols(r - kBlock, kBlock), -1.0);
   Index pivot = 0;
   const double largest = left_.maxCoeff(&pivot);
-  if (r == root_.cols()) root_.conservativeResize(x_.rows(), std::min(x_.rows(), r + 2 * kBlock));
-  auto column = root_.col(r);
-  column = kernel_.col(pivot);
-  column.noalias() -= root_.leftCols(r) * root_.row(pivot).head(r).transpose();
+  auto column = root.col(r);
+  column.head(pivot) = kernel.row(pivot).head(pivot).transpose();
+  column.tail(n - pivot) = kernel.col(pivot).tail(n - pivot);
+  column.noalias() -= root.middleCols(panel, width) * root.row(pivot).segment(panel, width).transpose();
   column /= std::sqrt(largest);
   left_ = (left_ - column.cwiseAbs2()).cwiseMax(0.0);
   left_[pivot] = 0.0;
@@ -79,13 +95,13 @@ std::vector<Index> PivotedCholesky::candidates(Index count) const {
 }
 
 void PivotedCholesky::add_block(Index most) {
-  const Index n = x_.rows(), r = rank();
+  const Index r = rank();
   const std::vector<Index> rows = candidates(kStretches);
   const Index c = static_cast<Index>(rows.size());
   MatrixXd own(c, x_.cols()), own_root(c, r);
   for (Index i = 0; i < c; ++i) {
     own.row(i) = x_.row(rows[static_cast<std::size_t>(i)]);
-    own_root.row(i) = root_.row(rows[static_cast<std::size_t>(i)]).head(r);
+    own_root.row(i) = root().row(rows[static_cast<std::size_t>(i)]);
   }
   // E among the candidates, and its own pivoted Cholesky factor.
   MatrixXd small = gaussian_kernel(own, own);
@@ -117,12 +133,11 @@ void PivotedCholesky::add_block(Index most) {
     triangle.row(i) = factor.row(row).head(k);
     pivots_.push_back(rows[static_cast<std::size_t>(row)]);
   }
-  MatrixXd columns = gaussian_kernel(x_, pivots);
-  if (r > 0) columns.noalias() -= root_.leftCols(r) * pivot_root.transpose();
+  auto root = root_for(r + k);
+  auto columns = root.rightCols(k);
+  gaussian_kernel(x_, pivots, columns);
+  if (r > 0) columns.noalias() -= root.leftCols(r) * pivot_root.transpose();
   triangle.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(columns);
-  if (r + k > root_.cols())
-    root_.conservativeResize(n, std::min(n, std::max(root_.cols() * 3 / 2, r + 2 * kBlock)));
-  root_.middleCols(r, k) = columns;
   left_ = (left_ - columns.rowwise().squaredNorm()).cwiseMax(0.0);
   for (Index i = r; i < r + k; ++i) left_[pivots_[static_cast<std::size_t>(i)]] = 0.0;
 }
