@@ -30,7 +30,7 @@ micro <- function(program, filter = ".") {
   run(file.path(build, program), paste0("--benchmark_filter='", filter, "'"), paste0("--benchmark_out=", file), "--benchmark_out_format=json")
   rows <- jsonlite::read_json(file)$benchmarks
   stats::setNames(lapply(rows, function(r) c(r, seconds = r$real_time / c(s = 1, ms = 1e3, us = 1e6, ns = 1e9)[[r$time_unit]])),
-                  vapply(rows, function(r) sub("/iterations:1$", "", r$name), ""))
+                  vapply(rows, function(r) sub("/iterations:[0-9]+$", "", r$name), ""))
 }
 
 gflops <- micro("micro_machine", "1000")[[1]]$flops / 1e9

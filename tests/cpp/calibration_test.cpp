@@ -211,7 +211,7 @@ TEST(ParameterModes, AreThoseOfAFineGrid) {
                    variance);
   VectorXd exact(4001), fitted(4001);
   Stream stream(1, 2, 3);
-  const ParameterModes modes = parameter_modes(target, {point}, {}, stream);
+  const ParameterModes modes = parameter_modes(target, {point}, {}, Context(), stream);
   EXPECT_GT(modes.evaluations, 256);
   for (Index i = 0; i < 4001; ++i) {
     exact[i] = target.log_density_inside(point, mean.row(i), variance.row(i)) - 0.5 * grid(0, i) * grid(0, i);
@@ -229,7 +229,7 @@ TEST(ParameterModes, TellWhereTheRecordContradictsTheHistoryPosterior) {
   const CalibrationTarget target(history, make_reference(1, 1.0), emulator);
   const HistoryParameters point = history.parameters(VectorXd::Zero(1));
   Stream stream(1, 2, 3);
-  const ParameterModes near = parameter_modes(target, {point}, {}, stream);
+  const ParameterModes near = parameter_modes(target, {point}, {}, Context(), stream);
   ASSERT_EQ(near.misfits.size(), 1);
   EXPECT_LT(near.misfits[0], 6.0);
   // Misfit at the mode, written down: one parameter, two coefficients.
@@ -249,7 +249,7 @@ TEST(ParameterModes, TellWhereTheRecordContradictsTheHistoryPosterior) {
   const HistoryModel other(far, model.priors(), Context());
   const HistoryTarget elsewhere(other, {});
   const CalibrationTarget lost(elsewhere, make_reference(1, 1.0), emulator);
-  EXPECT_GT(parameter_modes(lost, {point}, {}, stream).misfits[0], 200.0);
+  EXPECT_GT(parameter_modes(lost, {point}, {}, Context(), stream).misfits[0], 200.0);
 }
 
 TEST(CalibrationTarget, AnnealingFromTheModesGivesTheSameEvidenceForLess) {

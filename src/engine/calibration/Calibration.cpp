@@ -115,8 +115,9 @@ std::vector<HistoryParameters> spread_points(const HistoryTarget& target, const 
 CalibrationSample sample_calibration(const CalibrationTarget& target, const AisResult& history,
                                      const AisOptions& options, const Context& context) {
   Stream stream(context.seed, kReference, 0);
-  const ParameterModes modes = parameter_modes(
-      target, spread_points(target.history_target(), history, kHistoryPoints), ModeOptions(), stream);
+  const ParameterModes modes =
+      parameter_modes(target, spread_points(target.history_target(), history, kHistoryPoints), ModeOptions(),
+                      context, stream);
   CalibrationSample sample;
   sample.misfits = modes.misfits;
   AisResult& posterior = sample.posterior;

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "engine/linalg/log_sum_exp.hpp"
+#include "engine/parallel/parallel_for.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -119,33 +120,49 @@ bool same(const Mode& a, const Mode& b) {
   return apart.dot(a.precision * apart) < kSame * kSame;
 }
 
+// The distinct modes that searches from the best of the starts find for one point of the history posterior.
+std::vector<Mode> find_modes(const CalibrationTarget& target, const HistoryParameters& point,
+                             const MatrixXd& starts, const ModeOptions& options, long& evaluations) {
+  const Conditional conditional(target, point, evaluations);
+  const VectorXd values = conditional.log_density(starts);
+  std::vector<Index> order(static_cast<std::size_t>(options.starts));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a] > values[b]; });
+  std::vector<Mode> found;
+  for (int k = 0; k < options.searches; ++k) {
+    Mode mode = conditional.climb(starts.col(order[static_cast<std::size_t>(k)]), options.max_iterations);
+    if (!std::isfinite(mode.log_mass)) continue;
+    if (std::none_of(found.begin(), found.end(), [&](const Mode& other) { return same(other, mode); }))
+      found.push_back(std::move(mode));
+  }
+  return found;
+}
+
+double least_misfit(const std::vector<Mode>& modes) {
+  if (modes.empty()) return std::numeric_limits<double>::quiet_NaN();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Mode& mode : modes) least = std::min(least, mode.misfit);
+  return least;
+}
+
 }  // namespace
 
 ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
-                               const ModeOptions& options, Stream& stream) {
-  long evaluations = 0;
-  VectorXd misfits(static_cast<Index>(points.size()));
-  Index tried = 0;
+                               const ModeOptions& options, const Context& context, Stream& stream) {
   const MatrixXd starts = stream.normals(target.emulator().n_inputs(), options.starts);
+  std::vector<std::vector<Mode>> at_point(points.size());
+  std::vector<long> spent(points.size(), 0);
+  parallel_for(static_cast<int>(points.size()), context, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    at_point[k] = find_modes(target, points[k], starts, options, spent[k]);
+  });
+  VectorXd misfits(static_cast<Index>(points.size()));
   std::vector<Mode> modes;
   std::vector<double> shares;
-  for (const HistoryParameters& point : points) {
-    const Conditional conditional(target, point, evaluations);
-    const VectorXd values = conditional.log_density(starts);
-    std::vector<Index> order(static_cast<std::size_t>(options.starts));
-    std::iota(order.begin(), order.end(), Index{0});
-    std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a] > values[b]; });
-    std::vector<Mode> found;
-    for (int k = 0; k < options.searches; ++k) {
-      Mode mode = conditional.climb(starts.col(order[static_cast<std::size_t>(k)]), options.max_iterations);
-      if (!std::isfinite(mode.log_mass)) continue;
-      if (std::none_of(found.begin(), found.end(), [&](const Mode& other) { return same(other, mode); }))
-        found.push_back(std::move(mode));
-    }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::vector<Mode>& found = at_point[i];
+    misfits[static_cast<Index>(i)] = least_misfit(found);
     VectorXd log_mass(static_cast<Index>(found.size()));
-    double least = std::numeric_limits<double>::infinity();
-    for (const Mode& mode : found) least = std::min(least, mode.misfit);
-    misfits[tried++] = found.empty() ? std::numeric_limits<double>::quiet_NaN() : least;
     for (std::size_t k = 0; k < found.size(); ++k) log_mass[static_cast<Index>(k)] = found[k].log_mass;
     for (std::size_t k = 0; k < found.size(); ++k) {
       const double share =
@@ -176,7 +193,8 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
                             options.dof);
     weights.push_back(1.0);
   }
-  return {StudentTMixture(std::move(components), std::move(weights)), misfits, evaluations};
+  return {StudentTMixture(std::move(components), std::move(weights)), misfits,
+          std::accumulate(spent.begin(), spent.end(), 0L)};
 }
 
 }  // namespace amiss

@@ -26,6 +26,6 @@ struct ParameterModes {
 };
 
 ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
-                               const ModeOptions& options, Stream& stream);
+                               const ModeOptions& options, const Context& context, Stream& stream);
 
 }  // namespace amiss
