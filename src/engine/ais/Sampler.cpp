@@ -59,12 +59,19 @@ void for_blocks(const Target& target, Index n, const Context& context, const Tas
   });
 }
 
-VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& context) {
+// Likelihoods of the columns; also(i) is what else the threads can do for column i.
+template <class Task>
+VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& context, const Task& also) {
   VectorXd ll(x.cols());
   for_blocks(target, x.cols(), context, [&](Index first, Index count) {
     ll.segment(first, count) = target.log_likelihood(x.middleCols(first, count)).unaryExpr(&finite_or_zero);
+    for (Index i = first; i < first + count; ++i) also(i);
   });
   return ll;
+}
+
+VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& context) {
+  return evaluate(target, x, context, [](Index) {});
 }
 
 VectorXd evaluate(const Target& target, const MatrixXd& x, MatrixXd& gradient, const Context& context) {
@@ -135,16 +142,16 @@ double move(const Target& target, Chains& chains, const Level& level, Stream& st
   const Index n = chains.size();
   MatrixXd proposed(chains.x.rows(), n);
   for (Index i = 0; i < n; ++i) proposed.col(i) = level.proposal.step(chains.x.col(i), level.step, stream);
-  const VectorXd ll = evaluate(target, proposed, context);
+  VectorXd at_chain(n), at_proposed(n);  // log density of the reference over that of the proposal
+  const VectorXd ll = evaluate(target, proposed, context, [&](Index i) {
+    at_chain[i] = target.log_reference(chains.x.col(i)) - level.proposal.log_density(chains.x.col(i));
+    at_proposed[i] = target.log_reference(proposed.col(i)) - level.proposal.log_density(proposed.col(i));
+  });
   int accepted = 0;
   for (Index i = 0; i < n; ++i) {
     const double log_u = std::log(stream.uniform());
     if (!std::isfinite(ll[i])) continue;
-    const double log_ratio = level.beta * (ll[i] - chains.ll[i]) - target.log_reference(chains.x.col(i)) +
-                             target.log_reference(proposed.col(i)) +
-                             level.proposal.log_density(chains.x.col(i)) -
-                             level.proposal.log_density(proposed.col(i));
-    if (log_u < log_ratio) {
+    if (log_u < level.beta * (ll[i] - chains.ll[i]) + at_proposed[i] - at_chain[i]) {
       chains.x.col(i) = proposed.col(i);
       chains.ll[i] = ll[i];
       ++accepted;
@@ -454,12 +461,13 @@ void extend(ImportanceSample& sample, const Target& target, const Distribution& 
   sample.x.conservativeResize(target.dimension(), total);
   sample.ll.conservativeResize(total);
   sample.log_w.conservativeResize(total);
-  for (Index i = before; i < total; ++i) {
-    sample.x.col(i) = mixture.draw(stream);
-    sample.log_w[i] = target.log_reference(sample.x.col(i)) - mixture.log_density(sample.x.col(i));
-  }
-  sample.ll.tail(n) = evaluate(target, sample.x.rightCols(n), context);
-  sample.log_w.tail(n) += sample.ll.tail(n);
+  for (Index i = before; i < total; ++i) sample.x.col(i) = mixture.draw(stream);
+  const MatrixXd drawn = sample.x.rightCols(n);
+  VectorXd over_mixture(n);
+  sample.ll.tail(n) = evaluate(target, drawn, context, [&](Index i) {
+    over_mixture[i] = target.log_reference(drawn.col(i)) - mixture.log_density(drawn.col(i));
+  });
+  sample.log_w.tail(n) = over_mixture + sample.ll.tail(n);
   if (!std::isfinite(sample.log_w.maxCoeff())) return;
   sample.log_evidence = log_mean_exp(sample.log_w);
   sample.weights = normalised_exp(sample.log_w);

@@ -38,10 +38,13 @@ struct GaussianMixture {
   double bic = std::numeric_limits<double>::infinity();
 };
 
-double log_gaussian(const VectorXd& x, const VectorXd& mean, const MatrixXd& root) {
-  const VectorXd z = root.triangularView<Eigen::Lower>().solve(x - mean);
-  return -0.5 * z.squaredNorm() - root.diagonal().array().log().sum() -
-         0.5 * static_cast<double>(x.size()) * std::log(2 * kPi);
+// Log density of each column of x.
+VectorXd log_gaussian(const MatrixXd& x, const VectorXd& mean, const MatrixXd& root) {
+  MatrixXd z = x.colwise() - mean;
+  root.triangularView<Eigen::Lower>().solveInPlace(z);
+  const double log_constant =
+      -root.diagonal().array().log().sum() - 0.5 * static_cast<double>(x.rows()) * std::log(2 * kPi);
+  return (log_constant - 0.5 * z.colwise().squaredNorm().array()).transpose();
 }
 
 GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights, int components,
@@ -75,14 +78,13 @@ GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights,
   MatrixXd responsibility(n, components);
   for (int iteration = 0; iteration < (components == 1 ? 1 : 50); ++iteration) {
     double total = 0.0;
+    for (int k = 0; k < components; ++k) {
+      responsibility.col(k) =
+          log_gaussian(x, mixture.means[k], mixture.roots[k]).array() + std::log(mixture.weights[k]);
+    }
     for (Index i = 0; i < n; ++i) {
-      VectorXd log_part(components);
-      for (int k = 0; k < components; ++k) {
-        log_part[k] =
-            std::log(mixture.weights[k]) + log_gaussian(x.col(i), mixture.means[k], mixture.roots[k]);
-      }
-      const double log_density = log_sum_exp(log_part);
-      responsibility.row(i) = (log_part.array() - log_density).exp().transpose() * weights[i];
+      const double log_density = log_sum_exp(responsibility.row(i).transpose());
+      responsibility.row(i) = (responsibility.row(i).array() - log_density).exp() * weights[i];
       total += points * weights[i] * log_density;
     }
     const bool settled = total - log_likelihood < 1e-3 * std::abs(total);
