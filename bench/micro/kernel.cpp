@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "engine/discrepancy/KernelSampling.hpp"
 #include "engine/discrepancy/LowRankKernel.hpp"
@@ -68,6 +69,8 @@ void sampling(benchmark::State& state) {
   Context context;
   std::map<std::string, double> most;
   double fewest_draws = std::numeric_limits<double>::infinity();
+  std::vector<double> estimates;
+  double stated = 0.0;  // sum of squared standard errors
   const auto note = [&](const std::string& name, double value) { most[name] = std::max(most[name], value); };
   for (auto _ : state) {
     const KernelSample sample = sample_kernel(model, options, {}, context);
@@ -79,9 +82,16 @@ void sampling(benchmark::State& state) {
     note("direct", static_cast<double>(sample.direct));
     note("largest_error", sample.largest_error);
     fewest_draws = std::min(fewest_draws, posterior.ess);
+    estimates.push_back(posterior.log_evidence);
+    stated += posterior.standard_error * posterior.standard_error;
   }
   for (const auto& [name, value] : most) state.counters[name] = value;
   state.counters["effective_draws"] = fewest_draws;
+  const Eigen::Map<const VectorXd> z(estimates.data(), static_cast<Index>(estimates.size()));
+  if (z.size() > 1) {
+    const double n = static_cast<double>(z.size());
+    state.counters["spread"] = std::sqrt((z.array() - z.mean()).square().sum() / (n - 1.0) / (stated / n));
+  }
   state.counters["peak_memory"] = peak_memory();
 }
 BENCHMARK(sampling)->Name("kernel/sampling")->Args({384, 3})->Iterations(8)->Unit(benchmark::kSecond);

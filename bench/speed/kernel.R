@@ -18,5 +18,6 @@ for (case in names(required)) {
   measured(paste0(told, ": likelihood values"), s$values, "", 10000)
   measured(paste0(told, ": largest error of a certified draw"), s$largest_error, "nat", 0.05)
   measured(paste0(told, ": estimate and frozen run apart, over the latter's error"), s$annealed_apart, "", 3)
+  if (!is.null(s$spread)) measured(paste0(told, ": spread of the estimates over the stated error"), s$spread, "")
   measured(paste0(told, ": most memory held"), s$peak_memory, "MB", if (n >= 8760) 200 else NA)
 }

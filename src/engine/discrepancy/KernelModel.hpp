@@ -95,12 +95,12 @@ class KernelModel {
   /// What a value works in: with B = lambda* A = LL' and W = L^-1 [O, Hv], O'B^-1 O = RR' and the coordinates
   /// of the projection.
   struct Memory {
-    Eigen::MatrixXd b;        // B, then L in its lower triangle
-    Eigen::MatrixXd half;     // N x (Q+1): W
-    Eigen::MatrixXd root;     // Q x Q: R, lower
-    Eigen::VectorXd project;  // Q: R^-1 O'B^-1 Hv
+    Eigen::MatrixXd b;        ///< B, then L in its lower triangle
+    Eigen::MatrixXd half;     ///< N x (Q+1): W
+    Eigen::MatrixXd root;     ///< Q x Q: R, lower
+    Eigen::VectorXd project;  ///< Q: R^-1 O'B^-1 Hv
     double log_det = 0.0;
-    double quadratic = 0.0;  // of B
+    double quadratic = 0.0;  ///< of B
   };
 
   /// Log density of v. -infinity where amplitude * lambda* exceeds largest_ratio: rounding would decide

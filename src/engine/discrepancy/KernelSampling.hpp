@@ -31,8 +31,8 @@ struct KernelSample {
 /// Where `options` leave them open: 64 pilot chains, groups of 16, at least one move while only draws are
 /// needed, 300 draws for the first round of the importance sample, 400 effective draws in the end. Its
 /// mixture is skewed, as the prior limits, on one side, the alpha of every condition that does not act. Its
-/// weights have a heavy tail: over 24 seeds of bench/micro's record of 384 steps, the errors of the log
-/// evidence were 1.5 times the stated ones.
+/// weights can have a heavy tail, of which its standard error knows too little: bench/micro measures by how
+/// much estimates of several seeds lie further apart than they state.
 KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
                            const KernelSamplingOptions& sampling, const Context& context);
 

@@ -9,6 +9,7 @@ namespace amiss {
 
 /// exp(-|a_i - b_j|^2) of the rows of a (m x c) and b (n x c): one matrix product, one exponential.
 Eigen::MatrixXd gaussian_kernel(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+/// The same, written to `kernel` (m x n).
 void gaussian_kernel(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::Ref<Eigen::MatrixXd> kernel);
 
 /// Pivoted Cholesky factor of C_ij = exp(-|x_i - x_j|^2): C = LL' + E with E positive semi-definite and zero
