@@ -8,7 +8,8 @@
 #include <stdexcept>
 
 #include "engine/ais/BridgedTarget.hpp"
-#include "engine/ais/SkewedMixture.hpp"
+#include "engine/ais/ImportanceSample.hpp"
+#include "engine/ais/Sampler.hpp"
 #include "engine/discrepancy/LowRankKernel.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/MemoryPool.hpp"
@@ -22,8 +23,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kDof = 12.0;   // of the mixture that one stage hands to the next
-constexpr int kComponents = 3;  // of it
+constexpr double kDof = 5.0;                   // of the mixture that one stage hands to the next
+constexpr int kComponents = 3;                 // of it
+constexpr int kRounds = 4, kRoundDraws = 200;  // that bring it closer to the stage's posterior
 // Shares of a distribution's draws, in each direction, that skeletons serve.
 constexpr double kBulk = 0.9, kAll = 0.998;
 constexpr std::array<double, 3> kWide = {0.95, 0.98, 0.998};
@@ -152,9 +154,12 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
   }
 }
 
-SkewedMixture fit_population(const MatrixXd& draws, Stream& stream) {
+// A mixture close to the posterior of `target`, of which these are draws.
+SkewedMixture fit_population(const Target& target, const MatrixXd& draws, const Context& context,
+                             Stream& stream, long& evaluations) {
   const VectorXd weights = VectorXd::Constant(draws.cols(), 1.0 / static_cast<double>(draws.cols()));
-  return SkewedMixture::fit(draws, weights, kComponents, kDof, stream);
+  return closer_mixture(target, SkewedMixture::fit(draws, weights, kComponents, kDof, stream), kRounds,
+                        kRoundDraws, kComponents, kDof, context, stream, evaluations);
 }
 
 // Where the posterior of this record lies, found by way of thinned ones.
@@ -165,12 +170,13 @@ SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
   Stream stream(own.seed, kStage, 0);
   const KernelTarget target(model);
   if (model.size() <= sampling.coarsest)
-    return fit_population(sample_population(target, options, own, evaluations), stream);
+    return fit_population(target, sample_population(target, options, own, evaluations), own, stream,
+                          evaluations);
   const SkewedMixture before =
       sample_stage(model.thinned(sampling.thinning), options, sampling, own, evaluations);
   const ApproximateTarget approximate(model, before, kCoarser * sampling.tolerance, context, stream);
-  MatrixXd draws = sample_population(BridgedTarget(approximate, before), options, own, evaluations);
-  return fit_population(draws, stream);
+  const MatrixXd draws = sample_population(BridgedTarget(approximate, before), options, own, evaluations);
+  return fit_population(approximate, draws, own, stream, evaluations);
 }
 
 }  // namespace

@@ -1,0 +1,51 @@
+#pragma once
+#include "engine/Context.hpp"
+#include "engine/ais/Options.hpp"
+#include "engine/ais/StudentT.hpp"
+#include "engine/ais/Target.hpp"
+
+namespace amiss {
+
+/// Chains that are annealed side by side.
+struct Chains {
+  Eigen::MatrixXd x;      ///< dimension x n
+  Eigen::VectorXd ll;     ///< log-likelihood
+  Eigen::VectorXd log_w;  ///< log weights since the last resampling
+
+  /// n draws from the reference.
+  static Chains start(const Target& target, int n, Stream& stream, const Context& context);
+
+  Eigen::Index size() const { return x.cols(); }
+
+  double effective_size() const;  ///< by the weights
+
+  /// Systematic resampling; all weights become equal.
+  void resample(Stream& stream);
+};
+
+/// One temperature of the ladder, and how chains move there.
+struct Level {
+  double beta;  ///< inverse temperature
+  StudentT proposal;
+  double step;
+  double hamiltonian_step;
+  int sweeps;  ///< moves of every chain
+};
+
+/// One Crank-Nicolson move of every chain, reversible in the level's proposal; returns the share accepted.
+double crank_nicolson_move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+                           const Context& context);
+
+/// Whether chains make Hamiltonian moves too.
+bool hamiltonian(const Target& target, const AisOptions& options);
+
+/// One Hamiltonian move of every chain: leapfrog steps in the coordinates in which the proposal's scale is
+/// the identity (Neal 2011); returns the share accepted.
+double hamiltonian_move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+                        const Context& context);
+
+/// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move and, where there is a gradient, a
+/// Hamiltonian one.
+int sweep_cost(const Target& target, const AisOptions& options);
+
+}  // namespace amiss

@@ -1,0 +1,123 @@
+#include "engine/ais/ImportanceSample.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/ais/evaluate.hpp"
+#include "engine/linalg/log_sum_exp.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kImportanceDof = 8.0;  // of the mixtures
+
+// A mixture that comes closer to the posterior, fitted to a weighted sample of it and, if it may be skewed,
+// to all samples before it.
+SkewedMixture refit(const ImportanceSample& sample, DrawPool& pool, const AisOptions& options,
+                    Stream& stream) {
+  if (!options.skewed)
+    return SkewedMixture(SkewMap(), fit_elliptic(sample.x, sample.weights, options, stream));
+  pool.add(sample.x, sample.weights);
+  return pool.fit(options.max_components, kImportanceDof, stream);
+}
+
+}  // namespace
+
+void ImportanceSample::extend(const Target& target, const Distribution& mixture, Index n,
+                              const Context& context, Stream& stream) {
+  const Index before = size(), total = before + n;
+  x.conservativeResize(target.dimension(), total);
+  ll.conservativeResize(total);
+  log_w.conservativeResize(total);
+  for (Index i = before; i < total; ++i) x.col(i) = mixture.draw(stream);
+  const MatrixXd drawn = x.rightCols(n);
+  VectorXd over_mixture(n);
+  ll.tail(n) = evaluate(target, drawn, context, [&](Index i) {
+    over_mixture[i] = target.log_reference(drawn.col(i)) - mixture.log_density(drawn.col(i));
+  });
+  log_w.tail(n) = over_mixture + ll.tail(n);
+  if (!std::isfinite(log_w.maxCoeff())) return;
+  log_evidence = log_mean_exp(log_w);
+  weights = normalised_exp(log_w);
+  ess = 1.0 / weights.squaredNorm();
+  const double count = static_cast<double>(total);
+  se = std::sqrt(std::max(0.0, count / ess - 1.0) / (count - 1.0));
+}
+
+void DrawPool::add(const MatrixXd& draws, const VectorXd& weights) {
+  const Index before = x_.cols();
+  x_.conservativeResize(draws.rows(), before + draws.cols());
+  weights_.conservativeResize(before + draws.cols());
+  x_.rightCols(draws.cols()) = draws;
+  // Truncated (Ionides 2008), so that no single draw decides on the mixture.
+  const VectorXd kept = weights.cwiseMin(1.0 / std::sqrt(static_cast<double>(weights.size())));
+  weights_.tail(draws.cols()) = kept * kept.sum() / kept.squaredNorm();
+}
+
+SkewedMixture DrawPool::fit(int max_components, double dof, Stream& stream) const {
+  return SkewedMixture::fit(x_, weights_ / weights_.sum(), max_components, dof, stream);
+}
+
+SkewedMixture closer_mixture(const Target& target, SkewedMixture mixture, int rounds, Index draws,
+                             int max_components, double dof, const Context& context, Stream& stream,
+                             long& evaluations) {
+  DrawPool pool;
+  for (int round = 0; round < rounds; ++round) {
+    ImportanceSample sample;
+    sample.extend(target, mixture, draws, context, stream);
+    evaluations += draws;
+    if (!(sample.ess > 0)) break;
+    pool.add(sample.x, sample.weights);
+    mixture = pool.fit(max_components, dof, stream);
+  }
+  return mixture;
+}
+
+StudentTMixture fit_elliptic(const MatrixXd& x, const VectorXd& weights, const AisOptions& options,
+                             Stream& stream) {
+  return StudentTMixture::fit(x, weights, options.max_components, kImportanceDof, stream);
+}
+
+ImportanceSample importance_sample(const Target& target, const StudentTMixture& first, DrawPool pool,
+                                   const AisOptions& options, const Context& context, Stream& stream,
+                                   long& evaluations) {
+  constexpr int kRounds = 4;
+  constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
+  constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
+  constexpr Index kMost = 16;       // times the draws asked for, at most, for the sake of precision
+  constexpr Index kLeastAdded = 100;
+  const Index n = options.importance_draws;
+  SkewedMixture mixture(SkewMap(), first);
+  ImportanceSample sample;
+  const auto add = [&](Index draws) {
+    sample.extend(target, mixture, draws, context, stream);
+    evaluations += draws;
+  };
+  const auto good = [&] { return sample.ess >= kGood * static_cast<double>(sample.size()); };
+  const Index few = options.refit_draws > 0 ? std::min<Index>(options.refit_draws, n) : n;
+  add(few);
+  if (few < n && !(sample.ess > kUsable)) add(n - few);
+  const auto lacking = [&] {  // draws needed over those there are
+    return std::max(std::pow(sample.se / options.precision, 2), options.effective_draws / sample.ess);
+  };
+  for (int round = 1; round < kRounds && (options.skewed || sample.ess > kUsable); ++round) {
+    mixture = refit(sample, pool, options, stream);
+    sample = ImportanceSample();
+    add(n);
+    while (good() && lacking() > 1.0 && sample.size() < kMost * n) {
+      const double more = 1.1 * (lacking() - 1.0) * static_cast<double>(sample.size());
+      add(std::clamp<Index>(static_cast<Index>(more), kLeastAdded, n));
+    }
+    if (good()) break;
+  }
+  if (!good()) sample.ess = 0.0;
+  return sample;
+}
+
+}  // namespace amiss

@@ -1,0 +1,18 @@
+#pragma once
+#include <functional>
+
+#include "engine/Context.hpp"
+#include "engine/ais/Target.hpp"
+
+namespace amiss {
+
+/// Log-likelihoods of the columns of x, in blocks that the threads share; what is not finite is -infinity.
+/// also(i) is what else the threads can do for column i.
+Eigen::VectorXd evaluate(const Target& target, const Eigen::MatrixXd& x, const Context& context,
+                         const std::function<void(Eigen::Index)>& also = {});
+
+/// With gradients (dimension x n), whose memory is given.
+Eigen::VectorXd evaluate(const Target& target, const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient,
+                         const Context& context);
+
+}  // namespace amiss
