@@ -100,8 +100,9 @@ TEST(GaussianProcess, DensityWithSharedBetasIsThatOfEqualOnesEachCountedOnce) {
   VectorXd x(5), full(6), gradient(5), none(0);
   x << 0.4, -3.0, 2.0, 0.8, -0.7;
   full << 0.4, -3.0, 2.0, 0.8, -0.7, 0.8;
+  GaussianProcess::Memory memory;
   const auto density = [&](const VectorXd& at) {
-    return GaussianProcess::log_density(s.inputs, s.values, kShaped, beta_of, at, none);
+    return GaussianProcess::log_density(s.inputs, s.values, kShaped, beta_of, at, none, memory);
   };
   const double shared = 1 / (1 + std::exp(-0.8));
   const boost::math::beta_distribution<double> prior(kShaped.beta.a, kShaped.beta.b);
@@ -109,7 +110,7 @@ TEST(GaussianProcess, DensityWithSharedBetasIsThatOfEqualOnesEachCountedOnce) {
               GaussianProcess::log_density(s.inputs, s.values, kShaped, full, none) -
                   std::log(boost::math::pdf(prior, shared)),
               1e-11);
-  GaussianProcess::log_density(s.inputs, s.values, kShaped, beta_of, x, gradient);
+  GaussianProcess::log_density(s.inputs, s.values, kShaped, beta_of, x, gradient, memory);
   const VectorXd expected = numerical_gradient(density, x);
   for (Index i = 0; i < x.size(); ++i) {
     ASSERT_GT(std::abs(expected[i]), 1e-3) << "coordinate " << i << " tests nothing";
@@ -249,8 +250,9 @@ TEST(ForwardSelection, FirstStepIsTheBestOfAllByBruteForce) {
       VectorXd x = VectorXd::Constant(3 + betas, start), range = VectorXd::Constant(3 + betas, 12.0);
       x.head(3) << 0.5, -2.0, 40.0;
       range[2] = 40.0;
+      GaussianProcess::Memory memory;
       const Objective density = [&](const VectorXd& at, Eigen::Ref<VectorXd> gradient) {
-        return GaussianProcess::log_density(two.inputs, noisy, {}, beta_of, at, gradient);
+        return GaussianProcess::log_density(two.inputs, noisy, {}, beta_of, at, gradient, memory);
       };
       best = std::max(best, maximise(density, x, -range, range, 1e-10, 500).value);
     }

@@ -11,6 +11,7 @@
 namespace amiss {
 namespace {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -27,10 +28,10 @@ double noise_variance(const GaussianProcessParameters& p) {
 }
 
 // Of inputs already scaled by sqrt(theta_p): prod_p beta_p^(4 (a_ip - b_jp)^2) is a Gaussian kernel in them.
-MatrixXd covariance(const MatrixXd& scaled, const GaussianProcessParameters& p) {
-  MatrixXd c = std::exp(p.log_amplitude) * gaussian_kernel(scaled, scaled);
+void fill_covariance(const MatrixXd& scaled, const GaussianProcessParameters& p, Eigen::Ref<MatrixXd> c) {
+  gaussian_kernel(scaled, scaled, c);
+  c *= std::exp(p.log_amplitude);
   c.diagonal().array() += noise_variance(p) + kJitter * std::exp(p.log_amplitude);
-  return c;
 }
 
 // log Beta(x; a, b) at x = 1 / (1 + exp(-t)), as a density of x, and its derivative by t.
@@ -46,14 +47,14 @@ double log_beta_density(const BetaShapes& prior, double t, double& slope) {
 // added.
 double log_prior(const HyperPriors& priors, const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
   double value = 0.0;
-  const auto add = [&](Eigen::Index i, const BetaShapes& prior, double sign) {
+  const auto add = [&](Index i, const BetaShapes& prior, double sign) {
     double slope = 0.0;
     value += log_beta_density(prior, sign * x[i], slope);
     if (gradient.size() > 0) gradient[i] += sign * slope;
   };
   add(0, priors.s2, -1.0);
   add(1, priors.eta2, -1.0);
-  for (Eigen::Index i = 3; i < x.size(); ++i) add(i, priors.beta, 1.0);
+  for (Index i = 3; i < x.size(); ++i) add(i, priors.beta, 1.0);
   if (priors.lambda.shape > 0) {
     const double lambda = std::exp(x[2]);
     value += (priors.lambda.shape - 1) * x[2] - priors.lambda.rate * lambda;
@@ -64,37 +65,40 @@ double log_prior(const HyperPriors& priors, const VectorXd& x, Eigen::Ref<Vector
 
 // Log density of the values, up to a constant, and its gradient in pack()'s coordinates.
 double log_likelihood(const MatrixXd& inputs, const VectorXd& values, const VectorXd& packed,
-                      Eigen::Ref<VectorXd> gradient) {
+                      Eigen::Ref<VectorXd> gradient, GaussianProcess::Memory& memory) {
+  const Index n = inputs.rows();
   const auto p = GaussianProcessParameters::unpack(packed);
   const VectorXd theta = decay_rates(p.logit_beta);
   const MatrixXd scaled = inputs * theta.cwiseSqrt().asDiagonal();
-  MatrixXd c = covariance(scaled, p);
-  const Eigen::LLT<MatrixXd> factor(c);
+  auto c = memory.covariance.matrix(n, n), inverse = memory.inverse.matrix(n, n);
+  fill_covariance(scaled, p, c);
+  inverse = c;
+  Eigen::Ref<MatrixXd> in_place(inverse);
+  const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(in_place);
   if (factor.info() != Eigen::Success) {
     gradient.setZero();
     return -std::numeric_limits<double>::infinity();
   }
   const VectorXd weights = factor.solve(values);
-  const double log_det = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  const double log_det = 2.0 * inverse.diagonal().array().log().sum();
 
   if (gradient.size() > 0) {
     // d value / d theta_j = 1/2 tr[(w w' - C^-1) dC/dtheta_j] (Rasmussen and Williams 2006, equation 5.9).
-    MatrixXd sensitivity = factor.matrixLLT();
-    invert_lower(sensitivity);
-    square_lower(sensitivity);
-    symmetrise(sensitivity);
-    sensitivity *= -1.0;
-    sensitivity.noalias() += weights * weights.transpose();
-    const double trace = sensitivity.trace();
+    invert_lower(inverse);
+    square_lower(inverse);
+    symmetrise(inverse);
+    const double trace = weights.squaredNorm() - inverse.trace();
     c.diagonal().array() -= noise_variance(p);
-    sensitivity.array() *= c.array();
+    auto& sensitivity = inverse;
+    for (Index j = 0; j < n; ++j)
+      sensitivity.col(j) = (weights * weights[j] - inverse.col(j)).cwiseProduct(c.col(j));
     gradient[0] = 0.5 * sensitivity.sum();
     gradient[1] = 0.5 * trace * std::exp(p.log_nugget);
     gradient[2] = -0.5 * trace / std::exp(p.log_lambda);
     // sum_ij S_ij (u_ip - u_jp)^2 = 2 [sum_i u_ip^2 (S 1)_i - u_p' S u_p], S symmetric.
-    const VectorXd row_sums = sensitivity.rowwise().sum();
+    const VectorXd row_sums = sensitivity.colwise().sum();
     const MatrixXd product = sensitivity * inputs;
-    for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    for (Index j = 0; j < inputs.cols(); ++j) {
       const double squared =
           2.0 * (inputs.col(j).cwiseAbs2().dot(row_sums) - inputs.col(j).dot(product.col(j)));
       // d theta / d logit(beta) = -4 (1 - beta).
@@ -130,7 +134,9 @@ GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values,
     : scaled_inputs_(inputs * decay_rates(parameters.logit_beta).cwiseSqrt().asDiagonal()),
       values_(values),
       parameters_(parameters) {
-  const Eigen::LLT<MatrixXd> factor(covariance(scaled_inputs_, parameters_));
+  MatrixXd covariance(inputs.rows(), inputs.rows());
+  fill_covariance(scaled_inputs_, parameters_, covariance);
+  const Eigen::LLT<MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success)
     throw std::runtime_error("emulator: covariance is not positive definite");
   root_inverse_ = factor.matrixL();
@@ -143,22 +149,23 @@ GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values,
 
 double GaussianProcess::log_density(const MatrixXd& inputs, const VectorXd& values, const HyperPriors& priors,
                                     const VectorXd& packed, Eigen::Ref<VectorXd> gradient) {
-  const double value = log_likelihood(inputs, values, packed, gradient);
+  Memory memory;
+  const double value = log_likelihood(inputs, values, packed, gradient, memory);
   return value + log_prior(priors, packed, gradient);
 }
 
 double GaussianProcess::log_density(const MatrixXd& inputs, const VectorXd& values, const HyperPriors& priors,
                                     const std::vector<int>& beta_of, const VectorXd& x,
-                                    Eigen::Ref<VectorXd> gradient) {
-  const Eigen::Index n = inputs.cols();
+                                    Eigen::Ref<VectorXd> gradient, Memory& memory) {
+  const Index n = inputs.cols();
   VectorXd packed(n + 3), slope(gradient.size() > 0 ? n + 3 : 0);
   packed.head(3) = x.head(3);
-  for (Eigen::Index p = 0; p < n; ++p) packed[3 + p] = x[3 + beta_of[p]];
-  const double value = log_likelihood(inputs, values, packed, slope);
+  for (Index p = 0; p < n; ++p) packed[3 + p] = x[3 + beta_of[p]];
+  const double value = log_likelihood(inputs, values, packed, slope, memory);
   if (gradient.size() > 0) {
     gradient.setZero();
     gradient.head(3) = slope.head(3);
-    for (Eigen::Index p = 0; p < n; ++p) gradient[3 + beta_of[p]] += slope[3 + p];
+    for (Index p = 0; p < n; ++p) gradient[3 + beta_of[p]] += slope[3 + p];
   }
   return value + log_prior(priors, x, gradient);
 }

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "engine/linalg/Eigen.hpp"
+#include "engine/linalg/Scratch.hpp"
 
 namespace amiss {
 
@@ -68,6 +68,11 @@ class GaussianProcess {
   static GaussianProcess fit(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
                              const HyperPriors& priors, const SearchOptions& options);
 
+  /// What values of (3) are computed in, kept from one to the next.
+  struct Memory {
+    Scratch covariance, inverse;
+  };
+
   /// Logarithm of the joint density (3), up to a constant, and its gradient in pack()'s coordinates. It is
   /// the density of s2, eta2, beta and lambda themselves: the coordinates only carry the search, no Jacobian
   /// enters, so that uniform priors leave the likelihood as it is.
@@ -79,7 +84,7 @@ class GaussianProcess {
   /// in x (log_amplitude, log_nugget, log_lambda, then the logits), and each counts once in the prior.
   static double log_density(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values,
                             const HyperPriors& priors, const std::vector<int>& beta_of,
-                            const Eigen::VectorXd& x, Eigen::Ref<Eigen::VectorXd> gradient);
+                            const Eigen::VectorXd& x, Eigen::Ref<Eigen::VectorXd> gradient, Memory& memory);
 
   /// Mean and variance of the smooth part at points (n x P); a value seen there varies by noise() more.
   void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean,

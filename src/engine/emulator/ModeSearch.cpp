@@ -116,9 +116,9 @@ class Search {
     return out;
   }
 
-  Objective objective(const std::vector<int>& beta_of) const {
+  Objective objective(const std::vector<int>& beta_of) {
     return [this, beta_of](const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
-      return GaussianProcess::log_density(inputs_, values_, priors_, beta_of, x, gradient);
+      return GaussianProcess::log_density(inputs_, values_, priors_, beta_of, x, gradient, memory_);
     };
   }
 
@@ -138,6 +138,7 @@ class Search {
   const VectorXd& values_;
   const HyperPriors& priors_;
   const SearchOptions& options_;
+  GaussianProcess::Memory memory_;
   int evaluations_ = 0;
   std::vector<SelectionStep> selection_;
 };
