@@ -132,7 +132,9 @@ figure_theme <- function() {
 }
 
 figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {
-  wrap <- function(text, width) if (!is.null(text)) paste(strwrap(text, width), collapse = "\n")
+  wrap <- function(text, width) {  # a number stays beside its "%"
+    if (!is.null(text)) gsub("\001", " ", paste(strwrap(gsub("([0-9]) %", "\\1\001%", text), width), collapse = "\n"), fixed = TRUE)
+  }
   ggplot2::labs(title = wrap(title, 72), subtitle = wrap(subtitle, 92), x = x, y = y)
 }
 

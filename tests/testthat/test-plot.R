@@ -65,3 +65,12 @@ test_that("a circular condition is shown in degrees", {
   m <- measurements(table, time = "hour", target = "Ti", boundary = ~ circular(Wd), noise_sd = 0.1, warmup = 6)
   expect_equal(condition_values(m, "Wd"), table$Wd)
 })
+
+test_that("lines of a title do not begin with a per cent sign", {
+  for (width in 1:12) {
+    long <- paste(c(strrep("x", width), rep("word", 12), "97 % of it lie inside"), collapse = " ")
+    lines <- strsplit(figure_titles(long)$title, "\n")[[1]]
+    expect_identical(paste(lines, collapse = " "), long)
+    expect_false(any(grepl("^%", lines)))
+  }
+})
