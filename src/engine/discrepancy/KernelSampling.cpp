@@ -35,7 +35,7 @@ constexpr double kCoarser = 10.0;               // tolerance while only draws ar
 constexpr int kPilotChains = 64, kChains = 16;  // unless asked otherwise
 constexpr int kRefitDraws = 300, kEffectiveDraws = 400;  // likewise
 constexpr int kRoughSweeps = 1;                          // likewise, while only draws are needed
-constexpr double kRoughDrop = 0.6;     // conditional effective size while only draws are needed
+constexpr double kRoughDrop = 0.4;     // conditional effective size while only draws are needed
 constexpr std::uint64_t kStage = 128;  // purposes of the random streams
 
 // Skeletons from small to large that together serve nearly all draws of a distribution: one for its bulk, one
