@@ -1,6 +1,6 @@
 #pragma once
 #include "engine/Context.hpp"
-#include "engine/ais/Options.hpp"
+#include "engine/ais/AisOptions.hpp"
 #include "engine/ais/StudentT.hpp"
 #include "engine/ais/Target.hpp"
 

@@ -2,7 +2,7 @@
 #include <limits>
 
 #include "engine/Context.hpp"
-#include "engine/ais/Options.hpp"
+#include "engine/ais/AisOptions.hpp"
 #include "engine/ais/SkewedMixture.hpp"
 #include "engine/ais/Target.hpp"
 

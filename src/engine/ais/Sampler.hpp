@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "engine/Context.hpp"
-#include "engine/ais/Options.hpp"
+#include "engine/ais/AisOptions.hpp"
 #include "engine/ais/Target.hpp"
 #include "engine/ais/Temperature.hpp"
 

@@ -1,4 +1,4 @@
-#include "engine/ais/Options.hpp"
+#include "engine/ais/AisOptions.hpp"
 
 #include <algorithm>
 #include <stdexcept>
@@ -20,7 +20,6 @@ void AisOptions::check() const {
   if (!(precision > 0)) throw std::invalid_argument("ais: precision must be positive");
   if (sweeps < 0 || max_sweeps < 1 || max_sweeps < sweeps)
     throw std::invalid_argument("ais: sweeps must not be negative, max_sweeps positive and not below them");
-
   if (!(ess_drop > 0 && ess_drop < 1)) throw std::invalid_argument("ais: ess_drop must lie in (0, 1)");
   if (importance_draws != 0 && importance_draws < 50) {
     throw std::invalid_argument("ais: importance_draws must be 0 (none) or at least 50");
