@@ -29,16 +29,12 @@ calibrate_ <- function(data, priors, emulator_list, control, context_list) {
     .Call(`_amiss_calibrate_`, data, priors, emulator_list, control, context_list)
 }
 
-history_coefficients_ <- function(data, priors, draws) {
-    .Call(`_amiss_history_coefficients_`, data, priors, draws)
+attribute_ <- function(data, priors, emulator_list, fit, control, context_list) {
+    .Call(`_amiss_attribute_`, data, priors, emulator_list, fit, control, context_list)
 }
 
-shapley_shares_ <- function(data, priors, draws, context_list) {
-    .Call(`_amiss_shapley_shares_`, data, priors, draws, context_list)
-}
-
-attribute_ <- function(data, priors, drop, error_settings, control, context_list) {
-    .Call(`_amiss_attribute_`, data, priors, drop, error_settings, control, context_list)
+run_likelihood_ <- function(data, priors, emulator_list, points, runs, context_list) {
+    .Call(`_amiss_run_likelihood_`, data, priors, emulator_list, points, runs, context_list)
 }
 
 calibrate_paper_ <- function(data, priors, emulator_list, control, context_list) {

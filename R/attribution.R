@@ -1,14 +1,19 @@
 attribution_control <- list(surrogates = 199, smallest_shift = 0.05, level = 0.05, least_log10_bf = 0.5,
-                            ais = list(pilot_chains = 128, groups = 4, max_groups = 32, precision = 0.2))
+                            ais = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.3, importance_draws = 500))
 
 #' Which boundary conditions drive the discrepancy
 #'
-#' For each condition: the evidence that the history model loses when the condition is dropped, its share of the
-#' discrepancy, and a p-value from surrogates (all conditions shifted in time together, which keeps their
-#' autocorrelation and their correlation with one another), adjusted over all conditions by Holm's method.
+#' For each condition: the evidence that the model loses when its discrepancy may not answer to the condition, its share, and a
+#' p-value from surrogates (all conditions shifted in time together, which keeps their
+#' autocorrelation and their correlation with one another), for all conditions together by the step-down method of Westfall
+#' and Young (1993), whose least p-value does not grow with the number of conditions.
 #'
-#' *Share.* A set of conditions explains `1 - RSS / TSS` of the record outside the simulation space, its sums of squares
-#' weighed by the covariance of the error (for white error: the plain share of the variance). The share of a condition
+#' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those that can
+#' be dropped alone the smallest set is sought that cannot be dropped together. Such a group is tested like a condition, and its members are named
+#' together: what they say cannot be told apart in this record.
+#'
+#' *Share.* A set of conditions takes a part of the misfit away, its sum of squares
+#' weighed by the covariance of error and simulator. The share of a condition
 #' is its Shapley value: what it adds to those before it, averaged over all orders of the conditions and over the
 #' posterior. So shares are not negative and add up to what all conditions explain together, also where conditions are
 #' correlated; two conditions that say the same share evenly. Beyond 10 conditions that act, 400 random orders stand for all.
@@ -17,7 +22,10 @@ attribution_control <- list(surrogates = 199, smallest_shift = 0.05, level = 0.0
 #' @param control List of options: `surrogates` (199), `smallest_shift` (0.05 of the record), `level` (0.05),
 #'   `least_log10_bf` (0.5: what a condition must earn besides its p-value), and `ais` for the sampler.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_attribution`; its `table` is ranked.
+#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition; `group` names the conditions that it
+#'   cannot be told apart from (`NA` for none), and `significant` of a member is that of the group. `groups` is a list, one
+#'   element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and `correlation`, the largest between two members.
+#' @source Westfall and Young (1993), Resampling-based multiple testing, Wiley.
 #' @export
 attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
@@ -29,37 +37,41 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
-  full_setting <- fit$history$setting[which.max(fit$history$log_likelihood)]
-  settings <- unique(c(full_setting, fit$null_setting))
+  draws <- list(posterior = fit$posterior, kept = fit$kept, tangent = fit$tangent)
+  asked <- c(control, list(least = control$least_log10_bf * log(10)))
+  result <- call_engine(attribute_(data, fit$priors, fit$emulator$processes, draws, asked, engine_context(seed, threads)))
   conditions <- fit$measurements$conditions
-  lost <- evidence_lost(fit)
-  again <- which(!lost$standard_error <= control$ais$precision)
-  result <- call_engine(attribute_(data, fit$priors, again - 1L, settings, control, engine_context(seed, threads)))
-  lost$value[again] <- fit$history$log_evidence - result$log_evidence_dropped
-  lost$standard_error[again] <- sqrt(fit$history$standard_error^2 + result$standard_error^2)
-  lost$trusted[again] <- fit$history$trusted & result$trusted
-  log10_bf <- lost$value / log(10)
-  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf, standard_error = lost$standard_error / log(10),
-                      share = variance_shares(fit, data, seed, threads), p_value = result$adjusted, p_value_single = result$p_value,
-                      significant = result$adjusted <= control$level & log10_bf >= control$least_log10_bf,
-                      trusted = lost$trusted)
-  table <- table[order(-table$log10_bf_dropped), ]
+  log10_bf <- result$sets$lost / log(10)
+  significant <- result$adjusted <= control$level & log10_bf >= control$least_log10_bf
+  own <- seq_along(conditions)
+  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf[own], standard_error = result$sets$standard_error[own] / log(10),
+                      share = colMeans(result$shares), p_value = result$adjusted[own], p_value_single = result$p_value[own],
+                      significant = significant[own], trusted = result$sets$trusted[own], group = NA_character_)
+  groups <- lapply(setdiff(seq_along(log10_bf), own), function(k) {
+    members <- result$sets$conditions[[k]] + 1L
+    list(conditions = conditions[members], log10_bf_dropped = log10_bf[k], p_value = result$adjusted[k], significant = significant[k],
+         correlation = largest_correlation(fit, members))
+  })
+  for (group in groups) {
+    members <- table$boundary %in% group$conditions
+    table$group[members] <- listed(group$conditions, "or")
+    table$significant[members] <- group$significant
+    table$log10_bf_dropped[members] <- pmax(table$log10_bf_dropped[members], group$log10_bf_dropped)
+    table$p_value[members] <- group$p_value
+  }
+  table <- table[order(-table$log10_bf_dropped, -table$share), ]
   rownames(table) <- NULL
-  structure(list(format_version = format_version, table = table, surrogates = nrow(result$null_statistics),
-                 statistic = stats::setNames(result$statistic, conditions), null_statistics = result$null_statistics,
+  structure(list(format_version = format_version, table = table, groups = groups, surrogates = nrow(result$null_statistics),
+                 statistic = result$statistic, null_statistics = result$null_statistics,
                  control = control, seed = seed), class = "amiss_attribution")
 }
 
-# Log evidence lost without each condition, from the posterior's own draws: with independent priors the model without
-# condition s is the one with t_s = 0, so that Z_-s / Z = P(t_s = 0 | y) / P(t_s = 0) (Savage and Dickey). Its error is
-# that of a share among as many independent draws as the effective size; a share of none has none.
-evidence_lost <- function(fit) {
-  history <- fit$history
-  off <- colSums(history$weights * (history$t == 0))
-  prior_off <- 1 - fit$priors$inclusion
-  value <- if (prior_off > 0) log(prior_off) - log(off) else rep(NA_real_, length(off))
-  error <- sqrt(pmax(0, 1 - off) / (off * history$ess))
-  list(value = value, standard_error = ifelse(is.finite(value), error, Inf), trusted = rep(history$trusted, length(off)))
+# The largest correlation between columns of two different conditions of a group, over the calibration rows.
+largest_correlation <- function(fit, members) {
+  m <- fit$measurements
+  columns <- which(m$condition %in% members)
+  r <- abs(stats::cor(m$boundary[fit$rows, columns, drop = FALSE]))
+  max(r[outer(m$condition[columns], m$condition[columns], "!=")])
 }
 
 check_attribution_control <- function(control, call = rlang::caller_env()) {
@@ -68,11 +80,6 @@ check_attribution_control <- function(control, call = rlang::caller_env()) {
   check_input(checkmate::check_number(control$level, lower = 0, upper = 1), "control$level", call = call)
   check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE), "control$least_log10_bf", call = call)
   check_input(checkmate::check_list(control$ais), "control$ais", call = call)
-}
-
-# Shapley shares, averaged over the posterior draws that are kept for the discrepancy.
-variance_shares <- function(fit, data, seed, threads) {
-  colMeans(call_engine(shapley_shares_(data, fit$priors, fit$errors, engine_context(seed, threads))))
 }
 
 # Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).
@@ -85,14 +92,29 @@ condition_responses <- function(fit, data) {
   }, numeric(nrow(phi)))
 }
 
+# What is told as the answer: conditions, and groups that cannot be told apart as one.
+significant_conditions <- function(table) {
+  told <- ifelse(is.na(table$group), table$boundary, table$group)
+  unique(told[table$significant])
+}
+
 #' @export
 print.amiss_attribution <- function(x, ...) {
   cli::cli_text("{.strong Attribution} of the discrepancy ({x$surrogates} surrogates)")
   print(x$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")], digits = 3, row.names = FALSE)
-  named <- x$table$boundary[x$table$significant]
+  named <- significant_conditions(x$table)
   cli::cli_bullets(c("*" = if (length(named)) "driven by {.field {named}}" else "no boundary condition is significant",
+                     stats::setNames(group_words(x), rep("!", length(group_words(x)))),
                      ">" = "next: {.fun upgrade_model} with a {.fun catalogue}"))
   invisible(x)
+}
+
+# Which conditions cannot be told apart, and what would.
+group_words <- function(attribution) {
+  vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
+    sprintf("%s cannot be told apart in this record (correlation %.3f): measure while %s differ", listed(g$conditions), g$correlation,
+            if (length(g$conditions) == 2) "the two" else "they")
+  }, "")
 }
 
 #' @export

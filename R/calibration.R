@@ -1,29 +1,41 @@
-calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, time_constants = NULL, error_times = NULL,
-                            error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, ais = list())
+calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf), time_constants = NULL,
+                            error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, check = 40,
+                            exact = NULL, ais = list(pilot_chains = 192, groups = 4, max_sweeps = 12, precision = 0.2))
 
 #' Calibrate a simulator on measurements
 #'
-#' Two posteriors are sampled by annealed importance sampling. The first is that of the discrepancy and the error,
-#' on the part of the record outside the simulation space, which no parameter can reach. The second joins the
-#' parameters to it, on the whole record; its normalising constant is the evidence of the model, as a density of the
-#' calibration record.
+#' The joint posterior of the parameters, the error and the discrepancy, given the whole record, sampled by annealed
+#' importance sampling. Its normalising constant is the evidence of the model, as a density of the calibration record.
+#'
+#' *Model.* The record is the simulation, plus a discrepancy that answers to the history of the boundary conditions, plus an
+#' autocorrelated error, in one covariance: nothing is split off, so that the evidence does not hang on the basis of the
+#' emulator. How far the discrepancy reaches into what the parameters can do is learned: `reach` is a grid of numbers kappa,
+#' equally probable beforehand; with a small one the discrepancy keeps out of the directions in which the runs differ by much
+#' more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a free discrepancy says that the model is wrong
+#' where its parameters could hide it.
+#'
+#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior. The
+#' emulator's error there, over the noise (the stated one or, if lower, the one seen), is the check that counts: above a third,
+#' neither the posterior nor the evidence is trusted ([calibrate_refined()] then adds these runs and tries again). With `exact`
+#' draws, the evidence is corrected by the likelihoods of the runs themselves. For an ensemble made elsewhere the
+#' check uses runs left out one by one, the fifth (at least 20) that lie nearest to the posterior.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].
 #' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
 #'   `inclusion` (prior probability that a condition drives the discrepancy at all, 0.2), `amplitude` (scale of the
-#'   half-Cauchy prior of the discrepancy's standard deviation if it does, in the target's unit; default the noise), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
+#'   half-Cauchy prior of the discrepancy's standard deviation if it does, in the target's unit; default the noise), `reach`
+#'   (see *Model*), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
 #'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept
-#'   for the discrepancy over time), and `ais`, a list for the sampler (`pilot_chains`, `groups`, `chains`, `sweeps`,
-#'   `ess_drop`, `resample`, `importance_draws`, `max_components`).
+#'   for the discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (how many of
+#'   them correct the evidence; 0, or 200 for a [zone()]), and `ais`, a list for the sampler (`pilot_chains`,
+#'   `groups`, `chains`, `sweeps`, `ess_drop`, `resample`, `importance_draws`, `max_components`).
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
-#' @return An object of class `amiss_calibration`. Its `misfit` says how far the record lies from what any parameters give inside
-#'   the simulation space, measured against the error seen in the part outside: `chi_squared`, the misfit at the best parameters,
-#'   which has about `df` degrees of freedom if the model holds, one for each basis vector, or less, and `p`, the probability of
-#'   such a misfit (both means over errors drawn from their posterior; `p` is `misfit_p` in `glance()`). Where `p` is small, the
-#'   model lacks something or its emulator is off; then the parameters have taken values that partly hide it, and the evidence
-#'   hangs on how many vectors the basis has. `print()` and reports say so below 0.001.
+#' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the parameters; `log_evidence`,
+#'   `standard_error` and `interval` its evidence; `reach` the posterior probability of each reach; `check` what the runs said of
+#'   the emulator: `error` (RMS at the record's rows), `ratio` (over the noise), `z2` (mean square in units of the
+#'   emulator's own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and `verdict`.
 #' @export
 calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
   rows <- emulated_rows(emulator, measurements)
@@ -32,21 +44,22 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
   control <- fill_calibration_control(control, measurements, length(rows))
   data <- history_data(emulator, measurements, rows, control)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
-                 inclusion = control$inclusion, amplitude = control$amplitude, correlation_times = control$error_times, ratios = control$error_ratios)
+                 discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion, amplitude = control$amplitude,
+                 correlation_times = control$error_times, ratios = control$error_ratios, reach = control$reach)
 
-  result <- call_engine(calibrate_(data, priors, emulator$processes, control$ais, engine_context(seed, threads)))
-  history <- result$history
+  result <- call_engine(calibrate_(data, priors, emulator$processes, control, engine_context(seed, threads)))
   posterior <- result$posterior
-  picked <- systematic_draws(posterior$weights, control$error_draws)
-  errors <- list(setting = posterior$setting[picked], variance = posterior$variance[picked], t = posterior$t[picked, , drop = FALSE])
-  structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
-                 seed = seed, rows = rows, values = unit_to_values(posterior$unit, emulator$parameters),
-                 weights = posterior$weights, history = history, posterior = posterior, errors = errors, priors = priors,
-                 coefficients = call_engine(history_coefficients_(data, priors, errors)),
-                 centre = result$centre, scale = result$scale, null_setting = result$null_setting,
-                 misfit = misfit_inside(result$misfits, ncol(data$basis)),
-                 log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
-                 interval = posterior$interval, trust = trust(history, posterior)), class = "amiss_calibration")
+  fit <- structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
+                        seed = seed, rows = rows, values = unit_to_values(posterior$unit, emulator$parameters),
+                        weights = posterior$weights, posterior = posterior, kept = result$kept, priors = priors,
+                        coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
+                        centre = result$centre, scale = result$scale,
+                        reach = stats::setNames(result$reach, format(control$reach)),
+                        log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
+                        interval = posterior$interval), class = "amiss_calibration")
+  fit <- checked_by_runs(fit, threads)
+  fit$trust <- fit_trust(fit)
+  fit
 }
 
 # The calibration rows, which must be those that the emulator was trained on.
@@ -63,7 +76,7 @@ emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
 
 fill_calibration_control <- function(control, measurements, n, call = rlang::caller_env()) {
   control <- merge_control(calibration_control, control, call = call)
-  control$ais <- fill_ais_control(control$ais, "control$ais", call = call)
+  control$ais <- fill_ais_control(merge_control(calibration_control$ais, control$ais, "control$ais", names(ais_control), call), "control$ais", call = call)
   step <- measurements$step_h
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
   if (is.null(control$amplitude)) control["amplitude"] <- measurements$noise_sd
@@ -79,7 +92,12 @@ fill_calibration_control <- function(control, measurements, n, call = rlang::cal
   check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), "control$time_constants", call = call)
   check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE, max.len = 3), "control$error_times", call = call)
   check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), "control$error_ratios", call = call)
-  check_input(checkmate::check_count(control$error_draws, positive = TRUE), "control$error_draws", call = call)
+  check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1, any.missing = FALSE, unique = TRUE), "control$reach",
+              "Give numbers above 0; {.code Inf} is a free discrepancy.", call = call)
+  for (name in c("error_draws", "check", "exact")) {
+    if (is.null(control[[name]])) next
+    check_input(checkmate::check_count(control[[name]], positive = name == "error_draws"), paste0("control$", name), call = call)
+  }
   control
 }
 
@@ -101,16 +119,10 @@ systematic_draws <- function(weights, n) {
   findInterval((seq_len(n) - 0.5) / n, cumsum(weights / sum(weights)), left.open = TRUE) + 1L
 }
 
-misfit_inside <- function(misfits, vectors) {
-  list(chi_squared = mean(misfits), df = vectors, p = mean(stats::pchisq(misfits, vectors, lower.tail = FALSE)))
-}
-
-misses_inside <- function(fit) isTRUE(fit$misfit$p < 0.001)
-
-trust <- function(history, posterior) {
-  why <- c(if (!history$trusted) paste("discrepancy:", history$verdict),
-           if (!posterior$trusted) paste("parameters:", posterior$verdict))
-  list(trusted = is.null(why), verdict = if (is.null(why)) posterior$verdict else paste(why, collapse = "; "))
+# What a person should know before using it.
+fit_trust <- function(fit) {
+  why <- c(if (!fit$posterior$trusted) fit$posterior$verdict, if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict))
+  list(trusted = is.null(why), verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }
 
 #' @export
@@ -118,11 +130,18 @@ print.amiss_calibration <- function(x, ...) {
   cli::cli_text("{.strong Calibration} on {length(x$rows)} rows of {.val {x$measurements$name}}")
   cli::cli_text("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)}, {round(x$interval[2] / log(10), 2)}], {x$trust$verdict}")
   print(parameter_table(x), digits = 3, row.names = FALSE)
-  if (misses_inside(x)) {
-    cli::cli_bullets(c("!" = "no parameters reproduce the record, even in what the simulator can vary (chi-squared {signif(x$misfit$chi_squared, 2)}, {x$misfit$df} degrees of freedom): the model lacks something, or its emulator is off; do not trust the parameters"))
-  }
+  cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
   cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
   invisible(x)
+}
+
+# What the reach says of the model, in words.
+reach_words <- function(fit) {
+  free <- sum(fit$reach[is.infinite(fit$control$reach)])
+  if (length(fit$reach) < 2) return("the discrepancy is free")
+  if (free >= 0.9) return(sprintf("the discrepancy reaches into what the parameters can do (probability %.2f): the model is wrong where its parameters could hide it", free))
+  if (free <= 0.1) return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))
+  sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)
 }
 
 weighted_quantile <- function(x, w, probs) {
@@ -156,6 +175,6 @@ tidy.amiss_calibration <- function(x, ...) parameter_table(x)
 #' @export
 glance.amiss_calibration <- function(x, ...) {
   data.frame(log10_evidence = x$log_evidence / log(10), lower95 = x$interval[1] / log(10), upper95 = x$interval[2] / log(10),
-             trusted = x$trust$trusted, misfit_p = x$misfit$p %||% NA_real_, n = length(x$rows), vectors = ncol(x$emulator$basis$vectors),
+             trusted = x$trust$trusted, emulator_error = x$check$ratio %||% NA_real_, n = length(x$rows), vectors = ncol(x$emulator$basis$vectors),
              runs = nrow(x$emulator$processes$inputs))
 }

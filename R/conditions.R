@@ -31,13 +31,13 @@ check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) 
 }
 
 # Options travel as one list: defaults overwritten by what the user names; an unknown name is an error.
-merge_control <- function(defaults, control, what = "control", call = rlang::caller_env()) {
+merge_control <- function(defaults, control, what = "control", known = names(defaults), call = rlang::caller_env()) {
   if (is.null(control)) control <- list()
   check_input(checkmate::check_list(control), what, call = call)
-  unknown <- setdiff(names(control), names(defaults))
+  unknown <- setdiff(names(control), known)
   if (length(control) > 0 && (is.null(names(control)) || any(names(control) == "") || length(unknown) > 0)) {
     abort_input(c("{.arg {what}} has {cli::qty(unknown)} unknown option{?s}: {.val {unknown}}.",
-                  i = "Known options: {.val {names(defaults)}}."), call = call)
+                  i = "Known options: {.val {known}}."), call = call)
   }
   defaults[names(control)] <- control
   defaults

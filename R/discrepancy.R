@@ -1,7 +1,7 @@
 #' The discrepancy over time
 #'
-#' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean of the
-#' coefficients, and the part of it that answers to the boundary conditions, with a 95 % band.
+#' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean of its parameters, and the
+#' whole response to the boundary conditions that the model lacks, with a 95 % band.
 #'
 #' Of a calibration as in the paper the discrepancy is that of equation 8, at the same time step; its band takes the
 #' fictitious condition, which explains nothing, for constant.
@@ -15,13 +15,17 @@ discrepancy <- function(fit) {
   check_input(checkmate::check_multi_class(fit, c("amiss_calibration", "amiss_paper_calibration")), "fit")
   if (inherits(fit, "amiss_paper_calibration")) return(paper_discrepancy(fit))
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
-  outside <- function(x) as.matrix(stats::lm.fit(data$basis, x)$residuals)
-  phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
-  draws <- outside(phi %*% fit$coefficients)
+  draws <- lacking_response(fit, data$responses, data$basis)
   responses <- condition_responses(fit, data)
   colnames(responses) <- fit$measurements$conditions
   limits <- apply(draws, 1, stats::quantile, c(0.025, 0.975))
   new_discrepancy(fit, rowMeans(draws), limits[1, ], limits[2, ], responses)
+}
+
+# Response to the boundary conditions for each kept draw (rows x draws), given the filter bank and the basis at these rows.
+lacking_response <- function(fit, responses, basis) {
+  phi <- sweep(sweep(responses, 2, fit$centre), 2, fit$scale, "/")
+  phi %*% fit$coefficients - basis %*% fit$withheld
 }
 
 new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
@@ -67,8 +71,9 @@ conditional_variance <- function(x, basis, alpha, t2, lambda) {
   pmax(0, 1 - rowSums(basis^2) - outside / lambda) / lambda
 }
 
-# Simulation at the posterior mean of the basis coefficients.
+# Mean of the simulator's runs at posterior draws; by the emulator where there are none.
 simulated_mean <- function(fit) {
+  if (!is.null(fit$check$mean)) return(fit$check$mean)
   w <- predict_emulator_(fit$emulator$processes, posterior_unit(fit))$mean
   as.numeric(fit$emulator$basis$vectors %*% crossprod(w, fit$weights))
 }

@@ -1,4 +1,4 @@
-emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 30, selection = "ard", significance = 0.05,
+emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 30, selection = "ard", significance = 0.05,
                          s2 = c(1, 1), eta2 = c(1, 1), beta = c(1, 1), lambda = c(2, NA), starts = 3, searches = 1,
                          max_evaluations = 120)
 
@@ -31,7 +31,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.2, max_vectors = 3
 #' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know it: the basis
 #'   is kept fine enough that what it discards lies below it.
 #' @param control List of options: `explained` (share of variance kept, 0.99), `noise_fraction` (discarded RMS as a
-#'   share of the noise, 0.2), `max_vectors` (30); `selection` (`"ard"` or `"forward"`) and its `significance` (0.05);
+#'   share of the noise, 0.05), `max_vectors` (30); `selection` (`"ard"` or `"forward"`) and its `significance` (0.05);
 #'   `s2`, `eta2` and `beta`, the two shapes of their beta priors (each at least 1; `c(1, 1)`, uniform), and `lambda`, shape
 #'   a and rate b (squared unit of the outputs) of the gamma prior of the noise precision (`c(2, NA)`; `NA` is the square
 #'   root of the machine epsilon times the largest singular value); `starts`, `searches` and `max_evaluations` of the
@@ -74,7 +74,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   selection$parameter <- names(ensemble$parameters)[selection$parameter]
   structure(list(format_version = format_version, parameters = ensemble$parameters, simulator = ensemble$simulator,
                  basis = basis[c("vectors", "singular_values", "explained", "discarded_rms", "discarded_ss", "discarded_sd")],
-                 processes = trained[c("inputs", "coefficients", "hyperparameters")], selection = selection,
+                 processes = trained[c("inputs", "coefficients", "hyperparameters")],
+                 left_out = list(error = trained$coefficients - trained$loo_mean, variance = trained$loo_variance), selection = selection,
                  diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble), control = control,
                  noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
 }

@@ -179,8 +179,8 @@ percent <- function(x) {
   ifelse(is.na(x), "\u2013", text)
 }
 
-listed <- function(x, none = "nothing") {
-  if (!length(x)) none else if (length(x) == 1) x else paste(paste(x[-length(x)], collapse = ", "), "and", x[length(x)])
+listed <- function(x, last = "and", none = "nothing") {
+  if (!length(x)) none else if (length(x) == 1) x else paste(paste(x[-length(x)], collapse = ", "), last, x[length(x)])
 }
 
 change_words <- function(before, after, unit) {
@@ -270,7 +270,7 @@ figure_fit <- function(upgrade) {
 
 attribution_title <- function(attributions) {
   named <- lapply(attributions, function(a) a$table$boundary[a$table$significant])
-  if (length(named) < 2) return(paste("The error that no parameter can remove follows", listed(named[[1]], "no boundary condition")))
+  if (length(named) < 2) return(paste("The error that no parameter can remove follows", listed(named[[1]], none = "no boundary condition")))
   if (!length(named[[1]]) && !length(named[[2]])) return("The remaining error follows no boundary condition, neither before nor after")
   sprintf("Before, the remaining error follows %s; after the change it follows %s", listed(named[[1]]), listed(named[[2]]))
 }

@@ -82,7 +82,7 @@ figure_criteria <- function(comparison) {
 attribution_words <- function(comparison) {
   named <- lapply(split(comparison$tables$attribution, factor(comparison$tables$attribution$model, names(comparison$models))), significant_conditions)
   best <- best_model(comparison)
-  sprintf("%s, of highest evidence, leaves an error that answers to %s", best, listed(named[[best]], "no boundary condition"))
+  sprintf("%s, of highest evidence, leaves an error that answers to %s", best, listed(named[[best]], none = "no boundary condition"))
 }
 
 condition_panels <- function(table, comparison, value) {

@@ -11,7 +11,7 @@
 #' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (band of new measurements), and
 #'   `crps`, the continuous ranked probability score of each row.
 #' @export
-predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), draws = 40, seed = object$seed, threads = 1, ...) {
+predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), draws = 40, discrepancy = FALSE, seed = object$seed, threads = 1, ...) {
   rlang::check_dots_empty()
   use <- match.arg(use, several.ok = TRUE)
   check_input(checkmate::check_count(draws, positive = TRUE), "draws")
@@ -34,10 +34,10 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
 }
 
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy
-# as large as they were seen, the Q fitted coefficients taken off the degrees of freedom.
+# as large as they were seen, the fitted parameters taken off the degrees of freedom.
 error_sd <- function(fit) {
   r <- stats::residuals(fit)
-  sqrt(sum(r^2) / (length(r) - ncol(fit$emulator$basis$vectors)))
+  sqrt(sum(r^2) / max(1, length(r) - length(fit$emulator$parameters)))
 }
 
 summarise_prediction <- function(m, rows, runs, sd) {

@@ -6,8 +6,8 @@ large_remainder <- 1.5  # times the stated noise: autocorrelated noise of the st
 remaining_error <- function(model, measurements) {
   p <- model$prediction[model$prediction$use == "calibrate", ]
   r <- p$observed - p$mean
-  # As in error_sd(): fitted coefficients do not count as agreement.
-  q <- ncol(model$fit$emulator$basis$vectors)
+  # As in error_sd(): fitted parameters do not count as agreement.
+  q <- length(model$fit$emulator$parameters)
   ratio <- sqrt(sum(r^2) / max(1, length(r) - q)) / measurements$noise_sd
   list(ratio = ratio, large = ratio > large_remainder,
        pattern = if (ratio > large_remainder) remainder_pattern(r, model$fit$rows, measurements))

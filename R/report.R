@@ -40,8 +40,6 @@ first_trials <- function(upgrade) {
 
 last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$attribution$table
 
-significant_conditions <- function(table) table$boundary[table$significant]
-
 # A cause is named outright when it holds at least 95 % of the probability among all that was tried, when its estimate
 # is sound or decisive even at its lower end, when data held out do not speak against it, and when little is left of
 # what it is to explain.

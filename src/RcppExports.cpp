@@ -103,46 +103,35 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
-// history_coefficients_
-Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws);
-RcppExport SEXP _amiss_history_coefficients_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP) {
-BEGIN_RCPP
-    Rcpp::RObject rcpp_result_gen;
-    Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type draws(drawsSEXP);
-    rcpp_result_gen = Rcpp::wrap(history_coefficients_(data, priors, draws));
-    return rcpp_result_gen;
-END_RCPP
-}
-// shapley_shares_
-Eigen::MatrixXd shapley_shares_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws, const Rcpp::List& context_list);
-RcppExport SEXP _amiss_shapley_shares_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP, SEXP context_listSEXP) {
-BEGIN_RCPP
-    Rcpp::RObject rcpp_result_gen;
-    Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type draws(drawsSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
-    rcpp_result_gen = Rcpp::wrap(shapley_shares_(data, priors, draws, context_list));
-    return rcpp_result_gen;
-END_RCPP
-}
 // attribute_
-Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const std::vector<int>& drop, const Rcpp::IntegerVector& error_settings, const Rcpp::List& control, const Rcpp::List& context_list);
-RcppExport SEXP _amiss_attribute_(SEXP dataSEXP, SEXP priorsSEXP, SEXP dropSEXP, SEXP error_settingsSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
+Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& fit, const Rcpp::List& control, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_attribute_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP fitSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
-    Rcpp::traits::input_parameter< const std::vector<int>& >::type drop(dropSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::IntegerVector& >::type error_settings(error_settingsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type fit(fitSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
-    rcpp_result_gen = Rcpp::wrap(attribute_(data, priors, drop, error_settings, control, context_list));
+    rcpp_result_gen = Rcpp::wrap(attribute_(data, priors, emulator_list, fit, control, context_list));
+    return rcpp_result_gen;
+END_RCPP
+}
+// run_likelihood_
+Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& points, const Eigen::MatrixXd& runs, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_run_likelihood_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP pointsSEXP, SEXP runsSEXP, SEXP context_listSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type points(pointsSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type runs(runsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
+    rcpp_result_gen = Rcpp::wrap(run_likelihood_(data, priors, emulator_list, points, runs, context_list));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -226,9 +215,8 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_predict_emulator_", (DL_FUNC) &_amiss_predict_emulator_, 2},
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
-    {"_amiss_history_coefficients_", (DL_FUNC) &_amiss_history_coefficients_, 3},
-    {"_amiss_shapley_shares_", (DL_FUNC) &_amiss_shapley_shares_, 4},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 6},
+    {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 6},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
     {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},

@@ -3,6 +3,7 @@
 #include <RcppEigen.h>
 
 #include "engine/ais/Sampler.hpp"
+#include "engine/discrepancy/HistoryTarget.hpp"
 #include "engine/emulator/Emulator.hpp"
 
 namespace amiss::convert {
@@ -64,6 +65,26 @@ inline Rcpp::List ais_list(const AisResult& result) {
   out["weights"] = result.weights;
   out["log_likelihood"] = result.log_likelihood;
   return out;
+}
+
+// What the attribution needs of a posterior that ais_list() told.
+inline AisResult ais_summary(const Rcpp::List& list) {
+  AisResult out;
+  out.log_evidence = list["log_evidence"];
+  out.standard_error = list["standard_error"];
+  out.ess = list["ess"];
+  out.trusted = list["trusted"];
+  out.weights = Rcpp::as<Eigen::VectorXd>(list["weights"]);
+  out.log_likelihood = Rcpp::as<Eigen::VectorXd>(list["log_likelihood"]);
+  return out;
+}
+
+inline Rcpp::List simulator_list(const GaussianSimulator& simulator) {
+  return Rcpp::List::create(Rcpp::_["mean"] = simulator.mean, Rcpp::_["root"] = simulator.root);
+}
+
+inline GaussianSimulator simulator(const Rcpp::List& list) {
+  return {Rcpp::as<Eigen::VectorXd>(list["mean"]), Rcpp::as<Eigen::MatrixXd>(list["root"])};
 }
 
 }  // namespace amiss::convert

@@ -3,8 +3,7 @@
 // aligned alike.
 #include "export_convert.h"
 
-#include "engine/attribution/ShapleyShares.hpp"
-#include "engine/attribution/SurrogateTest.hpp"
+#include "engine/attribution/Attribution.hpp"
 #include "engine/basis/Basis.hpp"
 #include "engine/calibration/Calibration.hpp"
 #include "engine/discrepancy/FilterBank.hpp"
@@ -20,7 +19,7 @@ namespace {
 
 TimeAxis make_axis(const VectorXd& time, const std::vector<bool>& new_segment) { return {time, new_segment}; }
 
-HistoryModel make_history_model(const Rcpp::List& data, const Rcpp::List& priors, const Context& context) {
+HistoryData make_history_data(const Rcpp::List& data) {
   HistoryData history;
   history.y = Rcpp::as<VectorXd>(data["y"]);
   history.basis = Rcpp::as<MatrixXd>(data["basis"]);
@@ -28,31 +27,40 @@ HistoryModel make_history_model(const Rcpp::List& data, const Rcpp::List& priors
   history.condition = Rcpp::as<std::vector<int>>(data["condition"]);
   history.axis =
       make_axis(Rcpp::as<VectorXd>(data["time"]), Rcpp::as<std::vector<bool>>(data["new_segment"]));
+  return history;
+}
+
+HistoryPriors make_history_priors(const Rcpp::List& priors) {
   HistoryPriors prior;
   prior.noise_sd = priors["noise_sd"];
   prior.noise_shape = priors["noise_shape"];
+  prior.discarded_variance = priors["discarded_variance"];
   prior.inclusion = priors["inclusion"];
   prior.amplitude = priors["amplitude"];
   prior.error.correlation_times = Rcpp::as<VectorXd>(priors["correlation_times"]);
   prior.error.ratios = Rcpp::as<VectorXd>(priors["ratios"]);
-  return HistoryModel(std::move(history), std::move(prior), context);
+  prior.reach = Rcpp::as<std::vector<double>>(priors["reach"]);
+  return prior;
 }
 
-std::vector<int> all_conditions(const HistoryModel& model) {
-  std::vector<int> all(static_cast<std::size_t>(model.conditions()));
-  for (std::size_t s = 0; s < all.size(); ++s) all[s] = static_cast<int>(s);
-  return all;
+// Points of the history posterior: one for each element of list(setting, variance, t).
+std::vector<HistoryParameters> make_points(const Rcpp::List& draws) {
+  const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
+  const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
+  const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
+  std::vector<HistoryParameters> points;
+  for (Eigen::Index i = 0; i < variance.size(); ++i)
+    points.push_back({setting[static_cast<std::size_t>(i)], variance[i], t.row(i).transpose()});
+  return points;
 }
 
-template <class Parameters>
-void add_history_draws(Rcpp::List& out, const AisResult& result, Parameters parameters,
-                       const HistoryModel& model) {
-  const Eigen::Index draws = result.draws.cols();
-  VectorXd variance(draws);
-  Rcpp::IntegerVector setting(draws);
-  MatrixXd t(draws, model.conditions());
-  for (Eigen::Index i = 0; i < draws; ++i) {
-    const HistoryParameters point = parameters(VectorXd(result.draws.col(i)));
+void add_points(Rcpp::List& out, const std::vector<HistoryParameters>& points, int conditions) {
+  const Eigen::Index n = static_cast<Eigen::Index>(points.size());
+  VectorXd variance(n);
+  Rcpp::IntegerVector setting(n);
+  MatrixXd t(n, conditions);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const HistoryParameters& point = points[static_cast<std::size_t>(i)];
     variance[i] = point.variance;
     setting[i] = point.setting;
     t.row(i) = point.t.transpose();
@@ -60,6 +68,22 @@ void add_history_draws(Rcpp::List& out, const AisResult& result, Parameters para
   out["setting"] = setting;
   out["variance"] = variance;
   out["t"] = t;
+}
+
+Rcpp::List list_sets(const std::vector<DroppedSet>& sets) {
+  const std::size_t n = sets.size();
+  Rcpp::List conditions(n);
+  Rcpp::NumericVector lost(n), standard_error(n);
+  Rcpp::LogicalVector trusted(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    conditions[k] = Rcpp::wrap(sets[k].conditions);
+    lost[k] = sets[k].lost;
+    standard_error[k] = sets[k].standard_error;
+    trusted[k] = sets[k].trusted;
+  }
+  using Rcpp::_;
+  return Rcpp::List::create(_["conditions"] = conditions, _["lost"] = lost,
+                            _["standard_error"] = standard_error, _["trusted"] = trusted);
 }
 
 BetaShapes beta_shapes(const VectorXd& shapes) { return {shapes[0], shapes[1]}; }
@@ -144,104 +168,62 @@ Eigen::MatrixXd filter_bank_(const Eigen::MatrixXd& x, const Eigen::VectorXd& ti
       .responses;
 }
 
-// The history posterior on the part of y outside the simulation space, then the joint posterior on all of y.
+// The joint posterior of parameters, error and discrepancy.
 // [[Rcpp::export]]
 Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
                       const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const AisOptions options = convert::ais_options(control);
-  const HistoryModel model = make_history_model(data, priors, context);
-  const HistoryTarget history(model, all_conditions(model));
-  const AisResult outside = sample_ais(history, options, context);
-
-  Context second = context;
-  second.seed = context.seed + 1;
-  Stream stream(context.seed, 0, 0);
   const Emulator emulator(convert::emulator_state(emulator_list));
-  const CalibrationTarget target(
-      history, StudentTMixture::fit(outside.draws, outside.weights, options.max_components, 8.0, stream),
-      emulator);
-  const CalibrationSample sample = sample_calibration(target, outside, options, second);
-  const AisResult& joint = sample.posterior;
-
-  Rcpp::List outside_list = convert::ais_list(outside), joint_list = convert::ais_list(joint);
-  add_history_draws(
-      outside_list, outside, [&](const VectorXd& x) { return history.parameters(x); }, model);
-  add_history_draws(
-      joint_list, joint, [&](const VectorXd& x) { return target.history(x); }, model);
-  joint_list["unit"] = target.unit(joint.draws);
+  const HistoryModel model =
+      history_model(make_history_data(data), make_history_priors(priors), emulator, context);
+  const CalibrationOptions options{convert::ais_options(control["ais"]), Rcpp::as<int>(control["error_draws"])};
+  const Calibration result = calibrate(model, emulator, options, context);
+  Rcpp::List posterior = convert::ais_list(result.posterior);
+  add_points(posterior, result.history, model.conditions());
+  posterior["unit"] = result.unit;
   using Rcpp::_;
-  return Rcpp::List::create(_["history"] = outside_list, _["posterior"] = joint_list,
-                            _["misfits"] = sample.misfits, _["centre"] = VectorXd(model.centre().transpose()),
-                            _["scale"] = VectorXd(model.scale().transpose()),
-                            _["null_setting"] = null_setting(model));
+  return Rcpp::List::create(_["posterior"] = posterior, _["kept"] = Rcpp::wrap(result.kept),
+                            _["coefficients"] = result.coefficients, _["withheld"] = result.withheld,
+                            _["reach"] = result.reach, _["tangent"] = convert::simulator_list(result.tangent),
+                            _["centre"] = VectorXd(model.centre().transpose()),
+                            _["scale"] = VectorXd(model.scale().transpose()));
 }
 
-// Posterior mean coefficients (p x draws) of the scaled filter columns, for given draws of the history
-// parameters.
+// Which conditions drive the discrepancy, given a posterior of calibrate_().
 // [[Rcpp::export]]
-Eigen::MatrixXd history_coefficients_(const Rcpp::List& data, const Rcpp::List& priors,
-                                      const Rcpp::List& draws) {
-  const HistoryModel model = make_history_model(data, priors, Context());
-  const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
-  const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
-  const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
-  MatrixXd coefficients(model.data().responses.cols(), variance.size());
-  for (Eigen::Index j = 0; j < variance.size(); ++j) {
-    coefficients.col(j) =
-        model.coefficients(model.whitened(setting[j]), std::log(variance[j]), t.row(j).transpose());
-  }
-  return coefficients;
-}
-
-// Shapley shares of the discrepancy (draws x S), for given draws of the history parameters.
-// [[Rcpp::export]]
-Eigen::MatrixXd shapley_shares_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws,
-                                const Rcpp::List& context_list) {
+Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
+                      const Rcpp::List& fit, const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const HistoryModel model = make_history_model(data, priors, context);
-  const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
-  const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
-  const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
-  std::vector<HistoryParameters> points;
-  for (Eigen::Index j = 0; j < variance.size(); ++j)
-    points.push_back({setting[static_cast<std::size_t>(j)], variance[j], t.row(j).transpose()});
-  return shapley_shares(model, points, ShapleyOptions(), context);
-}
-
-// Evidence without each of the given conditions (0-based), and the surrogate test of all.
-// [[Rcpp::export]]
-Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const std::vector<int>& drop,
-                      const Rcpp::IntegerVector& error_settings, const Rcpp::List& control,
-                      const Rcpp::List& context_list) {
-  const Context context = convert::context(context_list);
-  const HistoryModel model = make_history_model(data, priors, context);
-  const AisOptions options = convert::ais_options(control["ais"]);
-  const int drops = static_cast<int>(drop.size());
-  std::vector<AisResult> dropped(drop.size());
-  parallel_for(drops, context, [&](int i) {
-    std::vector<int> active = all_conditions(model);
-    active.erase(active.begin() + drop[i]);
-    Context own = context.alone();  // conditions share the threads; each has its own seed
-    own.seed = context.seed + 1 + static_cast<std::uint64_t>(drop[i]);
-    dropped[i] = sample_ais(HistoryTarget(model, active), options, own);
-  });
-  SurrogateOptions surrogates;
-  surrogates.surrogates = control["surrogates"];
-  surrogates.smallest_shift = control["smallest_shift"];
-  surrogates.error_settings = Rcpp::as<std::vector<int>>(error_settings);
-  const SurrogateTest test = surrogate_test(model, surrogates, context);
-
-  VectorXd log_evidence(drops), standard_error(drops);
-  std::vector<bool> trusted(drop.size());
-  for (int i = 0; i < drops; ++i) {
-    log_evidence[i] = dropped[i].log_evidence;
-    standard_error[i] = dropped[i].standard_error;
-    trusted[i] = dropped[i].trusted;
-  }
+  const Emulator emulator(convert::emulator_state(emulator_list));
+  const HistoryModel model =
+      history_model(make_history_data(data), make_history_priors(priors), emulator, context);
+  const Rcpp::List posterior = fit["posterior"];
+  Calibration calibration;
+  calibration.posterior = convert::ais_summary(posterior);
+  calibration.history = make_points(posterior);
+  calibration.kept = Rcpp::as<std::vector<Eigen::Index>>(fit["kept"]);
+  calibration.tangent = convert::simulator(fit["tangent"]);
+  AttributionOptions options;
+  options.ais = convert::ais_options(control["ais"]);
+  options.least = Rcpp::as<double>(control["least"]);
+  options.surrogates.surrogates = control["surrogates"];
+  options.surrogates.smallest_shift = control["smallest_shift"];
+  const Attribution result = attribute(model, emulator, calibration, options, context);
   using Rcpp::_;
-  return Rcpp::List::create(_["log_evidence_dropped"] = log_evidence, _["standard_error"] = standard_error,
-                            _["trusted"] = trusted, _["statistic"] = test.statistic,
-                            _["p_value"] = test.p_value, _["adjusted"] = test.adjusted,
-                            _["null_statistics"] = test.null_statistics);
+  return Rcpp::List::create(_["sets"] = list_sets(result.sets), _["statistic"] = result.test.statistic,
+                            _["p_value"] = result.test.p_value, _["adjusted"] = result.test.adjusted,
+                            _["null_statistics"] = result.test.null_statistics, _["shares"] = result.shares);
+}
+
+// Log-likelihood of runs of the simulator itself (N x n), each at its point of the history posterior.
+// [[Rcpp::export]]
+Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors,
+                                const Rcpp::List& emulator_list, const Rcpp::List& points,
+                                const Eigen::MatrixXd& runs, const Rcpp::List& context_list) {
+  const Context context = convert::context(context_list);
+  const Emulator emulator(convert::emulator_state(emulator_list));
+  const std::vector<HistoryParameters> at = make_points(points);
+  return history_model(make_history_data(data), make_history_priors(priors), emulator, context,
+                       Rcpp::as<std::vector<int>>(points["setting"]))
+      .log_likelihood_of_runs(at, runs, context);
 }

@@ -24,6 +24,7 @@ install_package() {
   fi
   mkdir -p "$library" "$copy"
   find "$copy" -mindepth 1 -maxdepth 1 ! -name src ! -name .state -exec rm -rf {} +
+  [[ ! -d "$copy/src" ]] || find "$copy/src" -type f ! -name '*.o' -delete  # sources that are no more
   tar -C "$root" -c --exclude='*.o' --exclude='*.so' --exclude=./{build,demo,.git,tests,tools,bench} . |
     tar -C "$copy" -x
   state="$(cd "$copy" && { R --version; g++ --version; cat DESCRIPTION src/Makevars "$root/tools/Makevars";

@@ -43,10 +43,10 @@ Spread bootstrap(const VectorXd& values, double estimate, Stream stream) {
 
 }  // namespace
 
-AnnealedRun::AnnealedRun(const Target& target, const AisOptions& options, const Context& context,
+AnnealedRun::AnnealedRun(const AnnealingPath& path, const AisOptions& options, const Context& context,
                          std::uint64_t purpose)
-    : target_(target), options_(options), context_(context), purpose_(purpose) {
-  Pilot pilot(target, options, context, purpose);
+    : path_(path), options_(options), context_(context), purpose_(purpose) {
+  Pilot pilot(path, options, context, purpose);
   levels_ = std::move(pilot.levels);
   evaluations_ = pilot.evaluations;
   add_groups(options.groups);
@@ -70,12 +70,12 @@ void AnnealedRun::add_groups(int n) {
 
 AnnealedRun::Group AnnealedRun::run_group(Stream stream, const Context& context) const {
   Group group;
-  group.chains = Chains::start(target_, options_.chains, stream, context);
+  group.chains = Chains::start(path_, options_.chains, stream, context);
   group.acceptance = VectorXd::Zero(static_cast<Index>(levels_.size()));
   group.ess = VectorXd::Zero(static_cast<Index>(levels_.size()));
   double beta = 0.0;
   for (std::size_t k = 0; k < levels_.size(); ++k) {
-    group.chains.log_w += group.chains.ll * (levels_[k].beta - beta);
+    group.chains.log_w += group.chains.rise * (levels_[k].beta - beta);
     beta = levels_[k].beta;
     const double top = group.chains.log_w.maxCoeff();
     group.ess[k] = std::isfinite(top) ? group.chains.effective_size() / options_.chains : 0.0;
@@ -89,9 +89,9 @@ AnnealedRun::Group AnnealedRun::run_group(Stream stream, const Context& context)
     }
     double accepted = 0.0;
     for (int sweep = 0; sweep < levels_[k].sweeps; ++sweep) {
-      accepted += crank_nicolson_move(target_, group.chains, levels_[k], stream, context);
-      if (hamiltonian(target_, options_))
-        hamiltonian_move(target_, group.chains, levels_[k], stream, context);
+      accepted += crank_nicolson_move(path_, group.chains, levels_[k], stream, context);
+      if (hamiltonian(path_.target, options_))
+        hamiltonian_move(path_, group.chains, levels_[k], stream, context);
     }
     group.acceptance[k] = accepted / levels_[k].sweeps;
   }
@@ -119,7 +119,7 @@ double AnnealedRun::variance() const {
 
 long AnnealedRun::moves() const {
   long values = 1;
-  for (const Level& level : levels_) values += level.sweeps * sweep_cost(target_, options_);
+  for (const Level& level : levels_) values += level.sweeps * sweep_cost(path_.target, options_);
   return values * options_.chains;
 }
 
@@ -139,7 +139,7 @@ VectorXd AnnealedRun::estimates() const {
 
 void AnnealedRun::gather(MatrixXd& x, VectorXd& ll, VectorXd& weights) const {
   const Index n = options_.chains;
-  x.resize(target_.dimension(), n * size());
+  x.resize(path_.target.dimension(), n * size());
   ll.resize(n * size());
   VectorXd log_w = VectorXd::Constant(n * size(), -std::numeric_limits<double>::infinity());
   for (int g = 0; g < size(); ++g) {

@@ -16,7 +16,7 @@ struct Spread {
 /// of the evidence is unbiased (Neal 2001).
 class AnnealedRun {
  public:
-  AnnealedRun(const Target& target, const AisOptions& options, const Context& context, std::uint64_t purpose);
+  AnnealedRun(const AnnealingPath& path, const AisOptions& options, const Context& context, std::uint64_t purpose);
 
   /// Runs more groups, at most twice as many at a time, until the standard error is as asked.
   void refine();
@@ -45,7 +45,7 @@ class AnnealedRun {
   Group run_group(Stream stream, const Context& context) const;
   void add_groups(int n);
 
-  const Target& target_;
+  AnnealingPath path_;
   const AisOptions& options_;
   const Context& context_;
   std::uint64_t purpose_;

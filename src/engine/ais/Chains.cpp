@@ -18,11 +18,13 @@ constexpr int kLeapfrogs = 4;  // of one Hamiltonian move
 
 }  // namespace
 
-Chains Chains::start(const Target& target, int n, Stream& stream, const Context& context) {
+Chains Chains::start(const AnnealingPath& path, int n, Stream& stream, const Context& context) {
   Chains chains;
-  chains.x.resize(target.dimension(), n);
-  for (int i = 0; i < n; ++i) chains.x.col(i) = target.draw_reference(stream);
-  chains.ll = evaluate(target, chains.x, context);
+  chains.x.resize(path.target.dimension(), n);
+  for (int i = 0; i < n; ++i) chains.x.col(i) = path.reference.draw(stream);
+  chains.ll = evaluate(path.target, chains.x, context);
+  chains.rise.resize(n);
+  for (int i = 0; i < n; ++i) chains.rise[i] = path.rise(chains.x.col(i), chains.ll[i]);
   chains.log_w = VectorXd::Zero(n);
   return chains;
 }
@@ -33,7 +35,7 @@ void Chains::resample(Stream& stream) {
   const Index n = size();
   const VectorXd w = normalised_exp(log_w);
   MatrixXd kept_x(x.rows(), n);
-  VectorXd kept_ll(n);
+  VectorXd kept_ll(n), kept_rise(n);
   double cumulative = w[0];
   const double offset = stream.uniform();
   for (Index i = 0, from = 0; i < n; ++i) {
@@ -41,29 +43,36 @@ void Chains::resample(Stream& stream) {
       cumulative += w[++from];
     kept_x.col(i) = x.col(from);
     kept_ll[i] = ll[from];
+    kept_rise[i] = rise[from];
   }
   x = std::move(kept_x);
   ll = std::move(kept_ll);
+  rise = std::move(kept_rise);
   log_w.setZero();
 }
 
-double crank_nicolson_move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+double crank_nicolson_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                            const Context& context) {
   const Index n = chains.size();
   MatrixXd proposed(chains.x.rows(), n);
   for (Index i = 0; i < n; ++i) proposed.col(i) = level.proposal.step(chains.x.col(i), level.step, stream);
-  VectorXd at_chain(n), at_proposed(n);  // log density of the reference over that of the proposal
-  const VectorXd ll = evaluate(target, proposed, context, [&](Index i) {
-    at_chain[i] = target.log_reference(chains.x.col(i)) - level.proposal.log_density(chains.x.col(i));
-    at_proposed[i] = target.log_reference(proposed.col(i)) - level.proposal.log_density(proposed.col(i));
+  VectorXd at_chain(n), at_proposed(n), prior_over(n);
+  const VectorXd ll = evaluate(path.target, proposed, context, [&](Index i) {
+    const VectorXd from = chains.x.col(i), to = proposed.col(i);
+    const double reference = path.reference.log_density(to);
+    prior_over[i] = StandardNormal::log_density_at(to) - reference;
+    at_chain[i] = path.reference.log_density(from) - level.proposal.log_density(from);
+    at_proposed[i] = reference - level.proposal.log_density(to);
   });
   int accepted = 0;
   for (Index i = 0; i < n; ++i) {
     const double log_u = std::log(stream.uniform());
     if (!std::isfinite(ll[i])) continue;
-    if (log_u < level.beta * (ll[i] - chains.ll[i]) + at_proposed[i] - at_chain[i]) {
+    const double rise = ll[i] + prior_over[i];
+    if (log_u < level.beta * (rise - chains.rise[i]) + at_proposed[i] - at_chain[i]) {
       chains.x.col(i) = proposed.col(i);
       chains.ll[i] = ll[i];
+      chains.rise[i] = rise;
       ++accepted;
     }
   }
@@ -74,21 +83,25 @@ bool hamiltonian(const Target& target, const AisOptions& options) {
   return options.gradient && target.has_gradient();
 }
 
-double hamiltonian_move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                         const Context& context) {
   const Index n = chains.size(), d = chains.x.rows();
   const auto root = level.proposal.root().triangularView<Eigen::Lower>();
   MatrixXd x = chains.x, slope(d, n), momentum = stream.normals(d, n);
-  VectorXd ll;
+  VectorXd ll, prior_over(n), rise(n);
   const auto force = [&] {  // L' gradient of the log density at this temperature
-    ll = evaluate(target, x, slope, context);
-    slope *= level.beta;
-    for (Index i = 0; i < n; ++i) slope.col(i) += target.reference_gradient(x.col(i));
+    ll = evaluate(path.target, x, slope, context, [&](Index i) {
+      const VectorXd at = x.col(i);
+      prior_over[i] = StandardNormal::log_density_at(at) - path.reference.log_density(at);
+      const VectorXd reference = path.reference.gradient(at);
+      slope.col(i) = reference + level.beta * (slope.col(i) - at - reference);
+    });
+    rise = ll + prior_over;
     slope = root.transpose() * slope;
     slope = slope.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   };
-  VectorXd log_ratio = 0.5 * momentum.colwise().squaredNorm().transpose() - level.beta * chains.ll;
-  for (Index i = 0; i < n; ++i) log_ratio[i] -= target.log_reference(chains.x.col(i));
+  VectorXd log_ratio = 0.5 * momentum.colwise().squaredNorm().transpose() - level.beta * chains.rise;
+  for (Index i = 0; i < n; ++i) log_ratio[i] -= path.reference.log_density(chains.x.col(i));
   const double step = level.hamiltonian_step;
   force();
   for (int k = 0; k < kLeapfrogs; ++k) {
@@ -97,13 +110,14 @@ double hamiltonian_move(const Target& target, Chains& chains, const Level& level
     force();
     momentum += 0.5 * step * slope;
   }
-  log_ratio += level.beta * ll - 0.5 * momentum.colwise().squaredNorm().transpose();
+  log_ratio += level.beta * rise - 0.5 * momentum.colwise().squaredNorm().transpose();
   int accepted = 0;
   for (Index i = 0; i < n; ++i) {
     const double log_u = std::log(stream.uniform());
-    if (!std::isfinite(ll[i]) || !(log_u < log_ratio[i] + target.log_reference(x.col(i)))) continue;
+    if (!std::isfinite(ll[i]) || !(log_u < log_ratio[i] + path.reference.log_density(x.col(i)))) continue;
     chains.x.col(i) = x.col(i);
     chains.ll[i] = ll[i];
+    chains.rise[i] = rise[i];
     ++accepted;
   }
   return static_cast<double>(accepted) / static_cast<double>(n);

@@ -1,8 +1,8 @@
 #pragma once
 #include "engine/Context.hpp"
 #include "engine/ais/AisOptions.hpp"
+#include "engine/ais/AnnealingPath.hpp"
 #include "engine/ais/StudentT.hpp"
-#include "engine/ais/Target.hpp"
 
 namespace amiss {
 
@@ -10,10 +10,11 @@ namespace amiss {
 struct Chains {
   Eigen::MatrixXd x;      ///< dimension x n
   Eigen::VectorXd ll;     ///< log-likelihood
+  Eigen::VectorXd rise;   ///< of the path at x
   Eigen::VectorXd log_w;  ///< log weights since the last resampling
 
   /// n draws from the reference.
-  static Chains start(const Target& target, int n, Stream& stream, const Context& context);
+  static Chains start(const AnnealingPath& path, int n, Stream& stream, const Context& context);
 
   Eigen::Index size() const { return x.cols(); }
 
@@ -33,7 +34,7 @@ struct Level {
 };
 
 /// One Crank-Nicolson move of every chain, reversible in the level's proposal; returns the share accepted.
-double crank_nicolson_move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+double crank_nicolson_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                            const Context& context);
 
 /// Whether chains make Hamiltonian moves too.
@@ -41,7 +42,7 @@ bool hamiltonian(const Target& target, const AisOptions& options);
 
 /// One Hamiltonian move of every chain: leapfrog steps in the coordinates in which the proposal's scale is
 /// the identity (Neal 2011); returns the share accepted.
-double hamiltonian_move(const Target& target, Chains& chains, const Level& level, Stream& stream,
+double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                         const Context& context);
 
 /// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move and, where there is a gradient, a

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/evaluate.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 
@@ -37,11 +38,11 @@ void ImportanceSample::extend(const Target& target, const Distribution& mixture,
   log_w.conservativeResize(total);
   for (Index i = before; i < total; ++i) x.col(i) = mixture.draw(stream);
   const MatrixXd drawn = x.rightCols(n);
-  VectorXd over_mixture(n);
+  VectorXd prior_over(n);
   ll.tail(n) = evaluate(target, drawn, context, [&](Index i) {
-    over_mixture[i] = target.log_reference(drawn.col(i)) - mixture.log_density(drawn.col(i));
+    prior_over[i] = StandardNormal::log_density_at(drawn.col(i)) - mixture.log_density(drawn.col(i));
   });
-  log_w.tail(n) = over_mixture + ll.tail(n);
+  log_w.tail(n) = prior_over + ll.tail(n);
   if (!std::isfinite(log_w.maxCoeff())) return;
   log_evidence = log_mean_exp(log_w);
   weights = normalised_exp(log_w);
@@ -77,6 +78,16 @@ SkewedMixture closer_mixture(const Target& target, SkewedMixture mixture, int ro
     mixture = pool.fit(max_components, dof, stream);
   }
   return mixture;
+}
+
+SkewedMixture closer_mixture(const Target& target, const MatrixXd& population, Index draws,
+                             const Context& context, Stream& stream, long& evaluations) {
+  constexpr double kDof = 5.0;
+  constexpr int kComponents = 3, kRounds = 4;
+  const Index n = population.cols();
+  const VectorXd weights = VectorXd::Constant(n, 1.0 / static_cast<double>(n));
+  return closer_mixture(target, SkewedMixture::fit(population, weights, kComponents, kDof, stream), kRounds,
+                        draws, kComponents, kDof, context, stream, evaluations);
 }
 
 StudentTMixture fit_elliptic(const MatrixXd& x, const VectorXd& weights, const AisOptions& options,

@@ -23,7 +23,7 @@ constexpr double kMemory = 0.5;  // rank correlation of the likelihoods at which
 // Conditional effective size per chain of a step d in inverse temperature (Zhou, Johansen and Aston 2016).
 double conditional_ess(const Chains& chains, double d) {
   const VectorXd w = normalised_exp(chains.log_w);
-  const VectorXd v = chains.ll * d;
+  const VectorXd v = chains.rise * d;
   const double top = v.maxCoeff();
   if (!std::isfinite(top)) return 0.0;
   const Eigen::ArrayXd e = (v.array() - top).exp();
@@ -55,17 +55,17 @@ VectorXd ranks(const VectorXd& values) {
 
 // Moves the chains, tuning the step, until their likelihoods have forgotten where they began. The first sweep
 // is still far from the right step and is not counted.
-void tune(const Target& target, const AisOptions& options, Chains& chains, Level& level, Stream& stream,
+void tune(const AnnealingPath& path, const AisOptions& options, Chains& chains, Level& level, Stream& stream,
           const Context& context) {
   const VectorXd before = ranks(chains.ll);
   for (level.sweeps = 0; level.sweeps < options.max_sweeps; ++level.sweeps) {
     if (level.sweeps >= options.sweeps && before.dot(ranks(chains.ll)) < kMemory) return;
     const int repeats = level.sweeps == 0 ? 2 : 1;
     for (int i = 0; i < repeats; ++i) {
-      const double accepted = crank_nicolson_move(target, chains, level, stream, context);
+      const double accepted = crank_nicolson_move(path, chains, level, stream, context);
       level.step = std::min(1.0, std::max(0.003, level.step * std::exp(accepted - kAcceptance)));
-      if (!hamiltonian(target, options)) continue;
-      const double moved = hamiltonian_move(target, chains, level, stream, context);
+      if (!hamiltonian(path.target, options)) continue;
+      const double moved = hamiltonian_move(path, chains, level, stream, context);
       level.hamiltonian_step =
           std::min(1.5, std::max(0.001, level.hamiltonian_step * std::exp(moved - kHamiltonianAcceptance)));
     }
@@ -74,9 +74,9 @@ void tune(const Target& target, const AisOptions& options, Chains& chains, Level
 
 }  // namespace
 
-Pilot::Pilot(const Target& target, const AisOptions& options, const Context& context, std::uint64_t purpose) {
+Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context& context, std::uint64_t purpose) {
   Stream stream(context.seed, kPilot + purpose, 0);
-  chains = Chains::start(target, options.pilot_chains, stream, context);
+  chains = Chains::start(path, options.pilot_chains, stream, context);
   evaluations = options.pilot_chains;
   if (!std::isfinite(chains.ll.maxCoeff()))
     throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
@@ -86,13 +86,13 @@ Pilot::Pilot(const Target& target, const AisOptions& options, const Context& con
     if (static_cast<int>(levels.size()) >= options.max_temperatures)
       throw std::runtime_error("ais: too many temperatures");
     const double next = next_beta(chains, beta, options.ess_drop);
-    chains.log_w += chains.ll * (next - beta);
+    chains.log_w += chains.rise * (next - beta);
     beta = next;
     levels.push_back(
         {beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step, hamiltonian_step, 0});
     chains.resample(stream);
-    tune(target, options, chains, levels.back(), stream, context);
-    evaluations += chains.size() * (levels.back().sweeps + 1) * sweep_cost(target, options);
+    tune(path, options, chains, levels.back(), stream, context);
+    evaluations += chains.size() * (levels.back().sweeps + 1) * sweep_cost(path.target, options);
     step = levels.back().step;
     hamiltonian_step = levels.back().hamiltonian_step;
   }

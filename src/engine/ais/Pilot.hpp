@@ -14,7 +14,7 @@ struct Pilot {
   long evaluations = 0;  ///< of the likelihood
 
   /// @throws std::runtime_error if the likelihood is zero at every draw from the reference.
-  Pilot(const Target& target, const AisOptions& options, const Context& context, std::uint64_t purpose);
+  Pilot(const AnnealingPath& path, const AisOptions& options, const Context& context, std::uint64_t purpose);
 };
 
 }  // namespace amiss

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "engine/ais/AnnealedRun.hpp"
-#include "engine/ais/BridgedTarget.hpp"
 #include "engine/ais/ImportanceSample.hpp"
 #include "engine/ais/purposes.hpp"
 
@@ -58,8 +57,7 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
     report(result, std::move(sample));
     return;
   }
-  const BridgedTarget bridge(target, mixture);
-  AnnealedRun bridged(bridge, options, context, kBridged);
+  AnnealedRun bridged({target, mixture}, options, context, kBridged);
   const bool shorter = bridged.price() < annealed.price();
   (shorter ? bridged : annealed).refine();
   result.evaluations += bridged.evaluations();
@@ -67,9 +65,6 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   result.second_se = bridged.spread().se;
   report(result, "bridged", bridged);
   result.second_ess = result.ess;
-  // The likelihood of a draw, as seen from the target's own reference.
-  for (Index i = 0; i < result.log_likelihood.size(); ++i)
-    result.log_likelihood[i] -= bridge.log_ratio(result.draws.col(i));
   if (!shorter) report(result, "annealed", annealed);
 }
 
@@ -103,19 +98,24 @@ void judge(AisResult& result, const AisOptions& options) {
 
 }  // namespace
 
-MatrixXd sample_population(const Target& target, const AisOptions& asked, const Context& context,
-                           long& evaluations) {
+MatrixXd sample_population(const Target& target, const Distribution& reference, const AisOptions& asked,
+                           const Context& context, long& evaluations) {
   asked.check();
-  Pilot pilot(target, asked.for_dimension(target.dimension()), context, 0);
+  Pilot pilot({target, reference}, asked.for_dimension(target.dimension()), context, 0);
   evaluations += pilot.evaluations;
   return std::move(pilot.chains.x);
 }
 
-AisResult sample_ais(const Target& target, const AisOptions& asked, const Context& context) {
+AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context) {
+  return sample_ais(target, StandardNormal(target.dimension()), options, context);
+}
+
+AisResult sample_ais(const Target& target, const Distribution& reference, const AisOptions& asked,
+                     const Context& context) {
   asked.check();
   const AisOptions options = asked.for_dimension(target.dimension());
   AisResult result;
-  AnnealedRun annealed(target, options, context, 0);
+  AnnealedRun annealed({target, reference}, options, context, 0);
   result.second = result.second_se = std::numeric_limits<double>::quiet_NaN();
   if (options.importance_draws == 0) {
     annealed.refine();

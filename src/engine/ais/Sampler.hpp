@@ -4,6 +4,7 @@
 
 #include "engine/Context.hpp"
 #include "engine/ais/AisOptions.hpp"
+#include "engine/ais/Distribution.hpp"
 #include "engine/ais/Target.hpp"
 #include "engine/ais/Temperature.hpp"
 
@@ -31,7 +32,8 @@ struct AisResult {
   std::string verdict;  ///< why it can or cannot be trusted, one sentence
 };
 
-/// Annealed importance sampling (Neal 2001) of reference x likelihood. A pilot (an adaptive sequential Monte
+/// Annealed importance sampling (Neal 2001) from a reference to prior x likelihood; without one, from the
+/// prior. The evidence and the log-likelihoods are the target's, whatever the reference. A pilot (an adaptive sequential Monte
 /// Carlo sampler; Del Moral, Doucet and Jasra 2006) finds the ladder of temperatures and, at each, a
 /// Student-t proposal, a step length and how many moves the chains need. All are then frozen, and fresh
 /// independent groups of chains are run, so that each group's estimate of the evidence is unbiased. The
@@ -41,12 +43,14 @@ struct AisResult {
 /// ("bridged") is. The importance sample is reported where there is one, else the annealed run that reaches a
 /// standard error at less cost; more groups or draws are added until the standard error is as asked. The
 /// other estimator has to agree.
+AisResult sample_ais(const Target& target, const Distribution& reference, const AisOptions& options,
+                     const Context& context);
 AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context);
 
 /// Draws of the posterior (dimension x pilot_chains, of equal weight) from the pilot alone: a cheap start for
 /// a posterior nearby. Says nothing of the evidence. The likelihood values that it takes are added to
 /// `evaluations`.
-Eigen::MatrixXd sample_population(const Target& target, const AisOptions& options, const Context& context,
-                                  long& evaluations);
+Eigen::MatrixXd sample_population(const Target& target, const Distribution& reference,
+                                  const AisOptions& options, const Context& context, long& evaluations);
 
 }  // namespace amiss

@@ -18,6 +18,7 @@ class StudentT {
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  ///< of log_density
   Eigen::VectorXd draw(Stream& stream) const;
   const Eigen::MatrixXd& root() const { return root_; }  ///< L
+  Eigen::Index dimension() const { return location_.size(); }
 
   /// A step of length s in (0, 1] that leaves this distribution invariant and is reversible in it: with
   /// d = L^-1 (x - m), draw w ~ InvGamma((nu + dim) / 2, (nu + d'd) / 2), then
@@ -48,6 +49,7 @@ class StudentTMixture : public Distribution {
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override;
   Eigen::VectorXd draw(Stream& stream) const override;
   std::size_t size() const { return components_.size(); }
+  Eigen::Index dimension() const { return components_.front().dimension(); }
 
  private:
   Eigen::VectorXd log_parts(const Eigen::VectorXd& x) const;

@@ -41,13 +41,16 @@ VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& contex
   return ll;
 }
 
-VectorXd evaluate(const Target& target, const MatrixXd& x, MatrixXd& gradient, const Context& context) {
+VectorXd evaluate(const Target& target, const MatrixXd& x, MatrixXd& gradient, const Context& context,
+                  const std::function<void(Index)>& also) {
   VectorXd ll(x.cols());
   for_blocks(target, x.cols(), context, [&](Index first, Index count) {
     MatrixXd slope(x.rows(), count);
     ll.segment(first, count) =
         target.log_likelihood(x.middleCols(first, count), slope).unaryExpr(&finite_or_zero);
     gradient.middleCols(first, count) = slope;
+    if (!also) return;
+    for (Index i = first; i < first + count; ++i) also(i);
   });
   return ll;
 }

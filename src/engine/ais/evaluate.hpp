@@ -11,8 +11,8 @@ namespace amiss {
 Eigen::VectorXd evaluate(const Target& target, const Eigen::MatrixXd& x, const Context& context,
                          const std::function<void(Eigen::Index)>& also = {});
 
-/// With gradients (dimension x n), whose memory is given.
+/// With gradients (dimension x n), whose memory is given; also(i) comes after gradient i.
 Eigen::VectorXd evaluate(const Target& target, const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient,
-                         const Context& context);
+                         const Context& context, const std::function<void(Eigen::Index)>& also = {});
 
 }  // namespace amiss

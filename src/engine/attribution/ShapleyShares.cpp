@@ -76,11 +76,16 @@ VectorXd shapley_values(int players, const std::function<double(Coalition)>& val
   return over_orders(players, value, options.orders, Stream(context.seed, kOrders, 0));
 }
 
-MatrixXd shapley_shares(const HistoryModel& model, const std::vector<HistoryParameters>& draws,
-                        const ShapleyOptions& options, const Context& context) {
+MatrixXd shapley_shares(const HistoryModel& model, const GaussianSimulator& simulator,
+                        const std::vector<HistoryParameters>& draws, const ShapleyOptions& options,
+                        const Context& context) {
   MatrixXd shares = MatrixXd::Zero(static_cast<Index>(draws.size()), model.conditions());
   parallel_for(static_cast<int>(draws.size()), context, [&](int i) {
     const HistoryParameters& draw = draws[static_cast<std::size_t>(i)];
+    const WhitenedData seen =
+        model.whitened(draw.setting).in_terms_of(simulator.mean - model.reference(), simulator.root);
+    const double log_variance = std::log(draw.variance);
+    const double alone = model.quadratic(seen, log_variance, VectorXd::Zero(draw.t.size()));
     std::vector<int> acting;
     for (int s = 0; s < model.conditions(); ++s) {
       if (draw.t[s] > 0) acting.push_back(s);
@@ -90,7 +95,7 @@ MatrixXd shapley_shares(const HistoryModel& model, const std::vector<HistoryPara
       for (std::size_t a = 0; a < acting.size(); ++a) {
         if ((coalition & bit(static_cast<int>(a))) != 0) t[acting[a]] = draw.t[acting[a]];
       }
-      return model.explained(model.whitened(draw.setting), std::log(draw.variance), t);
+      return alone > 0 ? 1.0 - model.quadratic(seen, log_variance, t) / alone : 0.0;
     };
     const VectorXd own = shapley_values(static_cast<int>(acting.size()), value, options, context);
     for (std::size_t a = 0; a < acting.size(); ++a) shares(i, acting[a]) = own[static_cast<Index>(a)];

@@ -25,14 +25,26 @@ struct Fit {
   VectorXd x;  // log sigma^2, log t_s
 };
 
-VectorXd variances(const VectorXd& x, int dropped) {
+using Set = std::vector<int>;
+
+VectorXd variances(const VectorXd& x, const Set& dropped) {
   VectorXd t = x.tail(x.size() - 1).array().exp();
-  if (dropped >= 0) t[dropped] = 0.0;
+  for (int s : dropped) t[s] = 0.0;
   return t;
 }
 
-// Largest likelihood over sigma^2 and all t_s but that of the dropped condition (-1: none).
-Fit best_fit(const HistoryModel& model, const WhitenedData& data, int dropped, const VectorXd& start,
+// log sigma^2 at which the quadratic form without any response is about N.
+double log_error_scale(const HistoryModel& model, const WhitenedData& data) {
+  constexpr int kIterations = 5;
+  const VectorXd none = VectorXd::Zero(model.conditions());
+  double log_variance = 2.0 * std::log(model.priors().noise_sd);
+  for (int k = 0; k < kIterations; ++k)
+    log_variance += std::log(model.quadratic(data, log_variance, none) / static_cast<double>(data.size));
+  return log_variance;
+}
+
+// Largest likelihood over sigma^2 and all t_s but those of the dropped conditions.
+Fit best_fit(const HistoryModel& model, const WhitenedData& data, const Set& dropped, const VectorXd& start,
              double log_scale, const SurrogateOptions& options) {
   const Objective objective = [&](const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
     VectorXd slope;
@@ -47,33 +59,30 @@ Fit best_fit(const HistoryModel& model, const WhitenedData& data, int dropped, c
   return {found.value, found.x};
 }
 
-// Loss of log-likelihood by dropping each condition, for data seen under each of the error settings.
+// Loss of log-likelihood by dropping each set, for data seen under each of the settings.
 VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>& settings,
-                     const SurrogateOptions& options) {
-  const int conditions = model.conditions();
+                     const std::vector<Set>& sets, const SurrogateOptions& options) {
   std::vector<Fit> full;
+  std::vector<double> log_scale;
   for (const auto& data : settings) {
-    const double log_scale = std::log(data.square / static_cast<double>(data.residual_dimension));
-    VectorXd start = VectorXd::Constant(1 + conditions, log_scale - 3.0);
-    start[0] = log_scale - 0.5;
-    full.push_back(best_fit(model, data, -1, start, log_scale, options));
+    log_scale.push_back(log_error_scale(model, data));
+    VectorXd start = VectorXd::Constant(1 + model.conditions(), log_scale.back() - 3.0);
+    start[0] = log_scale.back() - 0.5;
+    full.push_back(best_fit(model, data, {}, start, log_scale.back(), options));
   }
   double best = full[0].value;
   for (const Fit& fit : full) best = std::max(best, fit.value);
-  VectorXd losses(conditions);
-  for (int s = 0; s < conditions; ++s) {
+  VectorXd losses(static_cast<Index>(sets.size()));
+  for (std::size_t s = 0; s < sets.size(); ++s) {
     double without = -std::numeric_limits<double>::infinity();
     for (std::size_t g = 0; g < settings.size(); ++g) {
       const VectorXd& x = full[g].x;
-      double value = model.log_likelihood(settings[g], x[0], variances(x, s));
-      if (full[g].value - value > kNegligible) {
-        const double log_scale =
-            std::log(settings[g].square / static_cast<double>(settings[g].residual_dimension));
-        value = std::max(value, best_fit(model, settings[g], s, x, log_scale, options).value);
-      }
+      double value = model.log_likelihood(settings[g], x[0], variances(x, sets[s]));
+      if (full[g].value - value > kNegligible)
+        value = std::max(value, best_fit(model, settings[g], sets[s], x, log_scale[g], options).value);
       without = std::max(without, value);
     }
-    losses[s] = std::max(0.0, best - without);
+    losses[static_cast<Index>(s)] = std::max(0.0, best - without);
   }
   return losses;
 }
@@ -103,31 +112,42 @@ void SurrogateOptions::check() const {
   if (surrogates < 1) throw std::invalid_argument("surrogates: at least one is needed");
   if (!(smallest_shift >= 0 && smallest_shift < 0.5))
     throw std::invalid_argument("surrogates: smallest_shift must lie in [0, 0.5)");
-  if (error_settings.empty()) throw std::invalid_argument("surrogates: no error setting given");
+  if (settings.empty()) throw std::invalid_argument("surrogates: no setting of error and reach given");
 }
 
-VectorXd holm(const VectorXd& p_values) {
-  const Index n = p_values.size();
-  std::vector<Index> order(n);
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return p_values[a] < p_values[b]; });
-  VectorXd adjusted(n);
-  double running = 0.0;
-  for (Index k = 0; k < n; ++k) {
-    running = std::max(running, std::min(1.0, static_cast<double>(n - k) * p_values[order[k]]));
-    adjusted[order[k]] = running;
+VectorXd adjusted_p_values(const VectorXd& statistic, const MatrixXd& null_statistics, double least) {
+  const Index n = null_statistics.rows(), sets = statistic.size();
+  VectorXd observed(sets);
+  MatrixXd null(n, sets);
+  for (Index s = 0; s < sets; ++s) {
+    VectorXd sorted = null_statistics.col(s);
+    std::sort(sorted.data(), sorted.data() + n);
+    const double unit = std::max(least, sorted[static_cast<Index>(0.95 * static_cast<double>(n - 1))]);
+    observed[s] = statistic[s] / unit;
+    null.col(s) = null_statistics.col(s) / unit;
   }
+  std::vector<Index> order(static_cast<std::size_t>(sets));
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return observed[a] < observed[b]; });
+  // From the smallest up, the largest null statistic so far; then p-values may not fall from the largest down.
+  VectorXd adjusted(sets), highest = VectorXd::Constant(n, -std::numeric_limits<double>::infinity());
+  for (Index s : order) {
+    highest = highest.cwiseMax(null.col(s));
+    const double as_high = static_cast<double>((highest.array() >= observed[s]).count());
+    adjusted[s] = (1.0 + as_high) / (1.0 + static_cast<double>(n));
+  }
+  double running = 0.0;
+  for (auto s = order.rbegin(); s != order.rend(); ++s) adjusted[*s] = running = std::max(running, adjusted[*s]);
   return adjusted;
 }
 
-int null_setting(const HistoryModel& model) {
+int null_setting(const HistoryModel& model, const GaussianSimulator& simulator) {
   int best = 0;
   double highest = -std::numeric_limits<double>::infinity();
-  const VectorXd none = VectorXd::Zero(model.conditions());
-  for (int g = 0; g < model.settings(); ++g) {
-    const WhitenedData& data = model.whitened(g);
-    const double value = model.log_likelihood(
-        data, std::log(data.square / static_cast<double>(data.residual_dimension)), none);
+  const VectorXd none = VectorXd::Zero(model.conditions()), shift = simulator.mean - model.reference();
+  for (int g = 0; g < model.error_settings(); ++g) {  // without responses they have no reach
+    const WhitenedData data = model.whitened(g).in_terms_of(shift, simulator.root);
+    const double value = model.log_likelihood(data, log_error_scale(model, data), none);
     if (value > highest) {
       highest = value;
       best = g;
@@ -136,33 +156,33 @@ int null_setting(const HistoryModel& model) {
   return best;
 }
 
-SurrogateTest surrogate_test(const HistoryModel& model, const SurrogateOptions& options,
+SurrogateTest surrogate_test(const HistoryModel& model, const GaussianSimulator& simulator,
+                             const std::vector<Set>& sets, const SurrogateOptions& options,
                              const Context& context) {
   options.check();
-  const ErrorOptions& error = model.priors().error;
-  std::vector<WhitenedData> settings;
-  for (int g : options.error_settings) settings.push_back(model.whitened(g));
+  const VectorXd shift = simulator.mean - model.reference();
+  const auto losses = [&](const MatrixXd& responses) {
+    std::vector<WhitenedData> settings;
+    for (int g : options.settings)
+      settings.push_back(model.whiten(g, responses).in_terms_of(shift, simulator.root));
+    return drop_losses(model, settings, sets, options);
+  };
   SurrogateTest test;
-  test.statistic = drop_losses(model, settings, options);
-
+  test.statistic = losses(model.data().responses);
   const std::vector<Index> lags = draw_lags(model.data().y.size(), options, context);
   const int n = static_cast<int>(lags.size());
-  test.null_statistics.resize(n, model.conditions());
+  test.null_statistics.resize(n, static_cast<Index>(sets.size()));
   parallel_for(n, context, [&](int b) {
-    HistoryData data = model.data();
-    data.responses = shifted(data.responses, lags[b]);
-    std::vector<WhitenedData> own;
-    for (int g : options.error_settings)
-      own.push_back(whiten(data, error.correlation_times, error.setting(g)));
-    test.null_statistics.row(b) = drop_losses(model, own, options).transpose();
+    test.null_statistics.row(b) =
+        losses(shifted(model.data().responses, lags[static_cast<std::size_t>(b)])).transpose();
   });
-  test.p_value.resize(model.conditions());
-  for (int s = 0; s < model.conditions(); ++s) {
+  test.p_value.resize(test.statistic.size());
+  for (Index s = 0; s < test.statistic.size(); ++s) {
     const double as_large =
         static_cast<double>((test.null_statistics.col(s).array() >= test.statistic[s]).count());
     test.p_value[s] = (1.0 + as_large) / (1.0 + n);
   }
-  test.adjusted = holm(test.p_value);
+  test.adjusted = adjusted_p_values(test.statistic, test.null_statistics);
   return test;
 }
 

@@ -1,12 +1,14 @@
 #include "engine/calibration/Calibration.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
-#include "engine/ais/DefensiveTarget.hpp"
+#include "engine/ais/CloserReference.hpp"
+#include "engine/ais/ImportanceSample.hpp"
+#include "engine/ais/StandardNormal.hpp"
 #include "engine/calibration/ParameterModes.hpp"
-#include "engine/linalg/constants.hpp"
-#include "engine/random/transform.hpp"
+#include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
 
@@ -16,126 +18,127 @@ using Eigen::VectorXd;
 
 namespace {
 
-double log_standard_normal(const VectorXd& x) {
-  return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));
-}
+enum Purpose : std::uint64_t { kFirstHistory, kSecondHistory, kPopulation, kPosterior };
+enum StreamPurpose : std::uint64_t { kPriorPoints = 61, kModes, kMixture, kCloser };
 
-}  // namespace
+constexpr int kHistoryPoints = 3;    // at which the modes of the parameters are sought
+constexpr int kHistoryChains = 128;  // of the posterior under a Gaussian simulator
+constexpr double kHistoryDrop = 0.5;
+constexpr double kReferenceDof = 8.0;
+constexpr Index kRoundDraws = 25;  // that bring the reference closer, each round, per coordinate
+constexpr std::uint64_t kPriorSeed = 20;  // the spread of the simulator is part of the model, not of a run
 
-CalibrationTarget::CalibrationTarget(const HistoryTarget& history, StudentTMixture reference,
-                                     const Emulator& emulator)
-    : history_(history),
-      reference_(std::move(reference)),
-      emulator_(emulator),
-      log_jacobian_(-log_volume(history.model().data().basis)) {
-  const HistoryModel& model = history.model();
-  for (int g = 0; g < model.settings(); ++g) {
-    const MatrixXd& root = model.whitened(g).root;
-    const MatrixXd inverse =
-        root.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(root.rows(), root.cols()));
-    unit_covariance_.push_back(inverse * inverse.transpose());
-  }
-}
-
-CalibrationTarget CalibrationTarget::from_prior() const {
-  const Index d = history_.dimension();
-  StudentT wide(VectorXd::Zero(d), MatrixXd::Identity(d, d), 30.0);
-  return CalibrationTarget(history_, StudentTMixture({std::move(wide)}, {1.0}), emulator_);
-}
-
-MatrixXd CalibrationTarget::unit(const MatrixXd& x) const {
-  return x.bottomRows(emulator_.n_inputs()).transpose().unaryExpr(&normal_cdf);
-}
-
-VectorXd CalibrationTarget::draw_reference(Stream& stream) const {
-  VectorXd x(dimension());
-  x << reference_.draw(stream), stream.normals(emulator_.n_inputs());
-  return x;
-}
-
-double CalibrationTarget::log_reference(const VectorXd& x) const {
-  return reference_.log_density(x.head(history_.dimension())) +
-         log_standard_normal(x.tail(emulator_.n_inputs()));
-}
-
-MatrixXd CalibrationTarget::covariance_inside(const HistoryParameters& point,
-                                              const VectorXd& variance) const {
-  MatrixXd covariance = point.variance * unit_covariance_[point.setting];
-  covariance.diagonal() += variance;
-  return covariance;
-}
-
-double CalibrationTarget::log_density_inside(const HistoryParameters& point, const VectorXd& mean,
-                                             const VectorXd& variance) const {
-  MatrixXd covariance = covariance_inside(point, variance);
-  // The coefficients differ by orders of magnitude: factorise the correlation.
-  const VectorXd scale = covariance.diagonal().cwiseSqrt();
-  covariance.array() /= (scale * scale.transpose()).array();
-  const Eigen::LLT<MatrixXd> factor(covariance);
-  if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
-  const VectorXd z = factor.matrixL().solve((estimate(point) - mean).cwiseQuotient(scale));
-  const double half_log_det = factor.matrixLLT().diagonal().array().log().sum() + scale.array().log().sum();
-  return log_jacobian_ - half_log_det -
-         0.5 * (static_cast<double>(mean.size()) * kLogTwoPi + z.squaredNorm());
-}
-
-VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {
-  MatrixXd mean, variance;
-  emulator_.predict(unit(x), mean, variance);
-  const MatrixXd history_x = x.topRows(history_.dimension());
-  VectorXd values = history_.log_likelihood(history_x);
-  for (Index i = 0; i < x.cols(); ++i) {
-    // The history posterior is in the target, not in the reference.
-    values[i] += log_standard_normal(history_x.col(i)) - reference_.log_density(history_x.col(i));
-    values[i] += log_density_inside(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose());
-  }
-  return values;
-}
-
-namespace {
-
-constexpr std::uint64_t kReference = 64;  // purpose of the streams below; the sampler's are smaller
-constexpr int kHistoryPoints = 4;         // at which the modes of the parameters are sought
-constexpr double kContradiction = 3.0;    // misfit per basis vector from which the modes mislead
-
-// n points of equal weight, evenly spread over weighted ones.
-std::vector<HistoryParameters> spread_points(const HistoryTarget& target, const AisResult& result, int n) {
-  std::vector<HistoryParameters> points;
+// n draws of equal weight, evenly spread over weighted ones.
+std::vector<Index> spread_draws(const VectorXd& weights, int n) {
+  std::vector<Index> picked;
   double cumulative = 0.0;
-  for (Index i = 0; i < result.weights.size(); ++i) {
-    cumulative += result.weights[i];
-    while (static_cast<int>(points.size()) < n && cumulative * n > static_cast<double>(points.size()) + 0.5)
-      points.push_back(target.parameters(result.draws.col(i)));
+  Index at = -1;
+  for (int i = 0; i < n; ++i) {
+    while (cumulative < (i + 0.5) / n && at + 1 < weights.size()) cumulative += weights[++at];
+    picked.push_back(at);
   }
-  return points;
+  return picked;
+}
+
+struct Start {
+  MatrixXd history;  // draws of equal weight
+  ParameterModes modes;
+};
+
+// Error and discrepancy under a Gaussian simulator, and where the parameters lie then.
+Start start_from(const CalibrationTarget& target, const GaussianSimulator& simulator,
+                 const AisOptions& options, const Context& context, long& evaluations) {
+  const HistoryTarget history(target.model(), target.coordinates().active(), simulator);
+  AisOptions rough = options;
+  rough.pilot_chains = kHistoryChains;
+  rough.ess_drop = std::min(options.ess_drop, kHistoryDrop);
+  rough.gradient = false;
+  MatrixXd draws = sample_population(history, StandardNormal(history.dimension()), rough, context, evaluations);
+  std::vector<HistoryParameters> points;
+  for (int k = 0; k < kHistoryPoints; ++k)
+    points.push_back(history.parameters(draws.col((2 * k + 1) * draws.cols() / (2 * kHistoryPoints))));
+  Stream stream(context.seed, kModes, 0);
+  ParameterModes modes = parameter_modes(target, points, ModeOptions(), context, stream);
+  return {std::move(draws), std::move(modes)};
+}
+
+CloserReference closer_reference(const CalibrationTarget& target, const AisOptions& options,
+                                 const Context& context, long& evaluations) {
+  const Emulator& emulator = target.emulator();
+  const GaussianSimulator first = over_priors(emulator, Stream(kPriorSeed, kPriorPoints, 0));
+  const Start rough = start_from(target, first, options, context.fork(kFirstHistory), evaluations);
+  const Start start = start_from(target, tangent_at(emulator, rough.modes.best), options,
+                                 context.fork(kSecondHistory), evaluations);
+  evaluations += rough.modes.evaluations + start.modes.evaluations;
+  const Index n = start.history.cols();
+  Stream stream(context.seed, kMixture, 0);
+  return CloserReference({StudentTMixture::fit(start.history, VectorXd::Constant(n, 1.0 / n),
+                                               options.max_components, kReferenceDof, stream),
+                          start.modes.mixture});
 }
 
 }  // namespace
 
-CalibrationSample sample_calibration(const CalibrationTarget& target, const AisResult& history,
-                                     const AisOptions& options, const Context& context) {
-  Stream stream(context.seed, kReference, 0);
-  const ParameterModes modes =
-      parameter_modes(target, spread_points(target.history_target(), history, kHistoryPoints), ModeOptions(),
-                      context, stream);
-  CalibrationSample sample;
-  sample.misfits = modes.misfits;
-  AisResult& posterior = sample.posterior;
-  // Log-likelihoods are told as seen from the target's own reference.
-  if (!(modes.misfits.mean() < kContradiction * static_cast<double>(target.emulator().n_outputs()))) {
-    const CalibrationTarget wide = target.from_prior();
-    posterior = sample_ais(wide, options, context);
-    for (Index i = 0; i < posterior.log_likelihood.size(); ++i)
-      posterior.log_likelihood[i] +=
-          wide.log_reference(posterior.draws.col(i)) - target.log_reference(posterior.draws.col(i));
-  } else {
-    const DefensiveTarget closer(target, modes.mixture, target.history_target().dimension());
-    posterior = sample_ais(closer, options, context);
-    for (Index i = 0; i < posterior.log_likelihood.size(); ++i)
-      posterior.log_likelihood[i] += closer.log_ratio(posterior.draws.col(i));
+HistoryModel history_model(HistoryData data, HistoryPriors priors, const Emulator& emulator,
+                           const Context& context, const std::vector<int>& only) {
+  data.spread = over_priors(emulator, Stream(kPriorSeed, kPriorPoints, 0)).root;
+  return HistoryModel(std::move(data), std::move(priors), context, only);
+}
+
+AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& options,
+                           const Context& context) {
+  long spent = 0;
+  const CloserReference reference = closer_reference(target, options, context, spent);
+  const MatrixXd population =
+      sample_population(target, reference, options, context.fork(kPopulation), spent);
+  Stream stream(context.seed, kCloser, 0);
+  const SkewedMixture mixture =
+      closer_mixture(target, population, kRoundDraws * target.dimension(), context, stream, spent);
+  AisOptions own = options;
+  own.skewed = true;
+  AisResult result = sample_ais(target, mixture, own, context.fork(kPosterior));
+  result.evaluations += spent;
+  return result;
+}
+
+std::vector<int> conditions_but(const HistoryModel& model, const std::vector<int>& without) {
+  std::vector<int> kept;
+  for (int s = 0; s < model.conditions(); ++s) {
+    if (std::find(without.begin(), without.end(), s) == without.end()) kept.push_back(s);
   }
-  posterior.evaluations += modes.evaluations;
-  return sample;
+  return kept;
+}
+
+Calibration calibrate(const HistoryModel& model, const Emulator& emulator, const CalibrationOptions& options,
+                      const Context& context) {
+  const CalibrationTarget target(model, conditions_but(model, {}), emulator);
+  Calibration out;
+  out.posterior = sample_posterior(target, options.ais, context);
+  const AisResult& posterior = out.posterior;
+  out.unit = target.unit(posterior.draws);
+  out.reach = VectorXd::Zero(static_cast<Index>(model.priors().reach.size()));
+  for (Index i = 0; i < posterior.weights.size(); ++i) {
+    out.history.push_back(target.history(posterior.draws.col(i)));
+    out.reach[out.history.back().setting / model.error_settings()] += posterior.weights[i];
+  }
+  out.kept = spread_draws(posterior.weights, options.kept);
+  MatrixXd mean, variance;
+  MatrixXd points(options.kept, out.unit.cols());
+  for (int k = 0; k < options.kept; ++k) points.row(k) = out.unit.row(out.kept[static_cast<std::size_t>(k)]);
+  emulator.predict(points, mean, variance);
+  out.coefficients.resize(model.data().responses.cols(), options.kept);
+  out.withheld.resize(model.data().basis.cols(), options.kept);
+  std::vector<MatrixXd> held(model.priors().reach.size());  // of each reach that is met
+  for (int k = 0; k < options.kept; ++k) {
+    const HistoryParameters& point = out.history[static_cast<std::size_t>(out.kept[static_cast<std::size_t>(k)])];
+    out.coefficients.col(k) = model.coefficients(point, mean.row(k).transpose(), variance.row(k).transpose());
+    MatrixXd& own = held[static_cast<std::size_t>(point.setting / model.error_settings())];
+    if (own.size() == 0) own = model.withheld(point.setting);
+    out.withheld.col(k) = own * out.coefficients.col(k);
+  }
+  const VectorXd centre = posterior.draws.bottomRows(emulator.n_inputs()) * posterior.weights;
+  out.tangent = tangent_at(emulator, centre);
+  return out;
 }
 
 }  // namespace amiss

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "engine/calibration/Linearisation.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/transform.hpp"
@@ -17,62 +18,55 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kDifference = 3e-3;  // of the emulated means, in standard deviations of the prior
 constexpr double kSettled = 1e-2;     // gain in nats at which a search ends
 constexpr double kSame = 1.0;         // distance between modes, in standard deviations, that counts as none
 
 struct Mode {
   VectorXd location;
   MatrixXd precision;
-  double log_mass = 0.0;  // of the Gaussian that touches the density at the mode
-  double misfit = 0.0;    // (estimate - w')'C^-1 (estimate - w')
+  double value = 0.0;     // log density at the mode
+  double log_mass = 0.0;  // of the Gaussian that touches the density there
 };
 
 // The density of the parameters for one point of the history posterior.
 class Conditional {
  public:
   Conditional(const CalibrationTarget& target, const HistoryParameters& point, long& evaluations)
-      : target_(target), point_(point), evaluations_(evaluations) {}
+      : emulator_(target.emulator()), likelihood_(target.model().given(point)), evaluations_(evaluations) {}
 
   VectorXd log_density(const MatrixXd& x) const {
     MatrixXd mean, variance;
-    predict(x, mean, variance);
+    emulator_.predict(x.transpose().unaryExpr(&normal_cdf), mean, variance);
+    evaluations_ += x.cols();
     VectorXd values(x.cols());
-    for (Index i = 0; i < x.cols(); ++i) values[i] = at(x.col(i), mean.row(i), variance.row(i));
+    for (Index i = 0; i < x.cols(); ++i)
+      values[i] = likelihood_.log_density(mean.row(i), variance.row(i)) - 0.5 * x.col(i).squaredNorm();
     return values;
   }
 
-  // Value, gradient (central differences), Gauss-Newton precision and misfit at x.
-  double expand(const VectorXd& x, VectorXd& gradient, MatrixXd& precision, double& misfit) const {
+  // Value, gradient (central differences) and Gauss-Newton precision at x.
+  double expand(const VectorXd& x, VectorXd& gradient, MatrixXd& precision) const {
     const Index d = x.size();
-    MatrixXd points(d, 2 * d + 1), mean, variance;
-    points.colwise() = x;
-    points.leftCols(d).diagonal().array() += kDifference;
-    points.middleCols(d, d).diagonal().array() -= kDifference;
-    predict(points, mean, variance);
+    const Expansion at = amiss::expand(emulator_, x);
+    evaluations_ += 2 * d + 1;
+    // Of the emulated mean alone: the variance changes slowly.
     gradient.resize(d);
     for (Index i = 0; i < d; ++i) {
-      gradient[i] = (at(points.col(i), mean.row(i), variance.row(i)) -
-                     at(points.col(d + i), mean.row(d + i), variance.row(d + i))) /
-                    (2.0 * kDifference);
+      const VectorXd step = kStep * at.slope.col(i);
+      gradient[i] = (likelihood_.log_density(at.mean + step, at.variance) -
+                     likelihood_.log_density(at.mean - step, at.variance)) /
+                        (2.0 * kStep) -
+                    x[i];
     }
-    const MatrixXd slope =
-        (mean.topRows(d) - mean.middleRows(d, d)).transpose() / (2.0 * kDifference);  // Q x d
-    const MatrixXd covariance = target_.covariance_inside(point_, variance.row(2 * d));
-    const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::LLT<MatrixXd> factor(scale.asDiagonal() * covariance * scale.asDiagonal());
-    const MatrixXd white = factor.matrixL().solve(scale.asDiagonal() * slope);
-    precision = white.transpose() * white;
+    precision = at.slope.transpose() * likelihood_.information(at.variance) * at.slope;
     precision.diagonal().array() += 1.0;
-    const VectorXd apart = target_.estimate(point_) - mean.row(2 * d).transpose();
-    misfit = factor.matrixL().solve(scale.cwiseProduct(apart)).squaredNorm();
-    return at(x, mean.row(2 * d), variance.row(2 * d));
+    return likelihood_.log_density(at.mean, at.variance) - 0.5 * x.squaredNorm();
   }
 
   Mode climb(VectorXd x, int max_iterations) const {
     VectorXd gradient;
     MatrixXd precision;
-    double misfit = 0.0, damping = 1e-2, value = expand(x, gradient, precision, misfit);
+    double damping = 1e-2, value = expand(x, gradient, precision);
     for (int iteration = 0; iteration < max_iterations && damping < 1e8; ++iteration) {
       MatrixXd damped = precision;
       damped.diagonal() *= 1.0 + damping;
@@ -85,26 +79,19 @@ class Conditional {
       const bool settled = there - value < kSettled;
       x = moved;
       damping = std::max(1e-6, 0.1 * damping);
-      value = expand(x, gradient, precision, misfit);
+      value = expand(x, gradient, precision);
       if (settled) break;
     }
     const Eigen::LLT<MatrixXd> factor(precision);
-    return {x, precision, value - factor.matrixLLT().diagonal().array().log().sum(), misfit};
+    return {x, precision, value, value - factor.matrixLLT().diagonal().array().log().sum()};
   }
 
  private:
   static constexpr double kFarthest = 6.0;  // in standard deviations of the prior
+  static constexpr double kStep = 1e-4;     // likewise, of the gradient
 
-  void predict(const MatrixXd& x, MatrixXd& mean, MatrixXd& variance) const {
-    target_.emulator().predict(x.transpose().unaryExpr(&normal_cdf), mean, variance);
-    evaluations_ += x.cols();
-  }
-  double at(const VectorXd& x, const VectorXd& mean, const VectorXd& variance) const {
-    return target_.log_density_inside(point_, mean, variance) - 0.5 * x.squaredNorm();
-  }
-
-  const CalibrationTarget& target_;
-  const HistoryParameters& point_;
+  const Emulator& emulator_;
+  CoefficientLikelihood likelihood_;
   long& evaluations_;
 };
 
@@ -138,13 +125,6 @@ std::vector<Mode> find_modes(const CalibrationTarget& target, const HistoryParam
   return found;
 }
 
-double least_misfit(const std::vector<Mode>& modes) {
-  if (modes.empty()) return std::numeric_limits<double>::quiet_NaN();
-  double least = std::numeric_limits<double>::infinity();
-  for (const Mode& mode : modes) least = std::min(least, mode.misfit);
-  return least;
-}
-
 }  // namespace
 
 ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
@@ -156,12 +136,10 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
     const auto k = static_cast<std::size_t>(i);
     at_point[k] = find_modes(target, points[k], starts, options, spent[k]);
   });
-  VectorXd misfits(static_cast<Index>(points.size()));
   std::vector<Mode> modes;
   std::vector<double> shares;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::vector<Mode>& found = at_point[i];
-    misfits[static_cast<Index>(i)] = least_misfit(found);
     VectorXd log_mass(static_cast<Index>(found.size()));
     for (std::size_t k = 0; k < found.size(); ++k) log_mass[static_cast<Index>(k)] = found[k].log_mass;
     for (std::size_t k = 0; k < found.size(); ++k) {
@@ -188,12 +166,16 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
     components.emplace_back(rounded(modes[k].location, sd), rounded(root, sd), options.dof);
     weights.push_back(0.5 * shares[k] / total + 0.5 / static_cast<double>(modes.size()));
   }
+  VectorXd best = VectorXd::Zero(starts.rows());
+  const auto highest = std::max_element(modes.begin(), modes.end(),
+                                        [](const Mode& a, const Mode& b) { return a.log_mass < b.log_mass; });
+  if (highest != modes.end()) best = highest->location;
   if (components.empty()) {  // nowhere is the record possible: the prior stands
     components.emplace_back(VectorXd::Zero(starts.rows()), MatrixXd::Identity(starts.rows(), starts.rows()),
                             options.dof);
     weights.push_back(1.0);
   }
-  return {StudentTMixture(std::move(components), std::move(weights)), misfits,
+  return {StudentTMixture(std::move(components), std::move(weights)), std::move(best),
           std::accumulate(spent.begin(), spent.end(), 0L)};
 }
 

@@ -1,15 +1,13 @@
 #include "engine/discrepancy/HistoryModel.hpp"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
+#include <map>
 #include <stdexcept>
+#include <utility>
 
 #include "engine/linalg/constants.hpp"
-#include "engine/linalg/double_policy.hpp"
-#include "engine/linalg/precedes.hpp"
 #include "engine/parallel/parallel_for.hpp"
-#include "engine/random/transform.hpp"
 
 namespace amiss {
 
@@ -21,39 +19,37 @@ namespace {
 
 constexpr Index kBlock = 2048;  // rows of a long record that are whitened at once
 
-double clamp_unit(double u) { return std::min(std::max(u, 1e-12), 1.0 - 1e-12); }
-
-// Whitened rows of the basis (columns divided by `norms`) and of [Phi, y], block after block, as often as
-// asked.
-class WhitenedBlocks {
- public:
-  WhitenedBlocks(const HistoryData& data, const Whitener& whitener, const VectorXd& norms)
-      : data_(data), whitener_(whitener), norms_(norms) {}
-
-  template <class Visit>
-  void visit(const Visit& visit) {
-    const Index n = data_.y.size(), q = data_.basis.cols(), p = data_.responses.cols();
-    if (n <= kBlock && all_.size() > 0) return visit(basis_, all_);
-    MatrixXd state;
-    for (Index first = 0; first < n; first += kBlock) {
-      const Index rows = std::min(kBlock, n - first);
-      MatrixXd block(rows, q + p + 1);
-      block << data_.basis.middleRows(first, rows), data_.responses.middleRows(first, rows),
-          data_.y.segment(first, rows);
-      block.leftCols(q).array().rowwise() /= norms_.transpose().array();
-      block = whitener_.rows(block, first, state);
-      basis_ = block.leftCols(q);
-      all_ = block.rightCols(p + 1);
-      visit(basis_, all_);
-    }
+// Gram matrix of W [K / norms, Phi, r] in blocks of rows.
+MatrixXd whitened_gram(const MatrixXd& basis, const VectorXd& norms, const MatrixXd& responses,
+                       const VectorXd& residual, const Whitener& whitener) {
+  const Index n = residual.size(), q = basis.cols(), p = responses.cols();
+  MatrixXd gram = MatrixXd::Zero(q + p + 1, q + p + 1), block, state;
+  for (Index first = 0; first < n; first += kBlock) {
+    const Index rows = std::min(kBlock, n - first);
+    block.resize(rows, q + p + 1);
+    block << basis.middleRows(first, rows), responses.middleRows(first, rows), residual.segment(first, rows);
+    block.leftCols(q).array().rowwise() /= norms.transpose().array();
+    block = whitener.rows(block, first, state);
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(block.transpose());
   }
+  return gram.selfadjointView<Eigen::Lower>();
+}
 
- private:
-  const HistoryData& data_;
-  const Whitener& whitener_;
-  const VectorXd& norms_;
-  MatrixXd basis_, all_;  // the last block; the only one of a short record
-};
+// Psi = Phi - K X in place of Phi.
+WhitenedData restrained(WhitenedData data, const MatrixXd& x) {
+  if (x.isZero(0.0)) return data;
+  const Index q = data.coefficients, p = data.cross.size() - q;
+  const MatrixXd basis = data.gram.topLeftCorner(q, q), mixed = data.gram.topRightCorner(q, p);
+  const MatrixXd left = mixed - basis * x;  // K' W'W Psi
+  MatrixXd own = data.gram.bottomRightCorner(p, p) - mixed.transpose() * x - x.transpose() * left;
+  data.gram.bottomRightCorner(p, p) = 0.5 * (own + own.transpose());
+  data.gram.topRightCorner(q, p) = left;
+  data.gram.bottomLeftCorner(p, q) = left.transpose();
+  data.cross.tail(p) -= x.transpose() * data.cross.head(q);
+  return data;
+}
+
+VectorXd column_norms(const MatrixXd& basis) { return basis.colwise().norm().transpose(); }
 
 }  // namespace
 
@@ -71,69 +67,52 @@ void HistoryData::check() const {
   if (!condition.empty() && *std::min_element(condition.begin(), condition.end()) < 0)
     throw std::invalid_argument("history: negative condition");
   if (basis.cols() >= n)
-    throw std::invalid_argument("history: the basis spans the whole record, nothing is left outside it");
+    throw std::invalid_argument("history: the record has " + std::to_string(n) + " rows, no more than the " +
+                                std::to_string(basis.cols()) + " basis vectors");
+  if (basis.cols() > 0 && !(column_norms(basis).minCoeff() > 0))
+    throw std::invalid_argument("history: a column of the basis is zero");
+  if (spread.size() > 0 && spread.rows() != basis.cols())
+    throw std::invalid_argument("history: the spread needs one row for each basis vector");
 }
 
 void HistoryPriors::check() const {
   if (!(noise_sd > 0)) throw std::invalid_argument("history: noise_sd must be positive");
   if (!(noise_shape > 0)) throw std::invalid_argument("history: noise_shape must be positive");
+  if (!(discarded_variance >= 0))
+    throw std::invalid_argument("history: discarded_variance must not be negative");
   if (!(inclusion > 0 && inclusion <= 1))
     throw std::invalid_argument("history: inclusion must lie in (0, 1]");
   if (!(amplitude > 0)) throw std::invalid_argument("history: amplitude must be positive");
+  if (reach.empty() || !std::all_of(reach.begin(), reach.end(), [](double k) { return k > 0; }))
+    throw std::invalid_argument("history: reach needs positive values");
   error.check();
 }
 
-WhitenedData whiten(const HistoryData& data, const VectorXd& correlation_times, const VectorXd& ratios) {
-  const Whitener whitener(data.axis, correlation_times, ratios);
-  const Index n = data.y.size(), q = data.basis.cols(), p = data.responses.cols();
-  // Columns scaled to unit norm first, so that their very different sizes do not cost accuracy.
-  const VectorXd norms = data.basis.colwise().norm().transpose();
-  WhitenedBlocks blocks(data, whitener, norms);
-
-  // First pass: W K = O R in blocks, and what lies inside.
-  MatrixXd root = MatrixXd::Zero(q, q), inside = MatrixXd::Zero(q, p + 1);
-  blocks.visit([&](const MatrixXd& basis, const MatrixXd& series) {
-    if (q == 0) return;
-    MatrixXd stacked(q + basis.rows(), q);
-    stacked << root, basis;
-    const Eigen::HouseholderQR<MatrixXd> qr(stacked);
-    root = qr.matrixQR().topRows(q).triangularView<Eigen::Upper>();
-    inside.noalias() += basis.transpose() * series;
-  });
-  root.triangularView<Eigen::Upper>().transpose().solveInPlace(inside);  // O'W [Phi, y]
-
-  // Second pass: what lies outside.
-  MatrixXd gram = MatrixXd::Zero(p + 1, p + 1);
-  blocks.visit([&](const MatrixXd& basis, const MatrixXd& series) {
-    MatrixXd o = basis;
-    root.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(o);
-    MatrixXd outside = series;
-    outside.noalias() -= o * inside;
-    gram.selfadjointView<Eigen::Lower>().rankUpdate(outside.transpose());
-  });
-
+WhitenedData WhitenedData::in_terms_of(const VectorXd& shift, const MatrixXd& root) const {
+  const Index q = coefficients, p = cross.size() - q, r = root.cols();
   WhitenedData out;
-  out.gram = MatrixXd(gram.topLeftCorner(p, p)).selfadjointView<Eigen::Lower>();
-  out.cross = gram.row(p).head(p).transpose();
-  out.square = gram(p, p);
-  out.estimate = norms.cwiseInverse().cwiseProduct(root.triangularView<Eigen::Upper>().solve(inside.col(p)));
-  out.root = root * norms.asDiagonal();
-  out.log_det =
-      whitener.log_det() + log_volume(data.basis) - out.root.diagonal().cwiseAbs().array().log().sum();
-  out.residual_dimension = n - q;
+  out.coefficients = r;
+  out.size = size;
+  out.log_det = log_det;
+  out.gram.resize(r + p, r + p);
+  const MatrixXd mixed = gram.leftCols(q) * root;  // (Q + p) x r
+  out.gram.topLeftCorner(r, r).noalias() = root.transpose() * mixed.topRows(q);
+  out.gram.bottomLeftCorner(p, r) = mixed.bottomRows(p);
+  out.gram.topRightCorner(r, p) = mixed.bottomRows(p).transpose();
+  out.gram.bottomRightCorner(p, p) = gram.bottomRightCorner(p, p);
+  const VectorXd left = cross - gram.leftCols(q) * shift;
+  out.cross.resize(r + p);
+  out.cross << root.transpose() * left.head(q), left.tail(p);
+  out.square = square - shift.dot(cross.head(q) + left.head(q));
   return out;
 }
 
-double log_volume(const MatrixXd& basis) {
-  const VectorXd norms = basis.colwise().norm().transpose();
-  const Eigen::HouseholderQR<MatrixXd> qr(basis * norms.cwiseInverse().asDiagonal());
-  return norms.array().log().sum() + qr.matrixQR().diagonal().cwiseAbs().array().log().sum();
-}
-
-HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context& context)
+HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context& context,
+                           const std::vector<int>& only)
     : data_(std::move(data)), priors_(std::move(priors)), conditions_(data_.conditions()) {
   data_.check();
   priors_.check();
+  if (data_.spread.size() == 0) data_.spread.resize(data_.basis.cols(), 0);
   columns_ = VectorXd::Zero(conditions_);
   for (int s : data_.condition) columns_[s] += 1.0;
   centre_ = data_.responses.colwise().mean();
@@ -144,164 +123,230 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
     if (!(scale_[j] > 1e-12 * (1.0 + std::abs(centre_[j])))) scale_[j] = 1.0;  // constant: its column is zero
   }
   data_.responses.array().rowwise() /= scale_.array();
-  settings_.resize(static_cast<std::size_t>(priors_.error.settings()));
-  parallel_for(static_cast<int>(settings_.size()), context, [&](int g) {
-    settings_[g] = whiten(data_, priors_.error.correlation_times, priors_.error.setting(g));
+  norms_ = column_norms(data_.basis);
+  const MatrixXd scaled = data_.basis * norms_.cwiseInverse().asDiagonal();
+  reference_ = norms_.cwiseInverse().cwiseProduct(VectorXd(scaled.householderQr().solve(data_.y)));
+  residual_ = data_.y - data_.basis * reference_;
+  const int errors = error_settings(), reaches = static_cast<int>(priors_.reach.size());
+  std::vector<MatrixXd> held;
+  for (double reach : priors_.reach) held.push_back(withheld(reach, data_.responses));
+  settings_.resize(static_cast<std::size_t>(errors * reaches));
+  std::vector<bool> wanted(static_cast<std::size_t>(errors), only.empty());
+  for (int setting : only) wanted[static_cast<std::size_t>(error_of(setting))] = true;
+  parallel_for(errors, context, [&](int g) {
+    if (!wanted[static_cast<std::size_t>(g)]) return;
+    const WhitenedData free = whiten_freely(g, data_.responses);
+    for (int k = 0; k < reaches; ++k)
+      settings_[static_cast<std::size_t>(k * errors + g)] = restrained(free, held[static_cast<std::size_t>(k)]);
   });
 }
 
-double HistoryModel::log_likelihood(int setting, double log_variance, const VectorXd& t,
-                                    VectorXd* gradient) const {
-  return log_likelihood(settings_[setting], log_variance, t, gradient);
+WhitenedData HistoryModel::whiten_freely(int error, const MatrixXd& responses) const {
+  const Whitener whitener(data_.axis, priors_.error.correlation_times, priors_.error.setting(error));
+  const Index q = data_.basis.cols(), p = responses.cols();
+  // Columns of the basis scaled to unit norm first, so that their very different sizes do not cost accuracy.
+  MatrixXd gram = whitened_gram(data_.basis, norms_, responses, residual_, whitener);
+  gram.topRows(q).array().colwise() *= norms_.array();
+  gram.leftCols(q).array().rowwise() *= norms_.transpose().array();
+  WhitenedData out;
+  out.gram = gram.topLeftCorner(q + p, q + p);
+  out.cross = gram.col(q + p).head(q + p);
+  out.square = gram(q + p, q + p);
+  out.log_det = whitener.log_det();
+  out.size = data_.y.size();
+  out.coefficients = q;
+  return out;
 }
 
-// With D = diag(t_s / p_s), B = I + D^1/2 G D^1/2 / sigma^2 = LL' and b = D^1/2 g, columns with t_s > 0 only.
+// With E'E = U Lambda U', the left singular vectors of E are E U Lambda^-1/2, so that
+//     (I + (E E' / c)^2)^-1 = I - E U diag(lambda / (lambda^2 + c^2)) U' E',   c = kappa sigma_0^2.
+MatrixXd HistoryModel::withheld(double reach, const MatrixXd& responses) const {
+  const Index q = data_.basis.cols(), r = data_.spread.cols();
+  if (r == 0 || std::isinf(reach)) return MatrixXd::Zero(q, responses.cols());
+  const MatrixXd moves = data_.basis * data_.spread;  // E
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(moves.transpose() * moves);
+  const double c = reach * priors_.noise_sd * priors_.noise_sd;
+  const Eigen::ArrayXd energy = eigen.eigenvalues().array().max(0.0);
+  const VectorXd share = energy / (energy.square() + c * c);
+  return data_.spread * (eigen.eigenvectors() * (share.asDiagonal() * (eigen.eigenvectors().transpose() *
+                                                                       (moves.transpose() * responses))));
+}
+
+WhitenedData HistoryModel::whiten(int setting, const MatrixXd& responses) const {
+  return restrained(whiten_freely(error_of(setting), responses), withheld(reach_of(setting), responses));
+}
+
+// Runs of one setting share the whitened responses. With r = y - run in place of r0 and no coefficients.
+VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameters>& points,
+                                              const MatrixXd& runs, const Context& context) const {
+  std::map<int, std::vector<Index>> of_setting;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    of_setting[points[i].setting].push_back(static_cast<Index>(i));
+  const std::vector<std::pair<int, std::vector<Index>>> groups(of_setting.begin(), of_setting.end());
+  const Index p = data_.responses.cols();
+  VectorXd values(runs.cols());
+  parallel_for(static_cast<int>(groups.size()), context, [&](int k) {
+    const auto& [setting, own] = groups[static_cast<std::size_t>(k)];
+    const Whitener whitener(data_.axis, priors_.error.correlation_times, priors_.error.setting(error_of(setting)));
+    const MatrixXd responses = data_.responses - data_.basis * withheld(setting);
+    const MatrixXd white = whitener(responses);
+    WhitenedData seen;
+    seen.gram = whitened(setting).gram.bottomRightCorner(p, p);
+    seen.log_det = whitener.log_det();
+    seen.size = data_.y.size();
+    for (Index i : own) {
+      const VectorXd left = whitener(data_.y - runs.col(i));
+      seen.cross = white.transpose() * left;
+      seen.square = left.squaredNorm();
+      const HistoryParameters& point = points[static_cast<std::size_t>(i)];
+      values[i] = log_likelihood(seen, std::log(point.variance), point.t);
+    }
+  });
+  return values;
+}
+
+// F = LL' and L^-1 b of the columns that act: all of the simulator's, and the responses with t_s > 0.
 struct HistoryModel::Factor {
   std::vector<Index> kept;
-  Eigen::LLT<MatrixXd, Eigen::Lower> root;  // L
+  VectorXd root;                            // D^1/2
+  Eigen::LLT<MatrixXd, Eigen::Lower> lower;  // L
   VectorXd half;                            // L^-1 b
 };
 
 HistoryModel::Factor HistoryModel::factorise(const WhitenedData& whitened, double precision,
-                                             const VectorXd& t) const {
+                                             const VectorXd& t, const VectorXd& root,
+                                             const VectorXd& cross) const {
+  const Index q = whitened.coefficients;
   Factor out;
+  for (Index j = 0; j < q; ++j) out.kept.push_back(j);
   for (std::size_t j = 0; j < data_.condition.size(); ++j) {
-    if (t[data_.condition[j]] > 0) out.kept.push_back(static_cast<Index>(j));
+    if (t[data_.condition[j]] > 0) out.kept.push_back(q + static_cast<Index>(j));
   }
-  const Index p = static_cast<Index>(out.kept.size());
-  VectorXd root(p), b(p);
-  for (Index j = 0; j < p; ++j) {
-    const int s = data_.condition[out.kept[j]];
-    root[j] = std::sqrt(t[s] / columns_[s]);
-    b[j] = root[j] * whitened.cross[out.kept[j]];
+  const Index n = static_cast<Index>(out.kept.size());
+  out.root.resize(n);
+  VectorXd b(n);
+  MatrixXd matrix(n, n);
+  for (Index j = 0; j < n; ++j) {
+    const Index own = out.kept[j];
+    if (own < q) {
+      out.root[j] = root[own];
+    } else {
+      const int s = data_.condition[static_cast<std::size_t>(own - q)];
+      out.root[j] = std::sqrt(t[s] / columns_[s]);
+    }
+    b[j] = out.root[j] * cross[own];
   }
-  MatrixXd matrix(p, p);
-  for (Index j = 0; j < p; ++j) {
-    for (Index i = j; i < p; ++i)
-      matrix(i, j) = precision * root[i] * root[j] * whitened.gram(out.kept[i], out.kept[j]);
+  for (Index j = 0; j < n; ++j) {
+    for (Index i = j; i < n; ++i)
+      matrix(i, j) = precision * out.root[i] * out.root[j] * whitened.gram(out.kept[i], out.kept[j]);
     matrix(j, j) += 1.0;
   }
-  out.root.compute(matrix);
-  if (p > 0) out.half = out.root.matrixL().solve(b);
+  out.lower.compute(matrix);
+  out.half = out.lower.matrixL().solve(b);
   return out;
 }
 
-double HistoryModel::explained(const WhitenedData& whitened, double log_variance, const VectorXd& t) const {
-  if (!(whitened.square > 0)) return 0.0;
-  const double precision = std::exp(-log_variance);
-  return precision * factorise(whitened, precision, t).half.squaredNorm() / whitened.square;
+// Cross products and square of r0 - K shift in place of r0.
+VectorXd HistoryModel::shifted_cross(const WhitenedData& whitened, const VectorXd& shift, double& square) const {
+  const Index q = whitened.coefficients;
+  const VectorXd cross = whitened.cross - whitened.gram.leftCols(q) * shift;
+  square = whitened.square - shift.dot(whitened.cross.head(q) + cross.head(q));
+  return cross;
 }
 
-//   log |H~'AH~| = (N - Q) log sigma^2 + log |B|,   quadratic form = (y'y - b' B^-1 b / sigma^2) / sigma^2.
-// With r = B^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(B^-1)_ss - p_s]; it holds at t_s = 0 too.
+namespace {
+
+double log_density(const WhitenedData& whitened, double log_variance, double square, const MatrixXd& lower,
+                   const VectorXd& half) {
+  const double precision = std::exp(-log_variance);
+  const double log_det = 2.0 * lower.diagonal().array().log().sum();
+  const double quadratic = precision * (square - precision * half.squaredNorm());
+  const double n = static_cast<double>(whitened.size);
+  return whitened.log_det - 0.5 * (n * (kLogTwoPi + log_variance) + log_det + quadratic);
+}
+
+}  // namespace
+
+double HistoryModel::log_likelihood(const HistoryParameters& point, const VectorXd& mean,
+                                    const VectorXd& variance) const {
+  const WhitenedData& own = whitened(point.setting);
+  double square = 0.0;
+  const VectorXd cross = shifted_cross(own, mean - reference_, square);
+  const Factor factor = factorise(own, 1.0 / point.variance, point.t, variance.cwiseSqrt(), cross);
+  return log_density(own, std::log(point.variance), square, factor.lower.matrixLLT(), factor.half);
+}
+
+// With r = F^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(F^-1)_ss - p_s]; it holds at t_s = 0 too.
 double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_variance, const VectorXd& t,
                                     VectorXd* gradient) const {
   const double precision = std::exp(-log_variance);
-  const Factor factor = factorise(whitened, precision, t);
-  const std::vector<Index>& kept = factor.kept;
-  const VectorXd& half = factor.half;
-  const Index p = half.size();
-  const double n = static_cast<double>(whitened.residual_dimension);
-  const double log_det = p == 0 ? 0.0 : 2.0 * factor.root.matrixLLT().diagonal().array().log().sum();
-  const double quadratic = precision * (whitened.square - precision * half.squaredNorm());
-  const double value = whitened.log_det - 0.5 * (n * (kLogTwoPi + log_variance) + log_det + quadratic);
-
-  if (gradient != nullptr) {
-    gradient->setZero(1 + conditions_);
-    MatrixXd root_inverse = MatrixXd::Identity(p, p);
-    if (p > 0) factor.root.matrixL().solveInPlace(root_inverse);
-    const VectorXd inverse_diagonal = root_inverse.colwise().squaredNorm().transpose();
-    const VectorXd r = precision * (root_inverse.transpose() * half);
-    for (Index j = 0; j < p; ++j) {
-      (*gradient)[1 + data_.condition[kept[j]]] += 0.5 * (r[j] * r[j] + inverse_diagonal[j] - 1.0);
-    }
-    // sigma^2 |Sigma^-1 y|^2 = (quadratic form) - r'r: the residual sum of squares over sigma^2.
-    (*gradient)[0] =
-        -0.5 * (n - static_cast<double>(p) + inverse_diagonal.sum() - (quadratic - r.squaredNorm()));
+  const Index q = whitened.coefficients;
+  const Factor factor = factorise(whitened, precision, t, VectorXd::Ones(q), whitened.cross);
+  const double value =
+      log_density(whitened, log_variance, whitened.square, factor.lower.matrixLLT(), factor.half);
+  if (gradient == nullptr) return value;
+  const Index n = factor.half.size();
+  MatrixXd root_inverse = MatrixXd::Identity(n, n);
+  factor.lower.matrixL().solveInPlace(root_inverse);
+  const VectorXd inverse_diagonal = root_inverse.colwise().squaredNorm().transpose();
+  const VectorXd r = precision * (root_inverse.transpose() * factor.half);
+  gradient->setZero(1 + conditions_);
+  for (Index j = q; j < n; ++j) {
+    const int s = data_.condition[static_cast<std::size_t>(factor.kept[j] - q)];
+    (*gradient)[1 + s] += 0.5 * (r[j] * r[j] + inverse_diagonal[j] - 1.0);
   }
+  // sigma^2 |Sigma^-1 y|^2 = (quadratic form) - r'r: the residual sum of squares over sigma^2.
+  const double quadratic = precision * (whitened.square - precision * factor.half.squaredNorm());
+  (*gradient)[0] = -0.5 * (static_cast<double>(whitened.size - n) + inverse_diagonal.sum() -
+                           (quadratic - r.squaredNorm()));
   return value;
 }
 
-VectorXd HistoryModel::coefficients(const WhitenedData& whitened, double log_variance,
-                                    const VectorXd& t) const {
+double HistoryModel::quadratic(const WhitenedData& whitened, double log_variance, const VectorXd& t) const {
   const double precision = std::exp(-log_variance);
-  const Index p = static_cast<Index>(data_.condition.size());
-  VectorXd root(p);
-  for (Index j = 0; j < p; ++j) root[j] = std::sqrt(t[data_.condition[j]] / columns_[data_.condition[j]]);
-  MatrixXd matrix = precision * (root.asDiagonal() * whitened.gram * root.asDiagonal());
-  matrix.diagonal().array() += 1.0;
-  return root.asDiagonal() * matrix.llt().solve(precision * root.cwiseProduct(whitened.cross));
+  const Factor factor =
+      factorise(whitened, precision, t, VectorXd::Ones(whitened.coefficients), whitened.cross);
+  return precision * (whitened.square - precision * factor.half.squaredNorm());
 }
 
-HistoryTarget::HistoryTarget(const HistoryModel& model, std::vector<int> active)
-    : model_(model), active_(std::move(active)) {
-  const HistoryData& data = model_.data();
-  const auto column = [&](int s) {
-    return data.responses.col(std::find(data.condition.begin(), data.condition.end(), s) -
-                              data.condition.begin());
-  };
-  std::stable_sort(active_.begin(), active_.end(),
-                   [&](int a, int b) { return precedes(column(a), column(b)); });
+// With G_K the columns of the Gram matrix that belong to K and F the factor of the responses alone,
+//     A = [G_KK - G_K' D^1/2 F^-1 D^1/2 G_K / sigma^2] / sigma^2, and c likewise.
+CoefficientLikelihood HistoryModel::given(const HistoryParameters& point) const {
+  const WhitenedData& own = whitened(point.setting);
+  const double precision = 1.0 / point.variance;
+  const Index q = own.coefficients;
+  WhitenedData responses;  // the simulator's coefficients fixed at w0
+  const Index p = own.cross.size() - q;
+  responses.gram = own.gram.bottomRightCorner(p, p);
+  responses.cross = own.cross.tail(p);
+  responses.square = own.square;
+  responses.log_det = own.log_det;
+  responses.size = own.size;
+  const Factor factor = factorise(responses, precision, point.t, VectorXd(), responses.cross);
+  MatrixXd half(static_cast<Index>(factor.kept.size()), q);
+  for (Index j = 0; j < half.rows(); ++j)
+    half.row(j) = factor.root[j] * own.gram.row(q + factor.kept[j]).head(q);
+  factor.lower.matrixL().solveInPlace(half);
+  const double squared = precision * precision;
+  return {reference_, precision * own.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
+          precision * own.cross.head(q) - squared * (half.transpose() * factor.half),
+          log_density(responses, std::log(point.variance), own.square, factor.lower.matrixLLT(), factor.half)};
 }
 
-Index HistoryTarget::dimension() const {
-  return 1 + model_.priors().error.correlation_times.size() + static_cast<Index>(active_.size());
-}
-
-HistoryParameters HistoryTarget::parameters(const VectorXd& x) const {
-  const HistoryPriors& priors = model_.priors();
-  HistoryParameters point;
-  const double shape = priors.noise_shape;
-  const double scaled = boost::math::gamma_p_inv(shape, clamp_unit(normal_cdf(x[0])), DoublePolicy());
-  point.variance = shape * priors.noise_sd * priors.noise_sd / scaled;
-  const Index components = priors.error.correlation_times.size();
-  const int levels = static_cast<int>(priors.error.ratios.size());
-  for (Index k = components - 1; k >= 0; --k) {
-    const int level = std::min(levels - 1, static_cast<int>(normal_cdf(x[1 + k]) * levels));
-    point.setting = point.setting * levels + level;
+VectorXd HistoryModel::coefficients(const HistoryParameters& point, const VectorXd& mean,
+                                    const VectorXd& variance) const {
+  const WhitenedData& own = whitened(point.setting);
+  double square = 0.0;
+  const VectorXd cross = shifted_cross(own, mean - reference_, square);
+  const double precision = 1.0 / point.variance;
+  const Factor factor = factorise(own, precision, point.t, variance.cwiseSqrt(), cross);
+  const VectorXd solved = factor.lower.matrixL().transpose().solve(factor.half);
+  VectorXd out = VectorXd::Zero(data_.responses.cols());
+  for (std::size_t j = static_cast<std::size_t>(own.coefficients); j < factor.kept.size(); ++j) {
+    const Index k = static_cast<Index>(j);
+    out[factor.kept[j] - own.coefficients] = precision * factor.root[k] * solved[k];
   }
-  point.t = VectorXd::Zero(model_.conditions());
-  for (std::size_t a = 0; a < active_.size(); ++a) {
-    // The lower part of the unit interval is the spike at zero; the likelihood is continuous where the slab
-    // begins.
-    const double u =
-        (normal_cdf(x[1 + components + static_cast<Index>(a)]) - (1.0 - priors.inclusion)) / priors.inclusion;
-    if (u > 0) point.t[active_[a]] = std::pow(priors.amplitude * std::tan(0.5 * kPi * clamp_unit(u)), 2);
-  }
-  return point;
-}
-
-VectorXd HistoryTarget::log_likelihood(const MatrixXd& x) const {
-  VectorXd values(x.cols());
-  for (Index i = 0; i < x.cols(); ++i) {
-    const HistoryParameters point = parameters(x.col(i));
-    values[i] = model_.log_likelihood(point.setting, std::log(point.variance), point.t);
-  }
-  return values;
-}
-
-// d log sigma^2 / dx and d log t / dx of the maps in parameters(): with u uniform and x = Phi^-1(u), du / dx
-// is the normal density.
-VectorXd HistoryTarget::log_likelihood(const MatrixXd& x, MatrixXd& gradient) const {
-  const HistoryPriors& priors = model_.priors();
-  const Index first = 1 + priors.error.correlation_times.size();
-  gradient.setZero(x.rows(), x.cols());
-  VectorXd values(x.cols()), natural;
-  for (Index i = 0; i < x.cols(); ++i) {
-    const HistoryParameters point = parameters(x.col(i));
-    values[i] = model_.log_likelihood(point.setting, std::log(point.variance), point.t, &natural);
-    const double scaled = priors.noise_shape * priors.noise_sd * priors.noise_sd / point.variance;
-    gradient(0, i) = -natural[0] * normal_density(x(0, i)) /
-                     (scaled * boost::math::gamma_p_derivative(priors.noise_shape, scaled, DoublePolicy()));
-    for (std::size_t a = 0; a < active_.size(); ++a) {
-      const Index row = first + static_cast<Index>(a);
-      if (!(point.t[active_[a]] > 0)) continue;
-      const double root = std::sqrt(point.t[active_[a]]) / priors.amplitude;  // tan(pi u / 2)
-      gradient(row, i) = natural[1 + active_[a]] * normal_density(x(row, i)) / priors.inclusion * kPi *
-                         (1.0 + root * root) / root;
-    }
-  }
-  return values;
+  return out;
 }
 
 }  // namespace amiss

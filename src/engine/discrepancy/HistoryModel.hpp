@@ -1,8 +1,9 @@
 #pragma once
+#include <limits>
 #include <vector>
 
 #include "engine/Context.hpp"
-#include "engine/ais/Target.hpp"
+#include "engine/discrepancy/CoefficientLikelihood.hpp"
 #include "engine/error/ErrorModel.hpp"
 
 namespace amiss {
@@ -14,6 +15,9 @@ struct HistoryData {
   Eigen::MatrixXd responses;   ///< N x p: filter bank Phi; every column is centred and scaled here
   std::vector<int> condition;  ///< p: boundary condition of each column, 0 ... S-1
   TimeAxis axis;
+  /// Q x r: root L of the covariance L L' that the simulator's coefficients have under the priors of its
+  /// parameters: how far it can move. Only the reach of the discrepancy needs it.
+  Eigen::MatrixXd spread;
 
   int conditions() const;
   void check() const;
@@ -21,116 +25,120 @@ struct HistoryData {
 
 /// Priors of the history model.
 struct HistoryPriors {
-  double noise_sd = 1.0;     ///< stated standard deviation of the white noise
-  double noise_shape = 2.0;  ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
-  double inclusion = 0.2;    ///< probability that a condition drives the discrepancy at all; else t_s = 0
-  double amplitude = 1.0;    ///< scale of the half-Cauchy prior of sqrt(t_s), if it does
-  ErrorOptions error;        ///< grid of error settings, all equally probable before the data
+  double noise_sd = 1.0;            ///< stated standard deviation of the white noise
+  double noise_shape = 2.0;         ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
+  double discarded_variance = 0.0;  ///< of what the basis leaves out of a run, added to the white noise
+  double inclusion = 0.2;           ///< probability that a condition drives the discrepancy at all; else t_s = 0
+  double amplitude = 1.0;           ///< scale of the half-Cauchy prior of sqrt(t_s), if it does
+  ErrorOptions error;               ///< grid of error settings, all equally probable before the data
+  /// Grid of the discrepancy's reach kappa > 0, equally probable before the data; infinity: free.
+  std::vector<double> reach{std::numeric_limits<double>::infinity()};
 
   void check() const;
 };
 
-/// One error setting: everything that a likelihood needs, worked out once in a pass linear in N. With the
-/// whitener W of the setting, W K = O R (O orthonormal columns) and P = I - O O':
+/// One setting of error and reach: everything that a likelihood needs, worked out in a pass linear in N. With
+/// the whitener W of the error, B = [K, Psi], r0 = y - K w0:
 struct WhitenedData {
-  Eigen::MatrixXd gram;                 ///< Phi' W' P W Phi, p x p
-  Eigen::VectorXd cross;                ///< Phi' W' P W y, p
-  double square = 0.0;                  ///< y' W' P W y
-  double log_det = 0.0;                 ///< -1/2 log|H'CH|, C = (W'W)^-1, H the complement of K
-  Eigen::MatrixXd root;                 ///< R, Q x Q upper triangular
-  Eigen::VectorXd estimate;             ///< R^-1 O' W y: generalised least squares coefficients of y on K
-  Eigen::Index residual_dimension = 0;  ///< N - Q
+  Eigen::MatrixXd gram;          ///< B' W' W B, (Q + p) x (Q + p)
+  Eigen::VectorXd cross;         ///< B' W' W r0, Q + p
+  double square = 0.0;           ///< r0' W' W r0
+  double log_det = 0.0;          ///< log |W|
+  Eigen::Index size = 0;         ///< N
+  Eigen::Index coefficients = 0; ///< Q
+
+  /// The same with the coefficients written as w = w0 + shift + root a: K becomes K root, r0 becomes
+  /// r0 - K shift.
+  WhitenedData in_terms_of(const Eigen::VectorXd& shift, const Eigen::MatrixXd& root) const;
 };
 
-WhitenedData whiten(const HistoryData& data, const Eigen::VectorXd& correlation_times,
-                    const Eigen::VectorXd& ratios);
+/// A point of the history posterior in natural terms.
+struct HistoryParameters {
+  int setting = 0;        ///< index of the setting of error and reach
+  double variance = 1.0;  ///< sigma^2
+  Eigen::VectorXd t;      ///< S; 0 where a condition is left out
+};
 
-/// 1/2 log|K'K|, whatever the sizes of the columns.
-double log_volume(const Eigen::MatrixXd& basis);
-
-/// Discrepancy driven by the history of the boundary conditions,
-///     v ~ N(0, sum_s t_s Phi_s Phi_s' / p_s),  p_s columns of condition s,
-/// seen with an error of ErrorModel's kind, in the complement of the simulation space under the metric of
-/// that error. In whitened coordinates this is the paper's split: the part of y inside the simulation space,
-/// the generalised least squares coefficients, is independent of the part outside.
+/// The measured record in one covariance:
+///     y | w ~ N(K w, sigma^2 C + sum_s (t_s / p_s) Psi_s Psi_s'),   w ~ N(m, S) of a simulator or its emulator,
+/// C the covariance of an error of ErrorModel's kind, Psi_s the p_s filtered responses to condition s. Nothing
+/// is split off: the discrepancy lives in all directions, those of the simulator included, and how far it
+/// reaches into them is learned: with the covariance K L L' K' of the runs,
+///     Psi = (I + (K L L' K' / (kappa sigma_0^2))^2)^-1 Phi,   sigma_0 the stated noise,
+/// which takes out of Phi the directions in which the simulator moves by more than sqrt(kappa) sigma_0 (a sum
+/// over the record), leaves those in which it moves less, and is Phi itself for kappa = infinity. The square
+/// keeps weak directions out of it, so that how many vectors the basis has does not matter. The density is one of y as it stands: no basis is preferred, and its size is only a
+/// matter of accuracy.
 ///
-/// What lies outside is seen through H'y, H the orthonormal complement of K, which no error setting and no w
-/// changes: with C the covariance of the error for sigma = 1, H~ the complement of W K,
-///     H'y ~ N(0, H'(sigma^2 C + Phi D Phi')H),  H~'W y = A H'y,
-///     |A| = |H'CH|^(-1/2) = |W| |K'K|^(1/2) / |R|.
-/// The density of H'y times |K'K|^(-1/2) times that of the coefficients is the density of y. |A| must stand
-/// here: |W| alone would compare error settings by densities of different statistics.
+/// A value costs a Cholesky factor of the size Q + (columns of the conditions with t_s > 0), whatever N: with
+/// r = y - K m, D = diag(S, t_s / p_s) and F = I + D^1/2 B'W'W B D^1/2 / sigma^2,
+///     log|.| = N log sigma^2 - 2 log|W| + log|F|,
+///     quadratic form = (r'W'W r - b' F^-1 b / sigma^2) / sigma^2,   b = D^1/2 B'W'W r.
 class HistoryModel {
  public:
-  HistoryModel(HistoryData data, HistoryPriors priors, const Context& context);
+  /// @param only  settings that will be asked for; all if empty.
+  HistoryModel(HistoryData data, HistoryPriors priors, const Context& context, const std::vector<int>& only = {});
 
-  /// log density of H'y, the part of y outside the simulation space, given the error setting, log sigma^2 and
-  /// the t_s of the conditions (t_s = 0 leaves one out). The gradient is with respect to (log sigma^2, log
-  /// t_1
-  /// ... log t_S).
-  double log_likelihood(int setting, double log_variance, const Eigen::VectorXd& t,
-                        Eigen::VectorXd* gradient = nullptr) const;
+  /// log density of y given the setting, log sigma^2, the t_s of the conditions (t_s = 0 leaves one out), and
+  /// coefficients of the given mean and variances (Q each). The gradient is with respect to (log sigma^2,
+  /// log t_1 ... log t_S).
+  double log_likelihood(const HistoryParameters& point, const Eigen::VectorXd& mean,
+                        const Eigen::VectorXd& variance) const;
+  /// The same for coefficients that are standard normal in the terms of `whitened`.
   double log_likelihood(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t,
                         Eigen::VectorXd* gradient = nullptr) const;
 
-  /// Posterior mean of the coefficients of the (scaled) filter columns.
-  Eigen::VectorXd coefficients(const WhitenedData& whitened, double log_variance,
-                               const Eigen::VectorXd& t) const;
+  /// The same as a function of the coefficients, for one point: cheap where many are asked for.
+  CoefficientLikelihood given(const HistoryParameters& point) const;
 
-  /// Share of y outside the simulation space that the conditions with t_s > 0 explain, in the metric of the
-  /// error:
-  ///     1 - sigma^2 v'(H'AH)^-1 v / v'(H'CH)^-1 v,  v = H'y,  A = sigma^2 C + sum_s t_s Phi_s Phi_s' / p_s.
-  /// The numerator is the response fitted by the conditions times v, so that for white error this is
-  /// cov(response, y) / var(y). Between 0 and 1; never less for more conditions.
-  double explained(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t) const;
+  /// Posterior mean of the coefficients of the filter columns Psi (p).
+  Eigen::VectorXd coefficients(const HistoryParameters& point, const Eigen::VectorXd& mean,
+                               const Eigen::VectorXd& variance) const;
+
+  /// (y - K m)' (cov y)^-1 (y - K m) for coefficients that are standard normal in the terms of `whitened`.
+  double quadratic(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t) const;
+
+  /// log density of y for each run of the simulator itself (columns of `runs`, N x n) at its point; of these
+  /// points the variance holds no discarded part.
+  Eigen::VectorXd log_likelihood_of_runs(const std::vector<HistoryParameters>& points,
+                                         const Eigen::MatrixXd& runs, const Context& context) const;
+
+  /// The setting's Gram matrices for other responses (N x p) in place of the model's.
+  WhitenedData whiten(int setting, const Eigen::MatrixXd& responses) const;
+
+  /// X (Q x p) with Psi = Phi - K X: what the reach of a setting takes out of the responses.
+  Eigen::MatrixXd withheld(int setting) const { return withheld(reach_of(setting), data_.responses); }
 
   const HistoryData& data() const { return data_; }
   const HistoryPriors& priors() const { return priors_; }
-  const WhitenedData& whitened(int setting) const { return settings_[setting]; }
+  const WhitenedData& whitened(int setting) const { return settings_[static_cast<std::size_t>(setting)]; }
   int settings() const { return static_cast<int>(settings_.size()); }
+  int error_settings() const { return priors_.error.settings(); }
+  int error_of(int setting) const { return setting % error_settings(); }
+  double reach_of(int setting) const {
+    return priors_.reach[static_cast<std::size_t>(setting / error_settings())];
+  }
   int conditions() const { return conditions_; }
+  const Eigen::VectorXd& reference() const { return reference_; }       ///< w0: least squares of y on K
   const Eigen::VectorXd& columns_per_condition() const { return columns_; }
   const Eigen::RowVectorXd& centre() const { return centre_; }  ///< subtracted from each filter column
   const Eigen::RowVectorXd& scale() const { return scale_; }    ///< then divided by this
 
  private:
   struct Factor;
-  Factor factorise(const WhitenedData& whitened, double precision, const Eigen::VectorXd& t) const;
+  Factor factorise(const WhitenedData& whitened, double precision, const Eigen::VectorXd& t,
+                   const Eigen::VectorXd& root, const Eigen::VectorXd& cross) const;
+  Eigen::VectorXd shifted_cross(const WhitenedData& whitened, const Eigen::VectorXd& shift,
+                                double& square) const;
+  WhitenedData whiten_freely(int error, const Eigen::MatrixXd& responses) const;
+  Eigen::MatrixXd withheld(double reach, const Eigen::MatrixXd& responses) const;
 
   HistoryData data_;
   HistoryPriors priors_;
   int conditions_;
-  Eigen::VectorXd columns_;
+  Eigen::VectorXd columns_, norms_, reference_, residual_;
   Eigen::RowVectorXd centre_, scale_;
-  std::vector<WhitenedData> settings_;
-};
-
-/// A point of the history posterior in natural terms.
-struct HistoryParameters {
-  int setting = 0;        ///< index of the error setting
-  double variance = 1.0;  ///< sigma^2
-  Eigen::VectorXd t;      ///< S; 0 where a condition is left out
-};
-
-/// Posterior of the history model with some of its conditions active. Coordinates: sigma, one per error
-/// component, one per active condition, these in an order that hangs on their columns alone: conditions that
-/// are numbered otherwise are sampled by the same chains.
-class HistoryTarget : public Target {
- public:
-  HistoryTarget(const HistoryModel& model, std::vector<int> active);
-
-  Eigen::Index dimension() const override;
-  Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
-  /// The coordinates of the error's grid have gradient zero: the likelihood is constant between its jumps.
-  bool has_gradient() const override { return true; }
-  Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override;
-  HistoryParameters parameters(const Eigen::VectorXd& x) const;
-  const HistoryModel& model() const { return model_; }
-  const std::vector<int>& active() const { return active_; }  ///< condition of each of the last coordinates
-
- private:
-  const HistoryModel& model_;
-  std::vector<int> active_;
+  std::vector<WhitenedData> settings_;  // reach by reach, and for each error by error
 };
 
 }  // namespace amiss

@@ -7,9 +7,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "engine/ais/BridgedTarget.hpp"
 #include "engine/ais/ImportanceSample.hpp"
 #include "engine/ais/Sampler.hpp"
+#include "engine/ais/StandardNormal.hpp"
 #include "engine/discrepancy/LowRankKernel.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/MemoryPool.hpp"
@@ -23,9 +23,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kDof = 5.0;                   // of the mixture that one stage hands to the next
-constexpr int kComponents = 3;                 // of it
-constexpr int kRounds = 4, kRoundDraws = 200;  // that bring it closer to the stage's posterior
+constexpr Index kRoundDraws = 200;  // that bring a stage's mixture closer to its posterior, each round
 // Shares of a distribution's draws, in each direction, that skeletons serve.
 constexpr double kBulk = 0.9, kAll = 0.998;
 constexpr std::array<double, 3> kWide = {0.95, 0.98, 0.998};
@@ -154,14 +152,6 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
   }
 }
 
-// A mixture close to the posterior of `target`, of which these are draws.
-SkewedMixture fit_population(const Target& target, const MatrixXd& draws, const Context& context,
-                             Stream& stream, long& evaluations) {
-  const VectorXd weights = VectorXd::Constant(draws.cols(), 1.0 / static_cast<double>(draws.cols()));
-  return closer_mixture(target, SkewedMixture::fit(draws, weights, kComponents, kDof, stream), kRounds,
-                        kRoundDraws, kComponents, kDof, context, stream, evaluations);
-}
-
 // Where the posterior of this record lies, found by way of thinned ones.
 SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
                            const KernelSamplingOptions& sampling, const Context& context, long& evaluations) {
@@ -170,13 +160,14 @@ SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
   Stream stream(own.seed, kStage, 0);
   const KernelTarget target(model);
   if (model.size() <= sampling.coarsest)
-    return fit_population(target, sample_population(target, options, own, evaluations), own, stream,
-                          evaluations);
+    return closer_mixture(target,
+                          sample_population(target, StandardNormal(target.dimension()), options, own, evaluations),
+                          kRoundDraws, own, stream, evaluations);
   const SkewedMixture before =
       sample_stage(model.thinned(sampling.thinning), options, sampling, own, evaluations);
   const ApproximateTarget approximate(model, before, kCoarser * sampling.tolerance, context, stream);
-  const MatrixXd draws = sample_population(BridgedTarget(approximate, before), options, own, evaluations);
-  return fit_population(approximate, draws, own, stream, evaluations);
+  const MatrixXd draws = sample_population(approximate, before, options, own, evaluations);
+  return closer_mixture(approximate, draws, kRoundDraws, own, stream, evaluations);
 }
 
 }  // namespace
@@ -210,10 +201,7 @@ KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
   const SkewedMixture before = sample_stage(model, rough, sampling, context, sample.coarse);
   Stream stream(context.seed, kStage, 0);
   const ApproximateTarget approximate(model, before, sampling.tolerance, context, stream);
-  const BridgedTarget bridged(approximate, before);
-  AisResult& posterior = sample.posterior = sample_ais(bridged, own, context);
-  for (Index i = 0; i < posterior.log_likelihood.size(); ++i)  // as seen from the prior
-    posterior.log_likelihood[i] -= bridged.log_ratio(posterior.draws.col(i));
+  AisResult& posterior = sample.posterior = sample_ais(approximate, before, own, context);
   posterior.evaluations += sample.coarse;
   sample.direct = approximate.direct;
   sample.by_skeleton = approximate.by_skeleton;

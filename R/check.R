@@ -1,0 +1,94 @@
+# The simulator has the last word: the emulator's error where the posterior lies, seen by runs of the simulator at draws
+# of it or, for runs made elsewhere, by runs left out.
+
+largest_error_ratio <- 1 / 3  # of the noise: above it the emulator is not good enough
+largest_failed_share <- 0.2   # of the runs at posterior draws
+
+checked_by_runs <- function(fit, threads) {
+  if (fit$control$check == 0) return(fit)
+  if (is.null(fit$emulator$simulator)) {
+    fit$check <- check_by_left_out(fit)
+    return(fit)
+  }
+  exact <- fit$control$exact %||% default_exact(fit$emulator$simulator)
+  made <- posterior_runs(fit, max(fit$control$check, exact), threads)
+  fit$check <- emulation_check(fit, made)
+  if (exact > 0) fit <- exact_evidence(fit, made, threads)
+  fit
+}
+
+# Runs that cost milliseconds are made for the exact evidence too.
+default_exact <- function(simulator) if (inherits(simulator, "amiss_zone")) 200 else 0
+
+# Runs of the simulator at n draws spread evenly over the posterior: list(draws, values, unit, runs), failed ones left out.
+posterior_runs <- function(fit, n, threads) {
+  # In the order of a coordinate, so that draws of equal weight cover the posterior evenly.
+  order <- order(fit$values[, 1])
+  draws <- unique(order[systematic_draws(fit$weights[order], n)])
+  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate", threads))
+  failed <- colSums(!is.finite(runs)) > 0
+  if (mean(failed) > largest_failed_share) {
+    worst <- draws[failed][1]
+    abort_numerical(c("The simulator failed at {sum(failed)} of {length(draws)} draws of the posterior, more than {100 * largest_failed_share} %.",
+                      x = "The first is run {which(failed)[1]} at {paste(colnames(fit$values), signif(fit$values[worst, ], 4), sep = ' = ', collapse = ', ')}.",
+                      i = "Find out why it fails there, or narrow the priors."))
+  }
+  list(draws = draws[!failed], runs = runs[, !failed, drop = FALSE], failed = sum(failed))
+}
+
+# The check tells of failed runs itself.
+suppress_run_warnings <- function(code) withCallingHandlers(code, amiss_warning_input = function(w) rlang::cnd_muffle(w))
+
+emulation_check <- function(fit, made) {
+  emulator <- fit$emulator
+  w <- predict_emulator_(emulator$processes, posterior_unit(fit)[made$draws, , drop = FALSE])
+  error <- made$runs - tcrossprod(emulator$basis$vectors, w$mean)
+  new_check(fit, error, series_variance(emulator$basis, w$variance), made$failed, "runs of the simulator at posterior draws",
+            mean = rowMeans(made$runs))
+}
+
+# Leave-one-out errors of the runs nearest to the posterior's centre, in the unit cube.
+check_by_left_out <- function(fit) {
+  loo <- fit$emulator$left_out
+  if (is.null(loo)) return(NULL)
+  inputs <- fit$emulator$processes$inputs
+  centre <- colSums(fit$weights * posterior_unit(fit))
+  near <- order(rowSums(sweep(inputs, 2, centre)^2))[seq_len(min(nrow(inputs), max(20, ceiling(nrow(inputs) / 5))))]
+  error <- tcrossprod(fit$emulator$basis$vectors, loo$error[near, , drop = FALSE])
+  error <- sqrt(error^2 + fit$emulator$basis$discarded_sd^2)
+  new_check(fit, error, series_variance(fit$emulator$basis, loo$variance[near, , drop = FALSE]), 0, "runs left out, those nearest to the posterior")
+}
+
+new_check <- function(fit, error, variance, failed, by, mean = NULL) {
+  rms <- sqrt(mean(error^2))
+  noise <- min(fit$measurements$noise_sd, sqrt(sum(fit$weights * fit$posterior$variance)))
+  ratio <- rms / noise
+  passed <- ratio <= largest_error_ratio
+  told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by, format(signif(ratio, 2)),
+                  if (failed) sprintf(" (%d more failed)", failed) else "")
+  list(runs = ncol(error), failed = failed, error = rms, noise = noise, ratio = ratio, z2 = mean(error^2 / variance), effective = NA_real_,
+       passed = passed, verdict = if (passed) told else paste0(told, ", more than a third: it is not good enough"), mean = mean)
+}
+
+# Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior; with the simulator itself nothing is discarded.
+exact_evidence <- function(fit, made, threads) {
+  own <- made$draws
+  posterior <- fit$posterior
+  points <- list(setting = posterior$setting[own], variance = posterior$variance[own] - fit$priors$discarded_variance,
+                 t = posterior$t[own, , drop = FALSE])
+  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  exact <- call_engine(run_likelihood_(data, fit$priors, fit$emulator$processes, points, made$runs, engine_context(fit$seed, threads)))
+  log_ratio <- exact - posterior$log_likelihood[own]
+  ratio <- exp(log_ratio - max(log_ratio))
+  weights <- ratio / sum(ratio)
+  n <- length(ratio)
+  effective <- 1 / (n * sum(weights^2))
+  fit$check$effective <- effective
+  correction <- max(log_ratio) + log(mean(ratio))
+  error <- sqrt(max(0, 1 / effective - 1) / (n - 1))
+  fit$check$correction <- correction
+  fit$log_evidence <- fit$log_evidence + correction
+  fit$standard_error <- sqrt(fit$standard_error^2 + error^2)
+  fit$interval <- fit$interval + correction + c(-1.96, 1.96) * error
+  fit
+}

@@ -1,0 +1,42 @@
+#include "engine/discrepancy/CoefficientLikelihood.hpp"
+
+#include <limits>
+#include <utility>
+
+namespace amiss {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+CoefficientLikelihood::CoefficientLikelihood(VectorXd reference, MatrixXd information, VectorXd score,
+                                             double log_density)
+    : reference_(std::move(reference)),
+      information_(std::move(information)),
+      score_(std::move(score)),
+      log_density_(log_density) {}
+
+Eigen::LLT<MatrixXd> CoefficientLikelihood::factor(const VectorXd& root) const {
+  MatrixXd matrix = root.asDiagonal() * information_ * root.asDiagonal();
+  matrix.diagonal().array() += 1.0;
+  return Eigen::LLT<MatrixXd>(matrix);
+}
+
+double CoefficientLikelihood::log_density(const VectorXd& mean, const VectorXd& variance) const {
+  const VectorXd root = variance.cwiseSqrt(), d = mean - reference_;
+  const Eigen::LLT<MatrixXd> f = factor(root);
+  if (f.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
+  const VectorXd pulled = information_ * d, left = score_ - pulled;
+  const VectorXd half = f.matrixL().solve(root.cwiseProduct(left));
+  return log_density_ + d.dot(score_) - 0.5 * d.dot(pulled) - f.matrixLLT().diagonal().array().log().sum() +
+         0.5 * half.squaredNorm();
+}
+
+// A - A S^1/2 F^-1 S^1/2 A.
+MatrixXd CoefficientLikelihood::information(const VectorXd& variance) const {
+  const VectorXd root = variance.cwiseSqrt();
+  const Eigen::LLT<MatrixXd> f = factor(root);
+  const MatrixXd half = f.matrixL().solve(root.asDiagonal() * information_);
+  return information_ - half.transpose() * half;
+}
+
+}  // namespace amiss

@@ -1,0 +1,122 @@
+#include "engine/discrepancy/HistoryTarget.hpp"
+
+#include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cmath>
+#include <utility>
+
+#include "engine/linalg/constants.hpp"
+#include "engine/linalg/double_policy.hpp"
+#include "engine/linalg/precedes.hpp"
+#include "engine/random/transform.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+double clamp_unit(double u) { return std::min(std::max(u, 1e-12), 1.0 - 1e-12); }
+
+// Which of n equally probable levels a coordinate chooses.
+int level(double x, int n) { return std::min(n - 1, static_cast<int>(normal_cdf(x) * n)); }
+
+}  // namespace
+
+HistoryCoordinates::HistoryCoordinates(const HistoryModel& model, std::vector<int> active)
+    : model_(&model), active_(std::move(active)) {
+  const HistoryData& data = model.data();
+  const auto column = [&](int s) {
+    return data.responses.col(std::find(data.condition.begin(), data.condition.end(), s) -
+                              data.condition.begin());
+  };
+  std::stable_sort(active_.begin(), active_.end(),
+                   [&](int a, int b) { return precedes(column(a), column(b)); });
+}
+
+Index HistoryCoordinates::first_condition() const {
+  const HistoryPriors& priors = model_->priors();
+  return 1 + priors.error.correlation_times.size() + (priors.reach.size() > 1 ? 1 : 0);
+}
+
+double HistoryCoordinates::noise_variance(double x) const {
+  const HistoryPriors& priors = model_->priors();
+  const double scaled = boost::math::gamma_p_inv(priors.noise_shape, clamp_unit(normal_cdf(x)), DoublePolicy());
+  return priors.noise_shape * priors.noise_sd * priors.noise_sd / scaled;
+}
+
+HistoryParameters HistoryCoordinates::parameters(const Eigen::Ref<const VectorXd>& x) const {
+  const HistoryPriors& priors = model_->priors();
+  HistoryParameters point;
+  point.variance = noise_variance(x[0]) + priors.discarded_variance;
+  const Index components = priors.error.correlation_times.size();
+  const int levels = static_cast<int>(priors.error.ratios.size());
+  const int reaches = static_cast<int>(priors.reach.size());
+  if (reaches > 1) point.setting = level(x[1 + components], reaches);
+  for (Index k = components - 1; k >= 0; --k) point.setting = point.setting * levels + level(x[1 + k], levels);
+  point.t = VectorXd::Zero(model_->conditions());
+  const Index first = first_condition();
+  for (std::size_t a = 0; a < active_.size(); ++a) {
+    // The lower part of the unit interval is the spike at zero; the likelihood is continuous where the slab
+    // begins.
+    const double u =
+        (normal_cdf(x[first + static_cast<Index>(a)]) - (1.0 - priors.inclusion)) / priors.inclusion;
+    if (u > 0) point.t[active_[a]] = std::pow(priors.amplitude * std::tan(0.5 * kPi * clamp_unit(u)), 2);
+  }
+  return point;
+}
+
+// d log sigma^2 / dx and d log t / dx of the maps in parameters(): with u uniform and x = Phi^-1(u), du / dx
+// is the normal density.
+VectorXd HistoryCoordinates::gradient(const Eigen::Ref<const VectorXd>& x, const HistoryParameters& point,
+                                      const VectorXd& natural) const {
+  const HistoryPriors& priors = model_->priors();
+  VectorXd out = VectorXd::Zero(x.size());
+  const double noise = noise_variance(x[0]);
+  const double scaled = priors.noise_shape * priors.noise_sd * priors.noise_sd / noise;
+  out[0] = -natural[0] * noise / point.variance * normal_density(x[0]) /
+           (scaled * boost::math::gamma_p_derivative(priors.noise_shape, scaled, DoublePolicy()));
+  const Index first = first_condition();
+  for (std::size_t a = 0; a < active_.size(); ++a) {
+    const Index row = first + static_cast<Index>(a);
+    if (!(point.t[active_[a]] > 0)) continue;
+    const double root = std::sqrt(point.t[active_[a]]) / priors.amplitude;  // tan(pi u / 2)
+    out[row] = natural[1 + active_[a]] * normal_density(x[row]) / priors.inclusion * kPi *
+               (1.0 + root * root) / root;
+  }
+  return out;
+}
+
+HistoryTarget::HistoryTarget(const HistoryModel& model, std::vector<int> active,
+                             const GaussianSimulator& simulator)
+    : coordinates_(model, std::move(active)) {
+  const VectorXd shift = simulator.mean - model.reference();
+  for (int g = 0; g < model.settings(); ++g)
+    settings_.push_back(model.whitened(g).in_terms_of(shift, simulator.root));
+}
+
+VectorXd HistoryTarget::log_likelihood(const MatrixXd& x) const {
+  VectorXd values(x.cols());
+  for (Index i = 0; i < x.cols(); ++i) {
+    const HistoryParameters point = coordinates_.parameters(x.col(i));
+    values[i] = coordinates_.model().log_likelihood(settings_[static_cast<std::size_t>(point.setting)],
+                                                    std::log(point.variance), point.t);
+  }
+  return values;
+}
+
+VectorXd HistoryTarget::log_likelihood(const MatrixXd& x, MatrixXd& gradient) const {
+  gradient.resize(x.rows(), x.cols());
+  VectorXd values(x.cols()), natural;
+  for (Index i = 0; i < x.cols(); ++i) {
+    const HistoryParameters point = coordinates_.parameters(x.col(i));
+    values[i] = coordinates_.model().log_likelihood(settings_[static_cast<std::size_t>(point.setting)],
+                                                    std::log(point.variance), point.t, &natural);
+    gradient.col(i) = coordinates_.gradient(x.col(i), point, natural);
+  }
+  return values;
+}
+
+}  // namespace amiss

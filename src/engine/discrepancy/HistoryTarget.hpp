@@ -1,0 +1,54 @@
+#pragma once
+#include "engine/ais/Target.hpp"
+#include "engine/discrepancy/HistoryModel.hpp"
+
+namespace amiss {
+
+/// The sampler's coordinates of error and discrepancy, x ~ N(0, I): sigma, one for each component of the
+/// error, one for the reach if there is a choice, one for each active condition, these in an order that hangs
+/// on their columns alone: conditions that are numbered otherwise are sampled by the same chains.
+class HistoryCoordinates {
+ public:
+  HistoryCoordinates(const HistoryModel& model, std::vector<int> active);
+
+  Eigen::Index dimension() const { return first_condition() + static_cast<Eigen::Index>(active_.size()); }
+  HistoryParameters parameters(const Eigen::Ref<const Eigen::VectorXd>& x) const;
+  /// Gradient with respect to x of a function with gradient `natural` with respect to (log sigma^2, log t_1 ...
+  /// log t_S). The coordinates of the grid have gradient zero: the function is constant between its jumps.
+  Eigen::VectorXd gradient(const Eigen::Ref<const Eigen::VectorXd>& x, const HistoryParameters& point,
+                           const Eigen::VectorXd& natural) const;
+  const HistoryModel& model() const { return *model_; }
+  const std::vector<int>& active() const { return active_; }  ///< condition of each of the last coordinates
+
+ private:
+  Eigen::Index first_condition() const;
+  double noise_variance(double x) const;
+
+  const HistoryModel* model_;
+  std::vector<int> active_;
+};
+
+/// A simulator seen as a Gaussian: its coefficients are w = mean + root a, a ~ N(0, I).
+struct GaussianSimulator {
+  Eigen::VectorXd mean;  ///< Q
+  Eigen::MatrixXd root;  ///< Q x r
+};
+
+/// Posterior of error and discrepancy when the simulator is a Gaussian: closed in the parameters, so that a
+/// value is a matter of microseconds.
+class HistoryTarget : public Target {
+ public:
+  HistoryTarget(const HistoryModel& model, std::vector<int> active, const GaussianSimulator& simulator);
+
+  Eigen::Index dimension() const override { return coordinates_.dimension(); }
+  Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
+  bool has_gradient() const override { return true; }
+  Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override;
+  HistoryParameters parameters(const Eigen::VectorXd& x) const { return coordinates_.parameters(x); }
+
+ private:
+  HistoryCoordinates coordinates_;
+  std::vector<WhitenedData> settings_;  // in terms of the simulator's a
+};
+
+}  // namespace amiss
