@@ -16,8 +16,8 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'
 #' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior. The
 #' emulator's error there, over the noise (the stated one or, if lower, the one seen), is the check that counts: above a third,
-#' neither the posterior nor the evidence is trusted ([calibrate_refined()] then adds these runs and tries again). With `exact`
-#' draws, the evidence is corrected by the likelihoods of the runs themselves. For an ensemble made elsewhere the
+#' neither the posterior nor the evidence is trusted ([calibrate_refined()] then adds these runs and tries again). The likelihoods of `exact`
+#' such runs correct the evidence, so that it is the simulator's own. For an ensemble made elsewhere the
 #' check uses runs left out one by one, the fifth (at least 20) that lie nearest to the posterior.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
@@ -27,8 +27,8 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   half-Cauchy prior of the discrepancy's standard deviation if it does, in the target's unit; default the noise), `reach`
 #'   (see *Model*), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
 #'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept
-#'   for the discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (how many of
-#'   them correct the evidence; 0, or 200 for a [zone()]), and `ais`, a list for the sampler (`pilot_chains`,
+#'   for the discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (runs
+#'   that correct the evidence; default those of the check, 200 for a [zone()]; 0 for none), and `ais`, a list for the sampler (`pilot_chains`,
 #'   `groups`, `chains`, `sweeps`, `ess_drop`, `resample`, `importance_draws`, `max_components`).
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
@@ -38,10 +38,15 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   emulator's own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and `verdict`.
 #' @export
 calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
-  rows <- emulated_rows(emulator, measurements)
+  calibrate_with_runs(emulator, measurements, control, seed, threads)$fit
+}
+
+# The calibration, and the runs of the simulator at its draws.
+calibrate_with_runs <- function(emulator, measurements, control, seed, threads, call = rlang::caller_env()) {
+  rows <- emulated_rows(emulator, measurements, call)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  control <- fill_calibration_control(control, measurements, length(rows))
+  control <- fill_calibration_control(control, measurements, length(rows), call)
   data <- history_data(emulator, measurements, rows, control)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
                  discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion, amplitude = control$amplitude,
@@ -57,9 +62,9 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
                         reach = stats::setNames(result$reach, format(control$reach)),
                         log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
                         interval = posterior$interval), class = "amiss_calibration")
-  fit <- checked_by_runs(fit, threads)
-  fit$trust <- fit_trust(fit)
-  fit
+  checked <- checked_by_runs(fit, threads)
+  checked$fit$trust <- fit_trust(checked$fit)
+  checked
 }
 
 # The calibration rows, which must be those that the emulator was trained on.

@@ -4,21 +4,22 @@
 largest_error_ratio <- 1 / 3  # of the noise: above it the emulator is not good enough
 largest_failed_share <- 0.2   # of the runs at posterior draws
 
+# list(fit, made): the fit with its check, and the runs (NULL where none were made).
 checked_by_runs <- function(fit, threads) {
-  if (fit$control$check == 0) return(fit)
+  if (fit$control$check == 0) return(list(fit = fit, made = NULL))
   if (is.null(fit$emulator$simulator)) {
     fit$check <- check_by_left_out(fit)
-    return(fit)
+    return(list(fit = fit, made = NULL))
   }
-  exact <- fit$control$exact %||% default_exact(fit$emulator$simulator)
+  exact <- fit$control$exact %||% default_exact(fit)
   made <- posterior_runs(fit, max(fit$control$check, exact), threads)
   fit$check <- emulation_check(fit, made)
   if (exact > 0) fit <- exact_evidence(fit, made, threads)
-  fit
+  list(fit = fit, made = made)
 }
 
-# Runs that cost milliseconds are made for the exact evidence too.
-default_exact <- function(simulator) if (inherits(simulator, "amiss_zone")) 200 else 0
+# The runs of the check serve the exact evidence; where they cost milliseconds, more are made for it.
+default_exact <- function(fit) if (inherits(fit$emulator$simulator, "amiss_zone")) max(200, fit$control$check) else fit$control$check
 
 # Runs of the simulator at n draws spread evenly over the posterior: list(draws, values, unit, runs), failed ones left out.
 posterior_runs <- function(fit, n, threads) {
@@ -85,7 +86,10 @@ exact_evidence <- function(fit, made, threads) {
   effective <- 1 / (n * sum(weights^2))
   fit$check$effective <- effective
   correction <- max(log_ratio) + log(mean(ratio))
-  error <- sqrt(max(0, 1 / effective - 1) / (n - 1))
+  # Where few draws carry the weight, the mean of the ratios is too low; by their first two moments it is that of lognormal
+  # ones. How far the two are apart is part of the error.
+  lognormal <- mean(log_ratio) + stats::var(log_ratio) / 2
+  error <- sqrt(max(0, 1 / effective - 1) / (n - 1) + (correction - lognormal)^2)
   fit$check$correction <- correction
   fit$log_evidence <- fit$log_evidence + correction
   fit$standard_error <- sqrt(fit$standard_error^2 + error^2)

@@ -227,7 +227,6 @@ model_doubts <- function(model) {
   noise <- fit$measurements$noise_sd
   beside <- function(size) sprintf("%s beside a noise of %s %s", short(size), short(noise), pretty_unit(fit$measurements$unit))
   c(if (!fit$trust$trusted) sprintf("the evidence is rough (%s).", fit$trust$verdict),
-    if (misses_inside(fit)) "even the best parameters miss the measurements by more than the noise allows; do not trust them.",
     if (emulator$basis$discarded_rms > 0.5 * noise) {
       sprintf("the basis is coarse; what it leaves out of the runs (%s) looks like discrepancy.", beside(emulator$basis$discarded_rms))
     },

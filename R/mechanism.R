@@ -46,12 +46,28 @@ print.amiss_catalogue <- function(x, ...) {
   invisible(x)
 }
 
-extend <- function(simulator, mechanism, call = rlang::caller_env()) {
+# The extended simulator. An edit may replace parameters of the base model, but not drop what was adopted.
+extend <- function(simulator, mechanism, adopted = character(), call = rlang::caller_env()) {
   extended <- tryCatch(mechanism$edit(simulator), error = function(e) {
     abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"), call = call)
   })
   if (!inherits(extended, class(simulator)[1])) {
     abort_input("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not a simulator.", call = call)
   }
+  lost <- setdiff(adopted, names(free_parameters(extended)))
+  if (length(lost)) {
+    abort_input(c("Mechanism {.val {mechanism$name}} drops {cli::qty(lost)}the parameter{?s} {.val {lost}} of a mechanism that was adopted before.",
+                  i = "Let its {.code edit} extend the model that it is given, instead of making it anew."), call = call)
+  }
   extended
+}
+
+# A mechanism whose driver is not analysed can be adopted, but no condition can speak for it.
+warn_absent_drivers <- function(catalogue, measurements) {
+  for (entry in catalogue) {
+    absent <- setdiff(entry$boundary, measurements$conditions)
+    if (!length(absent)) next
+    warn_input(c("Mechanism {.val {entry$name}} is driven by {.val {absent}}, which {?is/are} not among the boundary conditions analysed ({.val {measurements$conditions}}).",
+                 i = "Name {?it/them} in {.arg boundary} of {.fun measurements}, so that the discrepancy can answer to {?it/them}."))
+  }
 }

@@ -269,7 +269,7 @@ figure_fit <- function(upgrade) {
 }
 
 attribution_title <- function(attributions) {
-  named <- lapply(attributions, function(a) a$table$boundary[a$table$significant])
+  named <- lapply(attributions, function(a) significant_conditions(a$table))
   if (length(named) < 2) return(paste("The error that no parameter can remove follows", listed(named[[1]], none = "no boundary condition")))
   if (!length(named[[1]]) && !length(named[[2]])) return("The remaining error follows no boundary condition, neither before nor after")
   sprintf("Before, the remaining error follows %s; after the change it follows %s", listed(named[[1]]), listed(named[[2]]))
@@ -354,9 +354,8 @@ parameter_rows <- function(fit) {
     limit <- prior_quantile(p$prior, u)
     if (is.finite(limit)) limit else prior_quantile(p$prior, fallback)
   }, 0)
-  place <- mapply(function(p, x) prior_cdf(p$prior, x), declared, table$median)
   cbind(table, label = vapply(declared, `[[`, "", "label"), prior_lower = side(0, 0.001), prior_upper = side(1, 0.999),
-        at_edge = place < 0.05 | place > 0.95)
+        at_edge = unname(edge_of_prior(fit)[table$name]))
 }
 
 parameters_title <- function(table) {

@@ -6,6 +6,8 @@
 #' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both.
 #' @param draws Number of posterior draws.
+#' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as it was seen in calibration
+#'   ([discrepancy()]). Where its reach is limited, the runs of the ensemble are made again at the rows asked for.
 #' @inheritParams calibrate
 #' @param ... Not used.
 #' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (band of new measurements), and
@@ -30,7 +32,35 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
   runs <- simulate_measured(simulator, object$values[picked, , drop = FALSE], m, use, threads)
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
   if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
-  with_seed(seed, summarise_prediction(m, rows, runs, error_sd(object)))
+  sd <- error_sd(object)
+  if (discrepancy) {
+    carried <- carried_response(object, use, threads)
+    runs <- runs + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(runs)), drop = FALSE]
+    sd <- carried$sd
+  }
+  with_seed(seed, summarise_prediction(m, rows, runs, sd))
+}
+
+# The lacking response at the rows of these uses (rows x kept draws), and what it leaves in calibration.
+carried_response <- function(fit, use, threads) {
+  if (!inherits(fit, "amiss_calibration")) abort_input("{.arg discrepancy} needs a fit of {.fun calibrate}: that of the paper does not carry over to other rows.")
+  m <- fit$measurements
+  rows <- which(m$use %in% use & !is.na(m$y))
+  responses <- filter_responses(m, fit$control$time_constants)
+  basis <- if (any(fit$withheld != 0)) basis_at(fit, use, threads) else matrix(0, length(rows), nrow(fit$withheld))
+  seen <- lacking_response(fit, responses[fit$rows, , drop = FALSE], fit$emulator$basis$vectors)
+  left <- stats::residuals(fit) - rowMeans(seen)
+  list(response = lacking_response(fit, responses[rows, , drop = FALSE], basis),
+       sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
+}
+
+# The basis vectors at other rows: the same combinations of the ensemble's runs.
+basis_at <- function(fit, use, threads) {
+  emulator <- fit$emulator
+  w <- emulator$processes$coefficients
+  last <- ncol(w)
+  runs <- simulate_measured(emulator$simulator, unit_to_values(emulator$processes$inputs, emulator$parameters), fit$measurements, use, threads)
+  cbind(sweep(runs, 2, w[, last]) %*% w[, -last, drop = FALSE], 1)
 }
 
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy

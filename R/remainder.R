@@ -56,15 +56,15 @@ daily_share <- function(r, hours, clock) {
 
 # TRUE where a drift (a parabola in time) on top of the base model, its parameters adapted to first order, fits the calibration
 # record about as well as the extended model: no decisive difference of likelihoods (white error, a BIC's price for the drift).
-drift_rivals <- function(upgrade) {
-  base <- upgrade$models[[1]]
-  hours <- upgrade$measurements$hours[base$fit$rows]
+drift_rivals <- function(models, measurements, control) {
+  base <- models[[1]]
+  hours <- measurements$hours[base$fit$rows]
   if (length(hours) < 10) return(FALSE)
   n <- length(hours)
   drifted <- stats::lm.fit(cbind(1, output_slopes(base$fit), stats::poly(hours, 2)), calibration_residual(base))$residuals
-  extended <- calibration_residual(upgrade$models[[length(upgrade$models)]])
+  extended <- calibration_residual(models[[length(models)]])
   if (!sum(extended^2) > 0) return(FALSE)
-  0.5 * n * log(sum(drifted^2) / sum(extended^2)) + log(n) < upgrade$control$decisive * log(10)
+  0.5 * n * log(sum(drifted^2) / sum(extended^2)) + log(n) < control$decisive * log(10)
 }
 
 calibration_residual <- function(model) {

@@ -40,64 +40,60 @@ first_trials <- function(upgrade) {
 
 last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$attribution$table
 
-# A cause is named outright when it holds at least 95 % of the probability among all that was tried, when its estimate
-# is sound or decisive even at its lower end, when data held out do not speak against it, and when little is left of
-# what it is to explain.
+# The verdict on the whole: what of the mechanisms adopted is named, or what stays open.
 diagnosis_verdict <- function(upgrade) {
-  cause <- upgrade$named_cause
-  if (is.null(cause)) {
-    answers <- significant_conditions(last_attribution(upgrade))
-    if (length(answers)) {
-      return(list(verdict = "unexplained", tag = "Unexplained",
-                  headline = sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.", listed(answers))))
-    }
-    remainder <- remaining_error(upgrade$models[[1]], upgrade$measurements)
-    if (remainder$large) {
-      return(list(verdict = "unexplained", tag = "Unexplained",
-                  headline = sprintf("Something is missing from the model that no mechanism of the catalogue explains: its error is %s times the stated noise; %s.",
-                                     short(remainder$ratio), remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
-    }
-    if (misses_inside(upgrade$models[[1]]$fit)) {
-      return(list(verdict = "unexplained", tag = "Unexplained",
-                  headline = "Something is missing from the model that no mechanism of the catalogue explains: even the best parameters miss the measurements by more than the noise allows."))
-    }
-    return(list(verdict = "nothing", tag = "Nothing decisive",
-                headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition."))
+  adopted <- adopted_models(upgrade)
+  if (!length(adopted)) return(open_verdict(upgrade))
+  of <- function(verdict) Filter(function(m) m$verdict == verdict, adopted)
+  headline <- cause_headline(upgrade)
+  if (length(of("named"))) {
+    return(list(verdict = "named", tag = if (length(of("named")) > 1) "Causes named" else "Cause named", headline = headline))
   }
-  doubts <- cause_doubts(upgrade)
-  if (!length(doubts)) return(list(verdict = "named", tag = if (length(upgrade$models) > 2) "Causes named" else "Cause named", headline = cause_headline(upgrade)))
-  list(verdict = "likely", tag = paste("Likely cause, but", paste(doubts, collapse = "; ")), headline = paste("Most likely:", cause_headline(upgrade)))
+  likely <- of("likely")
+  if (length(likely)) {
+    return(list(verdict = "likely", tag = paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; ")), headline = headline))
+  }
+  list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
 }
 
-# The sentences of all mechanisms adopted.
+open_verdict <- function(upgrade) {
+  unexplained <- function(headline) list(verdict = "unexplained", tag = "Unexplained", headline = headline)
+  base <- upgrade$models[[1]]
+  answers <- significant_conditions(base$attribution$table)
+  if (length(answers)) {
+    return(unexplained(sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.", listed(answers))))
+  }
+  remainder <- remaining_error(base, upgrade$measurements)
+  if (remainder$large) {
+    return(unexplained(sprintf("Something is missing from the model that no mechanism of the catalogue explains: its error is %s times the stated noise; %s.",
+                               short(remainder$ratio), remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
+  }
+  if (!base$fit$trust$trusted) {
+    return(list(verdict = "nothing", tag = "Nothing decisive, but the numbers are not trusted",
+                headline = paste0("No mechanism is called for, but the numbers behind this are not to be trusted: ", base$fit$trust$verdict, ".")))
+  }
+  list(verdict = "nothing", tag = "Nothing decisive",
+       headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition.")
+}
+
+# The sentences of all mechanisms adopted, each as firmly as its verdict allows.
 cause_headline <- function(upgrade) {
-  told <- vapply(adopted_models(upgrade), function(m) upgrade$catalogue[[m$mechanism]]$sentence, "")
-  paste(c(told[1], if (length(told) > 1) paste("Also:", told[-1])), collapse = " ")
+  adopted <- adopted_models(upgrade)
+  sentence <- function(m) upgrade$catalogue[[m$mechanism]]$sentence
+  adopted <- adopted[order(match(vapply(adopted, `[[`, "", "verdict"), c("named", "likely", "stand-in")))]
+  told <- vapply(seq_along(adopted), function(k) {
+    m <- adopted[[k]]
+    switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
+           likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
+           paste0("\"", m$mechanism, "\" fits too, but data held out do not gain by it: take it as a stand-in for something else."))
+  }, "")
+  paste(told, collapse = " ")
 }
 
-cause_doubts <- function(upgrade) {
-  best <- first_trials(upgrade)[1, ]
-  rough <- !(best$trusted && upgrade$models[[1]]$fit$trust$trusted)
-  c(if (best$probability < 0.95) "other causes are possible",
-    if (rough && best$lower95 < upgrade$control$decisive) "its odds are only rough",
-    if (!improves_held_out(upgrade)) "held-out data do not confirm it",
-    if (much_remains(upgrade)) "a good part of the error remains",
-    if (misses_inside(upgrade$models[[length(upgrade$models)]]$fit)) "even the extended model cannot follow the measurements",
-    if (drift_rivals(upgrade)) "a drifting sensor would explain the error as well")
-}
-
-# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The mechanism
-# that made the error leaves nothing; one that imitates it does.
-much_remains <- function(upgrade) {
-  ends <- lapply(upgrade$models[c(1, length(upgrade$models))], remaining_error, upgrade$measurements)
-  excess <- vapply(ends, function(e) e$ratio^2 - 1, 0)
-  ends[[2]]$large && excess[2] > 0.1 * excess[1]
-}
-
-# FALSE where data were held out and the change does not lower their error by at least 3 %.
+# TRUE where no data were held out, or the changes as a whole lower their error by more than its own error.
 improves_held_out <- function(upgrade) {
-  held <- score_of(upgrade, "validate", "rmse")
-  length(held) < 2 || anyNA(held) || held[2] <= 0.97 * held[1]
+  last <- upgrade$models[[length(upgrade$models)]]
+  !isFALSE(held_out_gain(upgrade$models[[1]], last)$improves)
 }
 
 # 10^x written out while it can be read.
@@ -185,11 +181,38 @@ change_sentences <- function(upgrade) {
   adopted <- adopted_models(upgrade)
   if (!length(adopted)) return("Nothing: the base model stays as it is.")
   trials <- upgrade$candidates
-  vapply(adopted, function(model) {
+  unlist(lapply(adopted, function(model) {
     row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
     entry <- upgrade$catalogue[[model$mechanism]]
-    sprintf("%s, driven by %s: %s Evidence %s, odds of %s.", model$mechanism, listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf))
-  }, "")
+    c(sprintf("%s (%s), driven by %s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf)),
+      step_sentence(upgrade, model), doubt_sentence(model), confounded_sentence(model))
+  }))
+}
+
+# What one step brought.
+step_sentence <- function(upgrade, model) {
+  parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
+  unit <- upgrade$measurements$unit
+  told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
+  gain <- model$held_out_gain
+  sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
+          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s the uncertainty of that change", told("validate"),
+                                                    if (gain$improves) "more than" else "not more than"))
+}
+
+doubt_sentence <- function(model) {
+  if (length(model$doubts)) sprintf("Against %s speaks that %s.", model$mechanism, listed(model$doubts))
+}
+
+confounded_sentence <- function(model) {
+  if (length(model$confounded_with)) {
+    sprintf("What %s does, %s could do in part as well (correlated beyond 0.4).", model$mechanism, listed(parameter_labels(model$fit, model$confounded_with)))
+  }
+}
+
+parameter_labels <- function(fit, names) {
+  rows <- parameter_rows(fit)
+  rows$label[match(names, rows$name)]
 }
 
 # The parameters that each adopted mechanism brought, as the last model sees them.
@@ -235,11 +258,17 @@ remaining_sentences <- function(upgrade) {
     if (last$large) sprintf("In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
                             if (is.null(last$pattern)) ": either the stated noise is too small, or something else is missing."
                             else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    if (misses_inside(upgrade$models[[length(upgrade$models)]]$fit)) "Even with the best parameters the simulation misses the measurements by more than the noise allows, in what the parameters do influence. Something is still missing, and the parameters have taken values that partly hide it: do not read them as physical.",
+    reach_sentence(upgrade$models[[length(upgrade$models)]]$fit), group_words(upgrade$models[[length(upgrade$models)]]$attribution),
     if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these parameters make up for something else.", listed(edge))
     else "No parameter is at the edge of its range.",
     sprintf("The search stopped because %s%s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
             if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))
+}
+
+# What the reach of the discrepancy says of the last model.
+reach_sentence <- function(fit) {
+  free <- sum(fit$reach[is.infinite(fit$control$reach)])
+  if (length(fit$reach) > 1 && free > 0.9) "What remains reaches into what the parameters can do: they may hide a part of it, so do not read their values as physical."
 }
 
 scores_table <- function(upgrade) {
@@ -277,12 +306,12 @@ method_table <- function(upgrade) {
     c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
       paste(short(fit$measurements$noise_sd), unit), paste(short(fit$emulator$basis$discarded_rms), unit),
       paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ", signed(fit$interval[2] / log(10)), ")"),
-      fit$trust$verdict)
+      fit$check$verdict %||% "not checked", fit$trust$verdict)
   }
   columns <- lapply(upgrade$models, value)
   names(columns) <- vapply(upgrade$models, `[[`, "", "name")
   cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M", "stated measurement noise",
-                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)", "sampler"),
+                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)", "emulator", "trust"),
         as.data.frame(columns, optional = TRUE))
 }
 

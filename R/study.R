@@ -193,11 +193,14 @@ result_list.amiss_upgrade <- function(x) {
     list(name = model$name, parent = model$parent, mechanism = model$mechanism, Q = ncol(fit$emulator$basis$vectors),
          N = length(fit$rows), M = nrow(fit$emulator$processes$inputs), noise_sd = fit$measurements$noise_sd,
          discarded_rms = fit$emulator$basis$discarded_rms, log10_evidence = fit$log_evidence / log(10),
-         log10_evidence_interval = fit$interval / log(10), trusted = fit$trust$trusted, verdict = fit$trust$verdict,
+         log10_evidence_interval = fit$interval / log(10), trusted = fit$trust$trusted, trust = fit$trust$verdict,
+         verdict = model$verdict, doubts = as.list(model$doubts), confounded_with = as.list(model$confounded_with),
+         held_out_gain = model$held_out_gain[c("mean", "standard_error")], emulator_error = fit$check$error, emulator_ratio = fit$check$ratio,
+         emulator_checked = fit$check$passed, refinements = fit$rounds, reach = as.list(fit$reach),
          rmse_calibration = model$scores$calibrate[["rmse"]], rmse_validation = model$scores$validate[["rmse"]],
          coverage95_validation = model$scores$validate[["coverage95"]], crps_calibration = model$scores$calibrate[["crps"]],
          crps_validation = model$scores$validate[["crps"]], parameters = table_rows(parameter_table(fit)),
-         attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")]))
+         attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group")]))
   }
   candidate_list <- function(i) {
     row <- x$candidates[i, ]

@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
+upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 2, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
@@ -9,7 +9,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, emulator = 
 #'
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the parameters,
 #' two thirds of all, and compared with the present model calibrated in the same way; then in full, with the other runs made
-#' where the coarse posterior lies ([refine_ensemble()]), those that could come within `margin` of the best, if any could come
+#' where the coarse posterior lies ([refine_ensemble()]) and the emulator checked by runs of the simulator and refined
+#' ([calibrate_refined()]), those that could come within `margin` of the best, if any could come
 #' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and by what its
 #' annealed estimate lags behind the second one. Candidates that stay behind keep their coarse Bayes factor;
 #' `candidates$screened` says which.
@@ -19,7 +20,7 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, emulator = 
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
-#'   none), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#'   none), `rounds` (of refinement where the check by runs fails; 2), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
@@ -27,7 +28,10 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, emulator = 
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
 #' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried, the
-#'   named cause, the gain, and why the loop stopped.
+#'   named cause, the gain, and why the loop stopped. Each model that adopted a mechanism has a `verdict` of its own: `"named"`; `"likely"`,
+#'   where something of its `doubts` speaks against it; or `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its
+#'   standard error): then it takes the place of something else. `confounded_with` names parameters that are correlated beyond
+#'   0.4 with those that it brought: other parts of the model that could do the same.
 #' @export
 upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1, quiet = FALSE,
                           checkpoint = NULL) {
@@ -38,12 +42,14 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   check_input(checkmate::check_count(control$max_steps), "control$max_steps")
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
   check_input(checkmate::check_number(control$refine, lower = 0, upper = 0.8), "control$refine")
+  check_input(checkmate::check_count(control$rounds), "control$rounds")
   check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin")
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
   check_enough_runs(runs - round(control$refine * runs), length(free_parameters(simulator)), of = runs)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
+  warn_absent_drivers(catalogue, measurements)
   say <- progress(quiet)
 
   settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
@@ -64,6 +70,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
       break
     }
     ordered <- trial_order(catalogue[left], current$attribution)
+    settings$adopted <- setdiff(names(current$fit$emulator$parameters), names(models[[1]]$fit$emulator$parameters))
     trials <- try_mechanisms(current, catalogue[ordered], settings, say)
     candidates <- rbind(candidates, trials$table)
     best <- which.max(trials$table$log10_bf)
@@ -78,6 +85,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     models <- c(models, list(current))
   }
   say("Stopped: {stopped}")
+  models <- judge_models(models, candidates, catalogue, measurements, control)
   structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
                  named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models), stopped_because = stopped,
                  measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
@@ -93,23 +101,30 @@ first_runs <- function(simulator, runs, settings) {
   simulate_design(simulator, settings$measurements, runs, seed = settings$seed, threads = settings$threads)
 }
 
-fit_runs <- function(ensemble, settings, calibration = settings$control$calibration) {
-  calibrate_runs(train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads), settings, calibration)
-}
-
-calibrate_runs <- function(emulator, settings, calibration = settings$control$calibration) {
+# By calibrate() with refinements where its check by runs fails; calibrate_paper() has none.
+fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, rounds = settings$control$rounds) {
+  if (identical(settings$calibrate, calibrate)) {
+    return(calibrate_refined(ensemble, settings$measurements, rounds %||% upgrade_control$rounds,
+                             list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration)),
+                             seed = settings$seed, threads = settings$threads))
+  }
+  emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
   settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
 }
 
-# The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them.
+# The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
+# draws tell how far its evidence is off, and correct it.
 screen_model <- function(simulator, name, settings) {
-  calibration <- settings$control$calibration
+  calibration <- as.list(settings$control$calibration)
   calibration$ais <- utils::modifyList(as.list(calibration$ais), as.list(settings$control$screening %||% upgrade_control$screening))
+  if (is.null(calibration$check) || calibration$check > screening_runs) calibration$check <- calibration$exact <- screening_runs
   settings$keep(list("coarse", name, plain(simulator)), {
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
-    list(ensemble = ensemble, fit = fit_runs(ensemble, settings, calibration))
+    list(ensemble = ensemble, fit = fit_runs(ensemble, settings, calibration, rounds = 0))
   })
 }
+
+screening_runs <- 20
 
 refined_runs <- function(settings) round(settings$control$refine * settings$runs)
 
@@ -119,11 +134,8 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
   if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
   settings$keep(list("full", name, plain(simulator)), {
     first <- first %||% screen_model(simulator, name, settings)
-    fit <- if (more > 0) {
-      fit_runs(refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads), settings)
-    } else {
-      calibrate_runs(first$fit$emulator, settings)
-    }
+    ensemble <- if (more > 0) refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads) else first$ensemble
+    fit <- fit_runs(ensemble, settings)
     fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     fit
   })
@@ -188,7 +200,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   fits <- screens <- list()
   for (name in names(catalogue)) {
     first <- if (screening) screen_model else fit_fully
-    made <- rlang::try_fetch(first(extend(current$fit$emulator$simulator, catalogue[[name]]), paste(current$name, "+", name), settings),
+    made <- rlang::try_fetch(first(extend(current$fit$emulator$simulator, catalogue[[name]], settings$adopted), paste(current$name, "+", name), settings),
                              amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
     if (screening) screens[[name]] <- made
     fits[[name]] <- if (screening) made$fit else made
@@ -245,7 +257,7 @@ added_parameters <- function(fit, parent) {
 }
 
 stop_reason <- function(table, attribution, decisive) {
-  significant <- attribution$table$boundary[attribution$table$significant]
+  significant <- significant_conditions(attribution$table)
   best <- which.max(table$log10_bf)
   tail <- sprintf("no mechanism is decisive (best: %s, log10 Bayes factor %.1f, %.0f needed)", table$mechanism[best], table$log10_bf[best], decisive)
   if (length(significant)) paste0(tail, "; what answers to ", paste(significant, collapse = ", "), " remains unexplained") else paste0(tail, " and no boundary condition is significant")
@@ -270,11 +282,12 @@ upgrade_gain <- function(models) {
 
 #' @export
 print.amiss_upgrade <- function(x, ...) {
-  cause <- x$named_cause
-  cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(x$models) - 1} mechanism{?s} adopted")
-  if (is.null(cause)) cli::cli_bullets(c("*" = "no cause is named")) else {
-    verdict <- diagnosis_verdict(x)
-    cli::cli_bullets(c("*" = "{verdict$tag}: {.strong {cause$mechanism}} ({cause$boundary}), log10 Bayes factor {round(cause$log10_bf, 1)}", " " = "{cause$sentence}"))
+  adopted <- adopted_models(x)
+  cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(adopted)} mechanism{?s} adopted")
+  cli::cli_bullets(c("*" = "{diagnosis_verdict(x)$tag}"))
+  for (model in utils::head(adopted, 4)) {
+    row <- x$candidates[x$candidates$from == model$parent & x$candidates$mechanism == model$mechanism, ]
+    cli::cli_bullets(c("*" = "{model$verdict}: {.strong {model$mechanism}} ({x$catalogue[[model$mechanism]]$boundary}), log10 Bayes factor {round(row$log10_bf, 1)}"))
   }
   g <- x$gain
   cli::cli_bullets(c("*" = "RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)} held out",

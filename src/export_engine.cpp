@@ -176,7 +176,8 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   const Emulator emulator(convert::emulator_state(emulator_list));
   const HistoryModel model =
       history_model(make_history_data(data), make_history_priors(priors), emulator, context);
-  const CalibrationOptions options{convert::ais_options(control["ais"]), Rcpp::as<int>(control["error_draws"])};
+  const CalibrationOptions options{convert::ais_options(control["ais"]),
+                                   Rcpp::as<int>(control["error_draws"])};
   const Calibration result = calibrate(model, emulator, options, context);
   Rcpp::List posterior = convert::ais_list(result.posterior);
   add_points(posterior, result.history, model.conditions());

@@ -44,8 +44,8 @@ catalogue(
             sentence = "Wind changes the heat transfer at the outside of the facades."),
   mechanism("neighbour coupling", boundary = "T_kitchen",
             edit = function(model) {
-              add_component(model, coupling("kitchen leak", conductance = free("kitchen_leak", uniform(0, 60), "W/K", "air exchange with the kitchen"),
+              add_component(model, coupling("kitchen leak", conductance = free("kitchen_leak", uniform(0, 60), "W/K", "additional conductance to the kitchen"),
                                             temperature = "T_kitchen"))
             },
-            sentence = "Air is exchanged with the kitchen, though the model keeps that door sealed.")
+            sentence = "More heat passes between the room and the kitchen than the model's partition lets through.")
 )

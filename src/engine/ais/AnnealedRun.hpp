@@ -16,7 +16,8 @@ struct Spread {
 /// of the evidence is unbiased (Neal 2001).
 class AnnealedRun {
  public:
-  AnnealedRun(const AnnealingPath& path, const AisOptions& options, const Context& context, std::uint64_t purpose);
+  AnnealedRun(const AnnealingPath& path, const AisOptions& options, const Context& context,
+              std::uint64_t purpose);
 
   /// Runs more groups, at most twice as many at a time, until the standard error is as asked.
   void refine();

@@ -6,8 +6,8 @@
 
 namespace amiss {
 
-/// A distribution that comes closer to a posterior than its prior does, to anneal from: coordinates in blocks,
-/// one mixture g_b for each, mixed defensively (Hesterberg 1995) with the prior,
+/// A distribution that comes closer to a posterior than its prior does, to anneal from: coordinates in
+/// blocks, one mixture g_b for each, mixed defensively (Hesterberg 1995) with the prior,
 ///     a N(x; 0, I) + (1 - a) prod_b g_b(x_b).
 /// The prior's share bounds the weights: where the mixtures have missed something, annealing from the prior
 /// finds it.

@@ -36,11 +36,11 @@ class DrawPool {
   Eigen::VectorXd weights_;  // sum of each sample's: its effective size
 };
 
-/// A mixture close to a posterior of which `population` are draws of equal weight: fitted to them and then, in
-/// rounds, to weighted draws from itself and from the rounds before (population Monte Carlo; Cappe, Guillin,
-/// Marin and Robert 2004). Parts of the posterior in which the mixture has too little mass gain what their
-/// weights say, which chains that have to move there do slowly. Its tails are heavy (5 degrees of freedom): a
-/// reference to anneal from. The likelihood values that it takes are added to `evaluations`.
+/// A mixture close to a posterior of which `population` are draws of equal weight: fitted to them and then,
+/// in rounds, to weighted draws from itself and from the rounds before (population Monte Carlo; Cappe,
+/// Guillin, Marin and Robert 2004). Parts of the posterior in which the mixture has too little mass gain what
+/// their weights say, which chains that have to move there do slowly. Its tails are heavy (5 degrees of
+/// freedom): a reference to anneal from. The likelihood values that it takes are added to `evaluations`.
 /// @param draws  of each round.
 SkewedMixture closer_mixture(const Target& target, const Eigen::MatrixXd& population, Eigen::Index draws,
                              const Context& context, Stream& stream, long& evaluations);

@@ -74,7 +74,8 @@ void tune(const AnnealingPath& path, const AisOptions& options, Chains& chains, 
 
 }  // namespace
 
-Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context& context, std::uint64_t purpose) {
+Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context& context,
+             std::uint64_t purpose) {
   Stream stream(context.seed, kPilot + purpose, 0);
   chains = Chains::start(path, options.pilot_chains, stream, context);
   evaluations = options.pilot_chains;

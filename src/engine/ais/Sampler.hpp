@@ -33,10 +33,10 @@ struct AisResult {
 };
 
 /// Annealed importance sampling (Neal 2001) from a reference to prior x likelihood; without one, from the
-/// prior. The evidence and the log-likelihoods are the target's, whatever the reference. A pilot (an adaptive sequential Monte
-/// Carlo sampler; Del Moral, Doucet and Jasra 2006) finds the ladder of temperatures and, at each, a
-/// Student-t proposal, a step length and how many moves the chains need. All are then frozen, and fresh
-/// independent groups of chains are run, so that each group's estimate of the evidence is unbiased. The
+/// prior. The evidence and the log-likelihoods are the target's, whatever the reference. A pilot (an adaptive
+/// sequential Monte Carlo sampler; Del Moral, Doucet and Jasra 2006) finds the ladder of temperatures and, at
+/// each, a Student-t proposal, a step length and how many moves the chains need. All are then frozen, and
+/// fresh independent groups of chains are run, so that each group's estimate of the evidence is unbiased. The
 /// chains move by preconditioned Crank-Nicolson steps that are reversible in the fitted Student t, corrected
 /// by Metropolis and Hastings. An importance sample from a Student-t mixture fitted to the draws is the
 /// second estimator; where no mixture comes close, a second annealed run from the mixture to the posterior

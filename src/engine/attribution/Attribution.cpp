@@ -17,6 +17,7 @@ namespace {
 enum Purpose : std::uint64_t { kWithout = 100 };
 
 constexpr Index kLeastGroup = 2;
+constexpr int kFewSurrogates = 39;
 
 }  // namespace
 
@@ -58,7 +59,8 @@ std::vector<std::vector<int>> find_groups(const HistoryModel& model, const Calib
     std::vector<int> group = left;
     for (int s : left) {
       std::vector<int> smaller;
-      std::copy_if(group.begin(), group.end(), std::back_inserter(smaller), [&](int other) { return other != s; });
+      std::copy_if(group.begin(), group.end(), std::back_inserter(smaller),
+                   [&](int other) { return other != s; });
       if (!smaller.empty() && lost(smaller) >= least) group = std::move(smaller);
     }
     if (static_cast<Index>(group.size()) < kLeastGroup) break;
@@ -97,6 +99,10 @@ Attribution attribute(const HistoryModel& model, const Emulator& emulator, const
   surrogates.settings = {calibration.history[static_cast<std::size_t>(best)].setting,
                          null_setting(model, calibration.tangent)};
   if (surrogates.settings[0] == surrogates.settings[1]) surrogates.settings.pop_back();
+  // Where no set matters, none can be significant.
+  if (std::none_of(out.sets.begin(), out.sets.end(),
+                   [&](const DroppedSet& s) { return s.lost >= options.least; }))
+    surrogates.surrogates = std::min(surrogates.surrogates, kFewSurrogates);
   out.test = surrogate_test(model, calibration.tangent, sets, surrogates, context);
 
   std::vector<HistoryParameters> kept;

@@ -32,9 +32,9 @@ struct Attribution {
 /// without it is the one with t_s = 0 for all its conditions, so that Z_without / Z = P(off | y) / P(off)
 /// (Savage and Dickey). Where too few draws have it off, the posterior is sampled again without it.
 ///
-/// Conditions that say the same hide one another: each can be dropped alone. Among those that are dropped alone
-/// without harm the smallest set is sought that cannot be dropped together: a group. As many groups as there
-/// are, each from the conditions that the groups before it have left.
+/// Conditions that say the same hide one another: each can be dropped alone. Among those that are dropped
+/// alone without harm the smallest set is sought that cannot be dropped together: a group. As many groups as
+/// there are, each from the conditions that the groups before it have left.
 Attribution attribute(const HistoryModel& model, const Emulator& emulator, const Calibration& calibration,
                       const AttributionOptions& options, const Context& context);
 

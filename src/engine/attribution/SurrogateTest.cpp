@@ -18,6 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::uint64_t kShifts = 11;
+constexpr double kTolerance = 1e-5;   // of a fit, relative: a few thousandths of a nat
 constexpr double kNegligible = 0.02;  // nats: a condition that matters less need not be fitted again without
 
 struct Fit {
@@ -55,7 +56,7 @@ Fit best_fit(const HistoryModel& model, const WhitenedData& data, const Set& dro
   VectorXd lower = VectorXd::Constant(start.size(), log_scale - 16.0);
   VectorXd upper = VectorXd::Constant(start.size(), log_scale + 12.0);
   upper[0] = log_scale + 3.0;
-  const Maximum found = maximise(objective, start, lower, upper, 1e-9, options.max_evaluations);
+  const Maximum found = maximise(objective, start, lower, upper, kTolerance, options.max_evaluations);
   return {found.value, found.x};
 }
 
@@ -129,7 +130,8 @@ VectorXd adjusted_p_values(const VectorXd& statistic, const MatrixXd& null_stati
   std::vector<Index> order(static_cast<std::size_t>(sets));
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return observed[a] < observed[b]; });
-  // From the smallest up, the largest null statistic so far; then p-values may not fall from the largest down.
+  // From the smallest up, the largest null statistic so far; then p-values may not fall from the largest
+  // down.
   VectorXd adjusted(sets), highest = VectorXd::Constant(n, -std::numeric_limits<double>::infinity());
   for (Index s : order) {
     highest = highest.cwiseMax(null.col(s));
@@ -137,7 +139,8 @@ VectorXd adjusted_p_values(const VectorXd& statistic, const MatrixXd& null_stati
     adjusted[s] = (1.0 + as_high) / (1.0 + static_cast<double>(n));
   }
   double running = 0.0;
-  for (auto s = order.rbegin(); s != order.rend(); ++s) adjusted[*s] = running = std::max(running, adjusted[*s]);
+  for (auto s = order.rbegin(); s != order.rend(); ++s)
+    adjusted[*s] = running = std::max(running, adjusted[*s]);
   return adjusted;
 }
 

@@ -15,12 +15,13 @@ struct SurrogateOptions {
   void check() const;
 };
 
-/// Does the discrepancy answer to a set of conditions, or would any series with the same autocorrelation do as
-/// well?
+/// Does the discrepancy answer to a set of conditions, or would any series with the same autocorrelation do
+/// as well?
 struct SurrogateTest {
-  Eigen::VectorXd statistic;  ///< of each set: log-likelihood lost when it is dropped and the rest fitted again
-  Eigen::VectorXd p_value;    ///< (1 + surrogates that lose as much) / (1 + surrogates)
-  Eigen::VectorXd adjusted;   ///< the same for all sets together (adjusted_p_values())
+  Eigen::VectorXd
+      statistic;            ///< of each set: log-likelihood lost when it is dropped and the rest fitted again
+  Eigen::VectorXd p_value;  ///< (1 + surrogates that lose as much) / (1 + surrogates)
+  Eigen::VectorXd adjusted;         ///< the same for all sets together (adjusted_p_values())
   Eigen::MatrixXd null_statistics;  ///< surrogates x sets
 };
 
@@ -33,9 +34,10 @@ SurrogateTest surrogate_test(const HistoryModel& model, const GaussianSimulator&
                              const Context& context);
 
 /// Step-down p-values of Westfall and Young (1993) for several statistics together: that of the k-th largest
-/// is the share of surrogates in which any of those not larger comes as high. Statistics are compared in units
-/// of the 95 % quantiles of their null distributions (at least `least`), so that none sets the measure for the
-/// others. Unlike Holm's, the least p-value does not grow with the number of statistics: 1 / (1 + surrogates).
+/// is the share of surrogates in which any of those not larger comes as high. Statistics are compared in
+/// units of the 95 % quantiles of their null distributions (at least `least`), so that none sets the measure
+/// for the others. Unlike Holm's, the least p-value does not grow with the number of statistics: 1 / (1 +
+/// surrogates).
 Eigen::VectorXd adjusted_p_values(const Eigen::VectorXd& statistic, const Eigen::MatrixXd& null_statistics,
                                   double least = 0.5);
 

@@ -24,8 +24,9 @@ enum StreamPurpose : std::uint64_t { kPriorPoints = 61, kModes, kMixture, kClose
 constexpr int kHistoryPoints = 3;    // at which the modes of the parameters are sought
 constexpr int kHistoryChains = 128;  // of the posterior under a Gaussian simulator
 constexpr double kHistoryDrop = 0.5;
+constexpr int kHistorySweeps = 5;
 constexpr double kReferenceDof = 8.0;
-constexpr Index kRoundDraws = 25;  // that bring the reference closer, each round, per coordinate
+constexpr Index kRoundDraws = 25;         // that bring the reference closer, each round, per coordinate
 constexpr std::uint64_t kPriorSeed = 20;  // the spread of the simulator is part of the model, not of a run
 
 // n draws of equal weight, evenly spread over weighted ones.
@@ -52,8 +53,10 @@ Start start_from(const CalibrationTarget& target, const GaussianSimulator& simul
   AisOptions rough = options;
   rough.pilot_chains = kHistoryChains;
   rough.ess_drop = std::min(options.ess_drop, kHistoryDrop);
+  rough.max_sweeps = std::min(options.max_sweeps, kHistorySweeps);
   rough.gradient = false;
-  MatrixXd draws = sample_population(history, StandardNormal(history.dimension()), rough, context, evaluations);
+  MatrixXd draws =
+      sample_population(history, StandardNormal(history.dimension()), rough, context, evaluations);
   std::vector<HistoryParameters> points;
   for (int k = 0; k < kHistoryPoints; ++k)
     points.push_back(history.parameters(draws.col((2 * k + 1) * draws.cols() / (2 * kHistoryPoints))));
@@ -89,8 +92,7 @@ AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& op
                            const Context& context) {
   long spent = 0;
   const CloserReference reference = closer_reference(target, options, context, spent);
-  const MatrixXd population =
-      sample_population(target, reference, options, context.fork(kPopulation), spent);
+  const MatrixXd population = sample_population(target, reference, options, context.fork(kPopulation), spent);
   Stream stream(context.seed, kCloser, 0);
   const SkewedMixture mixture =
       closer_mixture(target, population, kRoundDraws * target.dimension(), context, stream, spent);
@@ -130,7 +132,8 @@ Calibration calibrate(const HistoryModel& model, const Emulator& emulator, const
   out.withheld.resize(model.data().basis.cols(), options.kept);
   std::vector<MatrixXd> held(model.priors().reach.size());  // of each reach that is met
   for (int k = 0; k < options.kept; ++k) {
-    const HistoryParameters& point = out.history[static_cast<std::size_t>(out.kept[static_cast<std::size_t>(k)])];
+    const HistoryParameters& point =
+        out.history[static_cast<std::size_t>(out.kept[static_cast<std::size_t>(k)])];
     out.coefficients.col(k) = model.coefficients(point, mean.row(k).transpose(), variance.row(k).transpose());
     MatrixXd& own = held[static_cast<std::size_t>(point.setting / model.error_settings())];
     if (own.size() == 0) own = model.withheld(point.setting);

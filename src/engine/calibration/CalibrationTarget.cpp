@@ -27,7 +27,8 @@ VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {
   emulator_.predict(unit(x), mean, variance);
   VectorXd values(x.cols());
   for (Index i = 0; i < x.cols(); ++i)
-    values[i] = model().log_likelihood(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose());
+    values[i] =
+        model().log_likelihood(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose());
   return values;
 }
 

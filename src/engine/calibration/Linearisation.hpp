@@ -5,8 +5,8 @@
 
 namespace amiss {
 
-/// The simulator as the Gaussian with the mean and the covariance that its emulator has over the priors of the
-/// parameters, by 512 points drawn from them.
+/// The simulator as the Gaussian with the mean and the covariance that its emulator has over the priors of
+/// the parameters, by 512 points drawn from them.
 GaussianSimulator over_priors(const Emulator& emulator, Stream stream);
 
 /// The simulator as the straight line that touches its emulator at x0, coordinates N(0, I) of the parameters:

@@ -14,9 +14,9 @@ struct ModeOptions {
 
 /// Where the parameters lie, given the record, for a few points of the history posterior: modes of
 ///     log p(y | z, history) + log N(x; 0, I),  z = Phi(x),
-/// by the Levenberg-Marquardt method, each with the Gauss-Newton covariance (W'A W + I)^-1, W = dw'/dx, A what
-/// the record tells about the coefficients. A Student-t mixture with one component for each distinct mode;
-/// weights half from the Laplace approximation of its mass, half equal.
+/// by the Levenberg-Marquardt method, each with the Gauss-Newton covariance (W'A W + I)^-1, W = dw'/dx, A
+/// what the record tells about the coefficients. A Student-t mixture with one component for each distinct
+/// mode; weights half from the Laplace approximation of its mass, half equal.
 struct ParameterModes {
   StudentTMixture mixture;
   Eigen::VectorXd best;  ///< the highest mode, P coordinates N(0, I)

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/linalg/constants.hpp"
+#include "engine/linalg/triangular.hpp"
 #include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
@@ -137,7 +138,8 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
     if (!wanted[static_cast<std::size_t>(g)]) return;
     const WhitenedData free = whiten_freely(g, data_.responses);
     for (int k = 0; k < reaches; ++k)
-      settings_[static_cast<std::size_t>(k * errors + g)] = restrained(free, held[static_cast<std::size_t>(k)]);
+      settings_[static_cast<std::size_t>(k * errors + g)] =
+          restrained(free, held[static_cast<std::size_t>(k)]);
   });
 }
 
@@ -187,7 +189,8 @@ VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameter
   VectorXd values(runs.cols());
   parallel_for(static_cast<int>(groups.size()), context, [&](int k) {
     const auto& [setting, own] = groups[static_cast<std::size_t>(k)];
-    const Whitener whitener(data_.axis, priors_.error.correlation_times, priors_.error.setting(error_of(setting)));
+    const Whitener whitener(data_.axis, priors_.error.correlation_times,
+                            priors_.error.setting(error_of(setting)));
     const MatrixXd responses = data_.responses - data_.basis * withheld(setting);
     const MatrixXd white = whitener(responses);
     WhitenedData seen;
@@ -208,9 +211,9 @@ VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameter
 // F = LL' and L^-1 b of the columns that act: all of the simulator's, and the responses with t_s > 0.
 struct HistoryModel::Factor {
   std::vector<Index> kept;
-  VectorXd root;                            // D^1/2
+  VectorXd root;                             // D^1/2
   Eigen::LLT<MatrixXd, Eigen::Lower> lower;  // L
-  VectorXd half;                            // L^-1 b
+  VectorXd half;                             // L^-1 b
 };
 
 HistoryModel::Factor HistoryModel::factorise(const WhitenedData& whitened, double precision,
@@ -247,7 +250,8 @@ HistoryModel::Factor HistoryModel::factorise(const WhitenedData& whitened, doubl
 }
 
 // Cross products and square of r0 - K shift in place of r0.
-VectorXd HistoryModel::shifted_cross(const WhitenedData& whitened, const VectorXd& shift, double& square) const {
+VectorXd HistoryModel::shifted_cross(const WhitenedData& whitened, const VectorXd& shift,
+                                     double& square) const {
   const Index q = whitened.coefficients;
   const VectorXd cross = whitened.cross - whitened.gram.leftCols(q) * shift;
   square = whitened.square - shift.dot(whitened.cross.head(q) + cross.head(q));
@@ -286,8 +290,8 @@ double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_var
       log_density(whitened, log_variance, whitened.square, factor.lower.matrixLLT(), factor.half);
   if (gradient == nullptr) return value;
   const Index n = factor.half.size();
-  MatrixXd root_inverse = MatrixXd::Identity(n, n);
-  factor.lower.matrixL().solveInPlace(root_inverse);
+  MatrixXd root_inverse = factor.lower.matrixL();
+  invert_lower(root_inverse);
   const VectorXd inverse_diagonal = root_inverse.colwise().squaredNorm().transpose();
   const VectorXd r = precision * (root_inverse.transpose() * factor.half);
   gradient->setZero(1 + conditions_);
@@ -328,9 +332,10 @@ CoefficientLikelihood HistoryModel::given(const HistoryParameters& point) const 
     half.row(j) = factor.root[j] * own.gram.row(q + factor.kept[j]).head(q);
   factor.lower.matrixL().solveInPlace(half);
   const double squared = precision * precision;
-  return {reference_, precision * own.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
-          precision * own.cross.head(q) - squared * (half.transpose() * factor.half),
-          log_density(responses, std::log(point.variance), own.square, factor.lower.matrixLLT(), factor.half)};
+  return {
+      reference_, precision * own.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
+      precision * own.cross.head(q) - squared * (half.transpose() * factor.half),
+      log_density(responses, std::log(point.variance), own.square, factor.lower.matrixLLT(), factor.half)};
 }
 
 VectorXd HistoryModel::coefficients(const HistoryParameters& point, const VectorXd& mean,

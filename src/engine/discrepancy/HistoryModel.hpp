@@ -25,12 +25,12 @@ struct HistoryData {
 
 /// Priors of the history model.
 struct HistoryPriors {
-  double noise_sd = 1.0;            ///< stated standard deviation of the white noise
-  double noise_shape = 2.0;         ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
+  double noise_sd = 1.0;     ///< stated standard deviation of the white noise
+  double noise_shape = 2.0;  ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
   double discarded_variance = 0.0;  ///< of what the basis leaves out of a run, added to the white noise
-  double inclusion = 0.2;           ///< probability that a condition drives the discrepancy at all; else t_s = 0
-  double amplitude = 1.0;           ///< scale of the half-Cauchy prior of sqrt(t_s), if it does
-  ErrorOptions error;               ///< grid of error settings, all equally probable before the data
+  double inclusion = 0.2;  ///< probability that a condition drives the discrepancy at all; else t_s = 0
+  double amplitude = 1.0;  ///< scale of the half-Cauchy prior of sqrt(t_s), if it does
+  ErrorOptions error;      ///< grid of error settings, all equally probable before the data
   /// Grid of the discrepancy's reach kappa > 0, equally probable before the data; infinity: free.
   std::vector<double> reach{std::numeric_limits<double>::infinity()};
 
@@ -40,12 +40,12 @@ struct HistoryPriors {
 /// One setting of error and reach: everything that a likelihood needs, worked out in a pass linear in N. With
 /// the whitener W of the error, B = [K, Psi], r0 = y - K w0:
 struct WhitenedData {
-  Eigen::MatrixXd gram;          ///< B' W' W B, (Q + p) x (Q + p)
-  Eigen::VectorXd cross;         ///< B' W' W r0, Q + p
-  double square = 0.0;           ///< r0' W' W r0
-  double log_det = 0.0;          ///< log |W|
-  Eigen::Index size = 0;         ///< N
-  Eigen::Index coefficients = 0; ///< Q
+  Eigen::MatrixXd gram;           ///< B' W' W B, (Q + p) x (Q + p)
+  Eigen::VectorXd cross;          ///< B' W' W r0, Q + p
+  double square = 0.0;            ///< r0' W' W r0
+  double log_det = 0.0;           ///< log |W|
+  Eigen::Index size = 0;          ///< N
+  Eigen::Index coefficients = 0;  ///< Q
 
   /// The same with the coefficients written as w = w0 + shift + root a: K becomes K root, r0 becomes
   /// r0 - K shift.
@@ -60,15 +60,16 @@ struct HistoryParameters {
 };
 
 /// The measured record in one covariance:
-///     y | w ~ N(K w, sigma^2 C + sum_s (t_s / p_s) Psi_s Psi_s'),   w ~ N(m, S) of a simulator or its emulator,
-/// C the covariance of an error of ErrorModel's kind, Psi_s the p_s filtered responses to condition s. Nothing
-/// is split off: the discrepancy lives in all directions, those of the simulator included, and how far it
-/// reaches into them is learned: with the covariance K L L' K' of the runs,
+///     y | w ~ N(K w, sigma^2 C + sum_s (t_s / p_s) Psi_s Psi_s'),   w ~ N(m, S) of a simulator or its
+///     emulator,
+/// C the covariance of an error of ErrorModel's kind, Psi_s the p_s filtered responses to condition s.
+/// Nothing is split off: the discrepancy lives in all directions, those of the simulator included, and how
+/// far it reaches into them is learned: with the covariance K L L' K' of the runs,
 ///     Psi = (I + (K L L' K' / (kappa sigma_0^2))^2)^-1 Phi,   sigma_0 the stated noise,
 /// which takes out of Phi the directions in which the simulator moves by more than sqrt(kappa) sigma_0 (a sum
 /// over the record), leaves those in which it moves less, and is Phi itself for kappa = infinity. The square
-/// keeps weak directions out of it, so that how many vectors the basis has does not matter. The density is one of y as it stands: no basis is preferred, and its size is only a
-/// matter of accuracy.
+/// keeps weak directions out of it, so that how many vectors the basis has does not matter. The density is
+/// one of y as it stands: no basis is preferred, and its size is only a matter of accuracy.
 ///
 /// A value costs a Cholesky factor of the size Q + (columns of the conditions with t_s > 0), whatever N: with
 /// r = y - K m, D = diag(S, t_s / p_s) and F = I + D^1/2 B'W'W B D^1/2 / sigma^2,
@@ -77,7 +78,8 @@ struct HistoryParameters {
 class HistoryModel {
  public:
   /// @param only  settings that will be asked for; all if empty.
-  HistoryModel(HistoryData data, HistoryPriors priors, const Context& context, const std::vector<int>& only = {});
+  HistoryModel(HistoryData data, HistoryPriors priors, const Context& context,
+               const std::vector<int>& only = {});
 
   /// log density of y given the setting, log sigma^2, the t_s of the conditions (t_s = 0 leaves one out), and
   /// coefficients of the given mean and variances (Q each). The gradient is with respect to (log sigma^2,
@@ -119,7 +121,7 @@ class HistoryModel {
     return priors_.reach[static_cast<std::size_t>(setting / error_settings())];
   }
   int conditions() const { return conditions_; }
-  const Eigen::VectorXd& reference() const { return reference_; }       ///< w0: least squares of y on K
+  const Eigen::VectorXd& reference() const { return reference_; }  ///< w0: least squares of y on K
   const Eigen::VectorXd& columns_per_condition() const { return columns_; }
   const Eigen::RowVectorXd& centre() const { return centre_; }  ///< subtracted from each filter column
   const Eigen::RowVectorXd& scale() const { return scale_; }    ///< then divided by this

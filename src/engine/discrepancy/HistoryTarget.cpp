@@ -43,7 +43,8 @@ Index HistoryCoordinates::first_condition() const {
 
 double HistoryCoordinates::noise_variance(double x) const {
   const HistoryPriors& priors = model_->priors();
-  const double scaled = boost::math::gamma_p_inv(priors.noise_shape, clamp_unit(normal_cdf(x)), DoublePolicy());
+  const double scaled =
+      boost::math::gamma_p_inv(priors.noise_shape, clamp_unit(normal_cdf(x)), DoublePolicy());
   return priors.noise_shape * priors.noise_sd * priors.noise_sd / scaled;
 }
 
@@ -55,7 +56,8 @@ HistoryParameters HistoryCoordinates::parameters(const Eigen::Ref<const VectorXd
   const int levels = static_cast<int>(priors.error.ratios.size());
   const int reaches = static_cast<int>(priors.reach.size());
   if (reaches > 1) point.setting = level(x[1 + components], reaches);
-  for (Index k = components - 1; k >= 0; --k) point.setting = point.setting * levels + level(x[1 + k], levels);
+  for (Index k = components - 1; k >= 0; --k)
+    point.setting = point.setting * levels + level(x[1 + k], levels);
   point.t = VectorXd::Zero(model_->conditions());
   const Index first = first_condition();
   for (std::size_t a = 0; a < active_.size(); ++a) {

@@ -13,8 +13,9 @@ class HistoryCoordinates {
 
   Eigen::Index dimension() const { return first_condition() + static_cast<Eigen::Index>(active_.size()); }
   HistoryParameters parameters(const Eigen::Ref<const Eigen::VectorXd>& x) const;
-  /// Gradient with respect to x of a function with gradient `natural` with respect to (log sigma^2, log t_1 ...
-  /// log t_S). The coordinates of the grid have gradient zero: the function is constant between its jumps.
+  /// Gradient with respect to x of a function with gradient `natural` with respect to (log sigma^2, log t_1
+  /// ... log t_S). The coordinates of the grid have gradient zero: the function is constant between its
+  /// jumps.
   Eigen::VectorXd gradient(const Eigen::Ref<const Eigen::VectorXd>& x, const HistoryParameters& point,
                            const Eigen::VectorXd& natural) const;
   const HistoryModel& model() const { return *model_; }

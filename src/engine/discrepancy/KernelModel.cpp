@@ -9,9 +9,9 @@
 #include <stdexcept>
 
 #include "engine/linalg/constants.hpp"
-#include "engine/random/Stream.hpp"
 #include "engine/linalg/double_policy.hpp"
 #include "engine/linalg/precedes.hpp"
+#include "engine/random/Stream.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {

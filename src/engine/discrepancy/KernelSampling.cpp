@@ -160,9 +160,9 @@ SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
   Stream stream(own.seed, kStage, 0);
   const KernelTarget target(model);
   if (model.size() <= sampling.coarsest)
-    return closer_mixture(target,
-                          sample_population(target, StandardNormal(target.dimension()), options, own, evaluations),
-                          kRoundDraws, own, stream, evaluations);
+    return closer_mixture(
+        target, sample_population(target, StandardNormal(target.dimension()), options, own, evaluations),
+        kRoundDraws, own, stream, evaluations);
   const SkewedMixture before =
       sample_stage(model.thinned(sampling.thinning), options, sampling, own, evaluations);
   const ApproximateTarget approximate(model, before, kCoarser * sampling.tolerance, context, stream);

@@ -1,0 +1,87 @@
+# Each adopted mechanism judged by itself: named, likely, or a stand-in for something that the catalogue does not hold.
+
+# Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism is a
+# stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely otherwise.
+judge_models <- function(models, candidates, catalogue, measurements, control) {
+  remains <- much_remains(models, measurements)
+  for (k in seq_along(models)[-1]) {
+    model <- models[[k]]
+    parent <- models[[k - 1]]
+    trials <- candidates[candidates$from == parent$name, ]
+    row <- trials[trials$mechanism == model$mechanism, ]
+    new <- setdiff(names(model$fit$emulator$parameters), names(parent$fit$emulator$parameters))
+    gain <- held_out_gain(parent, model)
+    no_gain <- isFALSE(gain$improves)
+    doubts <- c(
+      if (row$probability < 0.95) "other causes are possible",
+      if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
+      if (no_gain) "data held out do not gain by it",
+      if (model$scores$calibrate[["rmse"]] > 1.02 * parent$scores$calibrate[["rmse"]]) "the error in calibration rose with it",
+      if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary)) "what drives it is still answered to",
+      if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
+      if (remains) "a good part of the error remains",
+      if (k == 2 && drift_rivals(models, measurements, control)) "a drifting sensor would explain the error as well")
+    models[[k]]$held_out_gain <- gain
+    models[[k]]$confounded_with <- confounded_parameters(model$fit, new)
+    models[[k]]$doubts <- doubts
+    models[[k]]$verdict <- if (no_gain) "stand-in" else if (length(doubts)) "likely" else "named"
+  }
+  models
+}
+
+# By how much the mean square of the error held out falls, and its standard error, from sums over days (or eighths of
+# a short record): errors within a day hang together.
+held_out_gain <- function(parent, model) {
+  before <- parent$prediction[parent$prediction$use == "validate", ]
+  after <- model$prediction[model$prediction$use == "validate", ]
+  if (!nrow(before)) return(list(mean = NA_real_, standard_error = NA_real_, improves = NA))
+  fall <- (before$observed - before$mean)^2 - (after$observed - after$mean)^2
+  n <- length(fall)
+  hours <- record_hours(before$time)
+  block <- floor((hours - hours[1]) / 24)
+  if (length(unique(block)) < 8) block <- floor(8 * (seq_len(n) - 1) / n)
+  sums <- rowsum(fall, block)
+  error <- sqrt(nrow(sums)) * stats::sd(sums) / n
+  list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
+}
+
+record_hours <- function(time) if (inherits(time, "POSIXct")) as.numeric(time) / 3600 else as.numeric(time)
+
+# The condition that drives a mechanism answered before and does so still, with more than half of its evidence.
+still_answers <- function(parent, model, boundary) {
+  strength <- function(m) {
+    table <- m$attribution$table
+    own <- table$boundary %in% boundary & table$significant
+    if (any(own)) max(table$log10_bf_dropped[own]) else 0
+  }
+  before <- strength(parent)
+  before > 0 && strength(model) > 0.5 * before
+}
+
+# Parameters of the model that are correlated beyond 0.4 with those that the mechanism brought: another part of the model
+# that could do the same.
+confounded_parameters <- function(fit, new) {
+  others <- setdiff(colnames(fit$values), new)
+  if (!length(new) || !length(others)) return(character())
+  r <- stats::cov.wt(posterior_unit(fit), fit$weights, cor = TRUE)$cor
+  dimnames(r) <- list(colnames(fit$values), colnames(fit$values))
+  others[apply(abs(r[others, new, drop = FALSE]), 1, max) > 0.4]
+}
+
+# TRUE for each parameter whose 95 % interval touches an end of its prior (in probability, within 1 %), where the prior ends
+# abruptly.
+edge_of_prior <- function(fit) {
+  unit <- posterior_unit(fit)
+  stats::setNames(vapply(seq_len(ncol(unit)), function(p) {
+    q <- weighted_quantile(unit[, p], fit$weights, c(0.025, 0.5, 0.975))
+    (q[3] > 0.99 && q[2] > 0.9) || (q[1] < 0.01 && q[2] < 0.1)
+  }, NA), colnames(fit$values))
+}
+
+# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The mechanism
+# that made the error leaves nothing; one that imitates it does.
+much_remains <- function(models, measurements) {
+  ends <- lapply(models[c(1, length(models))], remaining_error, measurements)
+  excess <- vapply(ends, function(e) e$ratio^2 - 1, 0)
+  ends[[2]]$large && excess[2] > 0.1 * excess[1]
+}
