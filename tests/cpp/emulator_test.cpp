@@ -366,7 +366,7 @@ TEST(Emulator, TrainsEachCoefficientWithTheStatedNoisePrior) {
   const Trained trained;
   const Basis& basis = trained.basis;
   const double discarded = (trained.outputs - basis.vectors * basis.coefficients.transpose()).squaredNorm();
-  const double default_rate = std::sqrt(2.220446049250313e-16) * basis.vectors.col(0).norm();
+  const double default_rate = std::sqrt(2.220446049250313e-16) * basis.vectors.col(0).squaredNorm();
   EmulatorOptions given;
   given.priors.lambda = {500.0, 0.3};
   given.priors.beta = {2.0, 1.5};
@@ -409,6 +409,33 @@ TEST(Emulator, VariancesAreWidenedToTheLeaveOneOutErrors) {
   emulator.leave_one_out(mean, variance);
   EXPECT_GT(emulator.widened()[0], 1.1);
   EXPECT_NEAR(((basis.coefficients - mean).array().square() / variance.array()).mean(), 1.0, 1e-9);
+}
+
+// Means and standard deviations of the series at new points.
+void predict_series(const MatrixXd& outputs, MatrixXd& mean, MatrixXd& sd) {
+  BasisOptions options;
+  options.explained = 0.9999;
+  const Basis basis = make_basis(outputs, options);
+  MatrixXd m, v;
+  Emulator::train(Trained().inputs, basis, {}, Context()).predict(uniform_matrix(20, 3, 36), m, v);
+  mean = m * basis.vectors.transpose();
+  sd = (v * basis.vectors.cwiseAbs2().transpose()).cwiseSqrt();
+}
+
+TEST(Emulator, UnitAndOriginOfTheOutputsChangeNothingElse) {
+  const MatrixXd outputs = Trained().outputs;
+  MatrixXd mean, sd, m, s;
+  predict_series(outputs, mean, sd);
+  const auto compare = [&](double unit, double shift) {
+    predict_series((unit * outputs).array() + shift, m, s);
+    // The search ends where the density, of size 100, changes by 1e-7 of it, on slightly other paths. A shift
+    // of 1e6 leaves 10 digits of the outputs.
+    EXPECT_LT(((m.array() - shift) / unit - mean.array()).abs().maxCoeff(), 1e-6) << unit << ", " << shift;
+    EXPECT_LT((s.array() / (unit * sd.array()) - 1.0).abs().maxCoeff(), 1e-6) << unit << ", " << shift;
+  };
+  for (double unit : {1e-12, 1e-9, 1e9, 1e12}) compare(unit, 0.0);
+  compare(1.0, 1e6);
+  compare(1e6, 1e6);
 }
 
 TEST(Emulator, StateMakesTheSameEmulatorAgain) {

@@ -38,8 +38,9 @@ Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const Emula
   const double runs = static_cast<double>(inputs.rows());
   const GammaPrior& lambda = options.priors.lambda;
   const double shape = lambda.shape + 0.5 * runs * static_cast<double>(basis.vectors.rows() - basis.size());
+  const double largest = basis.singular_values[0];
   const double b = std::isnan(lambda.rate)
-                       ? std::sqrt(std::numeric_limits<double>::epsilon()) * basis.singular_values[0]
+                       ? std::sqrt(std::numeric_limits<double>::epsilon()) * largest * largest
                        : lambda.rate;
   const double rate = b + 0.5 * basis.discarded_ss;
   std::vector<std::optional<GaussianProcess>> fitted(static_cast<std::size_t>(basis.size()));

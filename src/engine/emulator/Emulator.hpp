@@ -18,7 +18,11 @@ struct EmulatorState {
 struct EmulatorOptions {
   SearchOptions search;
   /// Priors of every process. Those of lambda are a and b of the joint density (3), b in the squared unit of
-  /// the outputs; NaN stands for sqrt(machine epsilon) times the largest singular value.
+  /// the outputs; NaN stands for sqrt(machine epsilon) times the squared largest singular value d.
+  /// Where the basis leaves nothing out, the noise has then an RMS of 1.7e-4 of the runs' at each output
+  /// (1 / lambda = 3e-8 d^2 / (M (N - Q)), the runs' mean square d^2 / (M N)) and of 1.7e-4 / sqrt(N) of the
+  /// leading coefficient's: 1e-5 for N = 300, as the jitter of its covariance has, far above rounding and far
+  /// below what a basis is cut off at.
   HyperPriors priors{{2.0, std::numeric_limits<double>::quiet_NaN()}, {}, {}, {}};
 };
 
