@@ -33,7 +33,8 @@ class Emulator {
 
   /// Trains all Q processes; work is shared over the threads of the context. The prior of lambda_q is
   /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2. The variances of
-  /// each process are widened to its leave-one-out errors (GaussianProcess::widen()).
+  /// each process are widened to its leave-one-out errors, of hyper-parameters that have not seen the run
+  /// left out (GaussianProcess::widen()).
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context);
 
@@ -41,7 +42,8 @@ class Emulator {
   /// such a run on the basis has. They vary about the smooth part of the process by the nugget and 1 /
   /// lambda, as those of the training runs do, so that both are in the variance.
   void predict(const Eigen::MatrixXd& points, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
-  /// Leave-one-out mean and variance (M x Q), in the coefficients' own scale.
+  /// Leave-one-out mean and variance (M x Q), widened, by hyper-parameters that have not seen the run left
+  /// out, in the coefficients' own scale. @throws std::logic_error if made of a state, not trained.
   void leave_one_out(Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
 
   EmulatorState state() const;
