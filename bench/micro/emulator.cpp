@@ -49,6 +49,29 @@ BENCHMARK(density)
     ->ArgsProduct({{200}, {3, 5, 10, 20, 40}})
     ->Unit(benchmark::kMillisecond);
 
+// After a search, whose time is that of `fit` below.
+void widen(benchmark::State& state) {
+  const Runs runs(state.range(0), state.range(1));
+  const GaussianProcess fitted = GaussianProcess::fit(runs.inputs, runs.values, HyperPriors(), {});
+  for (auto _ : state) {
+    state.PauseTiming();
+    GaussianProcess process = fitted;
+    state.ResumeTiming();
+    process.widen(HyperPriors());
+    benchmark::DoNotOptimize(process.widened);
+  }
+}
+BENCHMARK(widen)->Name("emulator/widen")->ArgsProduct({{50, 200, 500}, {8}})->Unit(benchmark::kMillisecond);
+
+void fit(benchmark::State& state) {
+  const Runs runs(state.range(0), state.range(1));
+  for (auto _ : state) {
+    const GaussianProcess process = GaussianProcess::fit(runs.inputs, runs.values, HyperPriors(), {});
+    benchmark::DoNotOptimize(process.log_joint);
+  }
+}
+BENCHMARK(fit)->Name("emulator/fit")->ArgsProduct({{50, 200, 500}, {8}})->Unit(benchmark::kMillisecond);
+
 // Of 64 points at once, as a group of chains asks for.
 void prediction(benchmark::State& state) {
   const Index m = state.range(0), p = 8;

@@ -38,8 +38,9 @@ Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const Emula
   const double runs = static_cast<double>(inputs.rows());
   const GammaPrior& lambda = options.priors.lambda;
   const double shape = lambda.shape + 0.5 * runs * static_cast<double>(basis.vectors.rows() - basis.size());
+  const double largest = basis.singular_values[0];
   const double b = std::isnan(lambda.rate)
-                       ? std::sqrt(std::numeric_limits<double>::epsilon()) * basis.singular_values[0]
+                       ? std::sqrt(std::numeric_limits<double>::epsilon()) * largest * largest
                        : lambda.rate;
   const double rate = b + 0.5 * basis.discarded_ss;
   std::vector<std::optional<GaussianProcess>> fitted(static_cast<std::size_t>(basis.size()));
@@ -50,7 +51,7 @@ Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const Emula
     HyperPriors priors = options.priors;
     priors.lambda = {shape, rate / norm};
     fitted[q] = GaussianProcess::fit(inputs, values, priors, options.search);
-    fitted[q]->widen();
+    fitted[q]->widen(priors);
   });
   for (auto& process : fitted) emulator.processes_.push_back(std::move(*process));
   return emulator;
@@ -69,11 +70,13 @@ void Emulator::predict(const MatrixXd& points, MatrixXd& mean, MatrixXd& varianc
 void Emulator::leave_one_out(MatrixXd& mean, MatrixXd& variance) const {
   mean.resize(inputs_.rows(), n_outputs());
   variance.resize(inputs_.rows(), n_outputs());
-  VectorXd m, v;
   for (Index q = 0; q < n_outputs(); ++q) {
-    processes_[q].leave_one_out(m, v);
-    mean.col(q) = m * scale_[q] + VectorXd::Constant(m.size(), centre_[q]);
-    variance.col(q) = v * scale_[q] * scale_[q];
+    const GaussianProcess& process = processes_[static_cast<std::size_t>(q)];
+    if (process.left_out_mean.size() == 0)
+      throw std::logic_error(
+          "emulator: runs are left out of a trained emulator, not of one made of its state");
+    mean.col(q) = (process.left_out_mean.array() * scale_[q] + centre_[q]).matrix();
+    variance.col(q) = process.left_out_variance * (scale_[q] * scale_[q]);
   }
 }
 

@@ -18,7 +18,11 @@ struct EmulatorState {
 struct EmulatorOptions {
   SearchOptions search;
   /// Priors of every process. Those of lambda are a and b of the joint density (3), b in the squared unit of
-  /// the outputs; NaN stands for sqrt(machine epsilon) times the largest singular value.
+  /// the outputs; NaN stands for sqrt(machine epsilon) times the squared largest singular value d.
+  /// Where the basis leaves nothing out, the noise has then an RMS of 1.7e-4 of the runs' at each output
+  /// (1 / lambda = 3e-8 d^2 / (M (N - Q)), the runs' mean square d^2 / (M N)) and of 1.7e-4 / sqrt(N) of the
+  /// leading coefficient's: 1e-5 for N = 300, as the jitter of its covariance has, far above rounding and far
+  /// below what a basis is cut off at.
   HyperPriors priors{{2.0, std::numeric_limits<double>::quiet_NaN()}, {}, {}, {}};
 };
 
@@ -29,7 +33,8 @@ class Emulator {
 
   /// Trains all Q processes; work is shared over the threads of the context. The prior of lambda_q is
   /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2. The variances of
-  /// each process are widened to its leave-one-out errors (GaussianProcess::widen()).
+  /// each process are widened to its leave-one-out errors, of hyper-parameters that have not seen the run
+  /// left out (GaussianProcess::widen()).
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context);
 
@@ -37,7 +42,8 @@ class Emulator {
   /// such a run on the basis has. They vary about the smooth part of the process by the nugget and 1 /
   /// lambda, as those of the training runs do, so that both are in the variance.
   void predict(const Eigen::MatrixXd& points, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
-  /// Leave-one-out mean and variance (M x Q), in the coefficients' own scale.
+  /// Leave-one-out mean and variance (M x Q), widened, by hyper-parameters that have not seen the run left
+  /// out, in the coefficients' own scale. @throws std::logic_error if made of a state, not trained.
   void leave_one_out(Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
 
   EmulatorState state() const;

@@ -1,7 +1,10 @@
 #include "engine/emulator/GaussianProcess.hpp"
 
+#include <algorithm>
+#include <boost/math/special_functions/trigamma.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include "engine/emulator/ModeSearch.hpp"
@@ -15,7 +18,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kJitter = 1e-10;  // of the amplitude: keeps the Cholesky factor away from rounding
+constexpr double kJitter = 1e-10;          // of the amplitude: keeps the Cholesky factor away from rounding
+constexpr double kGreatestLeverage = 0.9;  // beyond which a Newton step leads too far
 
 // beta^(4 d^2) = exp(-theta d^2) with theta = -4 log(beta) = 4 log(1 + exp(-logit beta)).
 VectorXd decay_rates(const VectorXd& logit_beta) {
@@ -61,6 +65,21 @@ double log_prior(const HyperPriors& priors, const VectorXd& x, Eigen::Ref<Vector
     if (gradient.size() > 0) gradient[2] += priors.lambda.shape - 1 - priors.lambda.rate * lambda;
   }
   return value;
+}
+
+// 1 / variance of the logit of a Beta variable, of the logarithm of a Gamma variable.
+double logit_precision(const BetaShapes& prior) {
+  return 1.0 / (boost::math::trigamma(prior.a) + boost::math::trigamma(prior.b));
+}
+double log_precision(const GammaPrior& prior) {
+  return prior.shape > 0 ? 1.0 / boost::math::trigamma(prior.shape)
+                         : 1.0;  // nothing hangs on what is left out
+}
+
+VectorXd prior_precisions(const HyperPriors& priors, Index n_betas) {
+  VectorXd out = VectorXd::Constant(3 + n_betas, logit_precision(priors.beta));
+  out.head(3) << logit_precision(priors.s2), logit_precision(priors.eta2), log_precision(priors.lambda);
+  return out;
 }
 
 // Log density of the values, up to a constant, and its gradient in pack()'s coordinates.
@@ -134,6 +153,8 @@ GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values,
     : scaled_inputs_(inputs * decay_rates(parameters.logit_beta).cwiseSqrt().asDiagonal()),
       values_(values),
       parameters_(parameters) {
+  beta_of.resize(static_cast<std::size_t>(inputs.cols()));
+  std::iota(beta_of.begin(), beta_of.end(), 0);
   MatrixXd covariance(inputs.rows(), inputs.rows());
   fill_covariance(scaled_inputs_, parameters_, covariance);
   const Eigen::LLT<MatrixXd> factor(covariance);
@@ -177,6 +198,7 @@ GaussianProcess GaussianProcess::fit(const MatrixXd& inputs, const VectorXd& val
   process.log_joint = mode.value;
   process.evaluations = mode.evaluations;
   process.selection = mode.selection;
+  process.beta_of = mode.beta_of;
   return process;
 }
 
@@ -199,12 +221,81 @@ void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {
   mean = values_ - weights_.cwiseProduct(variance);
 }
 
-void GaussianProcess::widen() {
-  VectorXd mean, variance;
+// By the hyper-parameters, of which those of shared betas are one.
+struct GaussianProcess::Slopes {
+  MatrixXd error;         // of each leave-one-out error, one row a value
+  VectorXd log_variance;  // of the logarithm of the leave-one-out variances, mean over the values
+  MatrixXd information;   // about the hyper-parameters
+};
+
+// With C the covariance, dC its derivative and p_i the diagonal of C^-1, e_i = (C^-1 y)_i / p_i and
+//     de_i = -(C^-1 dC C^-1 y)_i / p_i + e_i d log v_i,   d log v_i = (C^-1 dC C^-1)_ii / p_i.
+GaussianProcess::Slopes GaussianProcess::slopes(const HyperPriors& priors, const VectorXd& error) const {
+  const Index n = values_.size(), inputs = scaled_inputs_.cols();
+  const double nugget = std::exp(parameters_.log_nugget), rest = noise() - nugget;
+  const VectorXd& w = weights_;
+  const VectorXd spread = inverse_.diagonal().cwiseInverse();
+  MatrixXd work = inverse_ * spread.cwiseSqrt().asDiagonal();
+  MatrixXd share = MatrixXd::Zero(n, n);  // of each element of dC in the mean of d log v_i
+  share.selfadjointView<Eigen::Lower>().rankUpdate(work, 1.0 / static_cast<double>(n));
+  symmetrise(share);
+  const double trace = share.trace();
+
+  const Index betas = 1 + *std::max_element(beta_of.begin(), beta_of.end());
+  MatrixXd moved = MatrixXd::Zero(n, 3 + betas);  // dC C^-1 y
+  VectorXd log_variance = VectorXd::Zero(3 + betas);
+  moved.leftCols(3) << values_ - noise() * w, nugget * w, -rest * w;
+  log_variance.head(3) << 1.0 - noise() * trace, nugget * trace, -rest * trace;
+
+  // dC_ij = C_ij f (u_i - u_j)^2 with the scaled inputs u, multiplied out.
+  auto& smooth = work;
+  gaussian_kernel(scaled_inputs_, scaled_inputs_, smooth);
+  smooth *= std::exp(parameters_.log_amplitude);
+  share = share.cwiseProduct(smooth);
+  const MatrixXd& u = scaled_inputs_;
+  const MatrixXd squared = u.cwiseAbs2();
+  const VectorXd direct = smooth * w, row_sums = share.rowwise().sum();
+  const MatrixXd once = smooth * (w.asDiagonal() * u), twice = smooth * (w.asDiagonal() * squared);
+  const MatrixXd shared = share * u;
+  const VectorXd rates = decay_rates(parameters_.logit_beta);
+  for (Index p = 0; p < inputs; ++p) {
+    const double f = 4.0 / (1.0 + std::exp(parameters_.logit_beta[p])) / rates[p];
+    const Index k = 3 + beta_of[static_cast<std::size_t>(p)];
+    moved.col(k) +=
+        f * (squared.col(p).cwiseProduct(direct) + twice.col(p) - 2.0 * u.col(p).cwiseProduct(once.col(p)));
+    log_variance[k] += 2.0 * f * (squared.col(p).dot(row_sums) - u.col(p).dot(shared.col(p)));
+  }
+
+  const MatrixXd half = root_inverse_.triangularView<Eigen::Lower>() * moved;
+  const MatrixXd solved = root_inverse_.triangularView<Eigen::Lower>().transpose() * half;
+  MatrixXd information = 0.5 * half.transpose() * half;
+  information.diagonal() += prior_precisions(priors, betas);
+  return {error * log_variance.transpose() - spread.asDiagonal() * solved, log_variance, information};
+}
+
+void GaussianProcess::leave_one_out(const HyperPriors& priors, VectorXd& mean, VectorXd& variance) const {
   leave_one_out(mean, variance);
-  const double factor = ((values_ - mean).array().square() / variance.array()).mean();
+  const VectorXd error = values_ - mean;
+  const Slopes slope = slopes(priors, error);
+  const VectorXd& b = slope.log_variance;
+  const Eigen::LLT<MatrixXd> information(slope.information);
+  for (Index i = 0; i < values_.size(); ++i) {
+    const VectorXd a = slope.error.row(i).transpose();
+    const double v = variance[i], e = error[i];
+    const VectorXd score = -(e / v) * a - 0.5 * (1.0 - e * e / v) * b;
+    const VectorXd step = information.solve(score), own = information.solve(a) / v;
+    const double change = a.dot(step) / (1.0 - std::min(kGreatestLeverage, a.dot(own)));  // Sherman, Morrison
+    mean[i] += change;
+    variance[i] *= std::exp(-b.dot(step) - b.dot(own) * change);
+  }
+}
+
+void GaussianProcess::widen(const HyperPriors& priors) {
+  leave_one_out(priors, left_out_mean, left_out_variance);
+  const double factor = ((values_ - left_out_mean).array().square() / left_out_variance.array()).mean();
   if (!(factor > 1.0)) return;
   widened = factor;
+  left_out_variance *= factor;
   parameters_.log_amplitude += std::log(factor);
   parameters_.log_nugget += std::log(factor);
   parameters_.log_lambda -= std::log(factor);

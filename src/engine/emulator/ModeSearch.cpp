@@ -40,7 +40,7 @@ class Search {
     GaussianProcessParameters parameters = GaussianProcessParameters::unpack(best.at.x);
     parameters.logit_beta.resize(inputs_.cols());
     for (Index p = 0; p < inputs_.cols(); ++p) parameters.logit_beta[p] = best.at.x[3 + best.beta_of[p]];
-    return {parameters, best.at.value, evaluations_, selection_};
+    return {parameters, best.at.value, evaluations_, selection_, best.beta_of};
   }
 
  private:

@@ -9,6 +9,7 @@ struct Mode {
   double value = 0.0;   ///< of the log density
   int evaluations = 0;  ///< of it
   std::vector<SelectionStep> selection;
+  std::vector<int> beta_of;  ///< inputs of the same number share a beta
 };
 
 /// Mode of the joint density (3) of one coefficient.
