@@ -3,7 +3,7 @@
 # [--seed 1] [--workers 2] [--figure FILE.png]
 #
 # Simulation-based calibration of posterior (5) with separate and with one noise precision, of posterior (6) and of the
-# history model; calibration of the probabilities of the models M1 to M3; evidences against bridge sampling, where that
+# joint posterior; calibration of the probabilities of the models M1 to M3; evidences against bridge sampling, where that
 # package is installed. Writes JSON, one row a quantity: case, quantity, draws, p_value and holds (p-values adjusted by
 # Holm's method over all rows stay above 0.05, so that a right implementation fails in one of twenty seeds).
 
@@ -27,9 +27,9 @@ said("posteriors (5) and (6)")
 shared <- sbc_run("paper", world, draws, first + 1e4, list(shared_lambda = TRUE), workers)
 said("posterior (5), one noise precision")
 history <- sbc_run("history", world, draws, first + 2e4, workers = workers)
-said("history model")
+said("joint posterior")
 parts <- list(list("posterior (5)", separate, "inside"), list("posterior (5), one lambda*", shared, "inside"),
-              list("posterior (6)", separate, "outside"), list("history model", history, "outside"), list("joint posterior", history, "joint"))
+              list("posterior (6)", separate, "outside"), list("joint posterior", history, "joint"))
 rows <- do.call(rbind, lapply(parts, do.call, what = sbc_rows))
 trusted <- vapply(parts, function(p) mean(vapply(p[[2]], function(r) r$trusted[[p[[3]]]], TRUE)), 0)
 rank_figure(parts, rows, figure)

@@ -2,9 +2,7 @@
 #include <RcppEigen.h>
 
 #include "engine/attribution/VarianceIndex.hpp"
-#include "engine/calibration/PaperCalibration.hpp"
-#include "engine/discrepancy/KernelModel.hpp"
-#include "engine/discrepancy/KernelSampling.hpp"
+#include "engine/calibration/PaperFit.hpp"
 #include "export_convert.h"
 
 using namespace amiss;  // NOLINT
@@ -35,12 +33,6 @@ KernelPriors make_kernel_priors(const Rcpp::List& priors) {
   return out;
 }
 
-std::vector<KernelParameters> make_draws(const KernelTarget& target, const MatrixXd& x) {
-  std::vector<KernelParameters> draws;
-  for (Eigen::Index i = 0; i < x.cols(); ++i) draws.push_back(target.parameters(x.col(i)));
-  return draws;
-}
-
 Rcpp::List list_draws(const std::vector<KernelParameters>& draws, int conditions) {
   const Eigen::Index n = static_cast<Eigen::Index>(draws.size());
   MatrixXd alpha(n, conditions + 1);
@@ -52,6 +44,14 @@ Rcpp::List list_draws(const std::vector<KernelParameters>& draws, int conditions
     lambda[i] = p.lambda;
   }
   return Rcpp::List::create(Rcpp::_["alpha"] = alpha, Rcpp::_["t2"] = t2, Rcpp::_["lambda"] = lambda);
+}
+
+Rcpp::List list_approximation(const KernelSample& sample) {
+  using Rcpp::_;
+  return Rcpp::List::create(
+      _["largest_error"] = sample.largest_error, _["correction"] = sample.correction,
+      _["values"] = Rcpp::IntegerVector::create(_["earlier"] = sample.coarse, _["skeleton"] = sample.by_skeleton,
+                                                _["direct"] = sample.direct));
 }
 
 Rcpp::List list_index(const VarianceIndex& index) {
@@ -75,45 +75,20 @@ Rcpp::List list_index(const VarianceIndex& index) {
 Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
                             const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const AisOptions options = convert::ais_options(control["ais"]);
-  const KernelData kernel = make_kernel_data(data);
-  const KernelModel model(kernel, make_kernel_priors(priors));
-  const KernelTarget outside_target(model);
-  const double tolerance = Rcpp::as<double>(control["tolerance"]);
-  KernelSample sample;
-  if (tolerance > 0) {
-    KernelSamplingOptions sampling;
-    sampling.tolerance = tolerance;
-    sample = sample_kernel(model, options, sampling, context);
-  } else {
-    sample.posterior = sample_ais(outside_target, options, context);
-    sample.direct = sample.posterior.evaluations;
-  }
-  const AisResult& outside = sample.posterior;
-
-  Context second = context;
-  second.seed = context.seed + 1;
-  const PaperCalibration coefficients(kernel.y, kernel.basis);
-  const Emulator emulator(convert::emulator_state(emulator_list));
-  const PaperCalibrationTarget inside_target(coefficients, emulator, model.priors().noise,
-                                             Rcpp::as<bool>(control["shared_lambda"]));
-  const AisResult inside = sample_ais(inside_target, options, second);
-
-  const std::vector<KernelParameters> draws = make_draws(outside_target, outside.draws);
-  const VarianceIndex index =
-      variance_index(model, draws, outside.weights, Rcpp::as<double>(control["probability"]), context);
-  Rcpp::List outside_list = convert::ais_list(outside), inside_list = convert::ais_list(inside);
-  outside_list["hyperparameters"] = list_draws(draws, model.conditions());
-  outside_list["approximation"] = Rcpp::List::create(
-      Rcpp::_["largest_error"] = sample.largest_error, Rcpp::_["correction"] = sample.correction,
-      Rcpp::_["values"] = Rcpp::IntegerVector::create(Rcpp::_["earlier"] = sample.coarse,
-                                                      Rcpp::_["skeleton"] = sample.by_skeleton,
-                                                      Rcpp::_["direct"] = sample.direct));
-  inside_list["unit"] = inside_target.unit(inside.draws);
-  inside_list["lambda"] = inside_target.lambda(inside.draws);
+  const KernelModel model(make_kernel_data(data), make_kernel_priors(priors));
+  const PaperOptions options{convert::ais_options(control["ais"]), Rcpp::as<double>(control["tolerance"]),
+                             Rcpp::as<bool>(control["shared_lambda"])};
+  const PaperFit fit = calibrate_paper(model, Emulator(convert::emulator_state(emulator_list)), options, context);
+  const VarianceIndex index = variance_index(model, fit.draws, fit.outside.posterior.weights,
+                                             Rcpp::as<double>(control["probability"]), context);
+  Rcpp::List outside = convert::ais_list(fit.outside.posterior), inside = convert::ais_list(fit.inside);
+  outside["hyperparameters"] = list_draws(fit.draws, model.conditions());
+  outside["approximation"] = list_approximation(fit.outside);
+  inside["unit"] = fit.unit;
+  inside["lambda"] = fit.lambda;
   using Rcpp::_;
-  return Rcpp::List::create(_["inside"] = inside_list, _["outside"] = outside_list,
-                            _["index"] = list_index(index), _["log_jacobian"] = coefficients.log_jacobian());
+  return Rcpp::List::create(_["inside"] = inside, _["outside"] = outside, _["index"] = list_index(index),
+                            _["log_jacobian"] = fit.log_jacobian);
 }
 
 // The fictitious condition x_0 of (6).

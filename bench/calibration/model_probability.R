@@ -14,7 +14,8 @@ box_worlds <- function(noise_sd = 1.5) {
   lapply(stats::setNames(box_models, box_models), function(model) {
     simulator <- amiss::paper_box(model)
     runs <- amiss::simulate_design(simulator, record, runs = 60, seed = 6)
-    list(measurements = record, simulator = simulator, emulator = amiss::train_emulator(runs, record, list(noise_fraction = 0.02)))
+    emulator <- amiss::train_emulator(runs, record, list(noise_fraction = 0.02))
+    list(measurements = record, simulator = simulator, emulator = emulator, spread = simulator_spread(emulator))
   })
 }
 
@@ -39,7 +40,7 @@ model_case <- function(worlds, source, seed) {
   set.seed(seed)
   true <- sample(length(worlds), 1)
   record <- worlds[[1]]$measurements
-  control <- amiss:::fill_calibration_control(utils::modifyList(list(ais = sbc_ais), source$control), record, sum(record$use == "calibrate"))
+  control <- amiss:::fill_calibration_control(utils::modifyList(list(ais = sbc_ais, check = 0), source$control), record, sum(record$use == "calibrate"))
   y <- source$draw(worlds[[true]], control)
   evidence <- vapply(worlds, function(world) amiss::calibrate(world$emulator, observed(record, y), control, seed = seed)$log_evidence, 0)
   weight <- exp(evidence - max(evidence))

@@ -40,28 +40,38 @@ kernel_covariance <- function(x, condition, alpha, t2) {
   zeta
 }
 
-# The history model: one sigma and one error setting for the whole record, discrepancy in the complement of K under
-# the metric of the error.
+# The history model: one sigma, one error setting and one reach for the whole record, the discrepancy in all directions.
 draw_history <- function(world, control) {
   m <- world$measurements
-  k <- world$emulator$basis$vectors
+  emulator <- world$emulator
+  k <- emulator$basis$vectors
   n <- nrow(k)
-  unit <- stats::runif(length(world$emulator$parameters))
-  w <- coefficients_at(world$emulator, unit)
-  variance <- 1 / draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence))
+  unit <- stats::runif(length(emulator$parameters))
+  w <- coefficients_at(emulator, unit)
+  variance <- 1 / draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)) + mean(emulator$basis$discarded_sd^2)
   level <- sample(length(control$error_ratios), length(control$error_times), replace = TRUE)
+  reach <- sample(length(control$reach), 1)
   included <- stats::runif(length(m$conditions)) < control$inclusion
   strength <- ifelse(included, (control$amplitude * stats::rcauchy(length(m$conditions)))^2, 0)
 
   error <- error_covariance(m$hours[m$use == "calibrate"], control$error_times, control$error_ratios[level])
   phi <- standardised_responses(m, control$time_constants)
   coefficients <- stats::rnorm(ncol(phi$x), 0, sqrt(strength[phi$condition] / length(control$time_constants)))
-  root <- chol(error)
-  whitened <- function(x) backsolve(root, x, transpose = TRUE)
-  outside <- stats::lm.fit(whitened(k), whitened(phi$x %*% coefficients))$residuals
-  y <- k %*% stats::rnorm(ncol(k), w$mean, sqrt(w$variance)) + crossprod(root, outside + stats::rnorm(n, 0, sqrt(variance)))
-  truth <- c(variance = variance, stats::setNames(level, ratio_names(control)), stats::setNames(strength, t_names(m)))
-  list(y = as.numeric(y), joint = c(stats::setNames(unit, names(world$emulator$parameters)), truth), history = truth)
+  response <- phi$x %*% coefficients
+  if (is.finite(control$reach[reach])) {
+    ratio <- k %*% world$spread %*% t(k) / (control$reach[reach] * m$noise_sd^2)
+    response <- solve(diag(n) + ratio %*% ratio, response)
+  }
+  y <- k %*% stats::rnorm(ncol(k), w$mean, sqrt(w$variance)) + response + sqrt(variance) * crossprod(chol(error), stats::rnorm(n))
+  truth <- c(variance = variance, stats::setNames(level, ratio_names(control)), reach = reach, stats::setNames(strength, t_names(m)))
+  list(y = as.numeric(y), joint = c(stats::setNames(unit, names(emulator$parameters)), truth))
+}
+
+# Covariance of the emulated coefficients over the priors, by many points: how far the simulator can move.
+simulator_spread <- function(emulator, points = 20000) {
+  set.seed(1)
+  w <- amiss:::predict_emulator_(emulator$processes, matrix(stats::runif(points * length(emulator$parameters)), points))
+  stats::cov(w$mean) + diag(colMeans(w$variance), ncol(w$mean))
 }
 
 ratio_names <- function(control) sprintf("error ratio (%g h)", control$error_times)

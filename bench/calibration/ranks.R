@@ -36,20 +36,18 @@ sbc_one <- list(
     list(inside = ranks(drawn$inside, inside, fit$weights), outside = ranks(drawn$outside, outside, h$weights),
          trusted = c(inside = fit$inside$trusted, outside = fit$outside$trusted))
   },
+  # The record is the emulator's: the simulator is not asked.
   history = function(world, control, seed) {
-    control <- utils::modifyList(list(ais = sbc_ais), control)
+    control <- utils::modifyList(list(ais = sbc_ais, check = 0), control)
     drawn <- draw_history(world, amiss:::fill_calibration_control(control, world$measurements, sbc_steps))
     fit <- amiss::calibrate(world$emulator, observed(world$measurements, drawn$y), control, seed = seed)
-    draws <- function(part, names) {
-      levels <- length(fit$control$error_ratios)
-      digits <- vapply(seq_along(fit$control$error_times), function(k) part$setting %/% levels^(k - 1) %% levels + 1, part$variance)
-      out <- cbind(part$unit, part$variance, digits, part$t)
-      colnames(out) <- names
-      out
-    }
-    list(joint = ranks(drawn$joint, draws(fit$posterior, names(drawn$joint)), fit$posterior$weights),
-         outside = ranks(drawn$history, draws(fit$history, names(drawn$history)), fit$history$weights),
-         trusted = c(joint = fit$posterior$trusted, outside = fit$history$trusted))
+    part <- fit$posterior
+    levels <- length(fit$control$error_ratios)
+    places <- seq_along(fit$control$error_times)
+    digits <- vapply(places, function(k) part$setting %/% levels^(k - 1) %% levels + 1, part$variance)
+    draws <- cbind(part$unit, part$variance, digits, part$setting %/% levels^length(places) + 1, part$t)
+    colnames(draws) <- names(drawn$joint)
+    list(joint = ranks(drawn$joint, draws, part$weights), trusted = c(joint = part$trusted))
   })
 
 # Ranks of `draws` repetitions; seeds are first + 1, 2, ...

@@ -15,7 +15,8 @@ sbc_world <- function() {
   record <- amiss::measurements(data.frame(hour, Te, Gv, Ti = 20 + sin(hour)), time = "hour", target = "Ti", boundary = ~ Te + Gv,
                                 noise_sd = 0.3, unit = "K", name = "calibration check")
   runs <- amiss::simulate_design(simulator, record, runs = 8, seed = 1)
-  list(measurements = record, emulator = amiss::train_emulator(runs, record))
+  emulator <- amiss::train_emulator(runs, record)
+  list(measurements = record, emulator = emulator, spread = simulator_spread(emulator))
 }
 
 observed <- function(measurements, y) {
