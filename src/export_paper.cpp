@@ -50,8 +50,8 @@ Rcpp::List list_approximation(const KernelSample& sample) {
   using Rcpp::_;
   return Rcpp::List::create(
       _["largest_error"] = sample.largest_error, _["correction"] = sample.correction,
-      _["values"] = Rcpp::IntegerVector::create(_["earlier"] = sample.coarse, _["skeleton"] = sample.by_skeleton,
-                                                _["direct"] = sample.direct));
+      _["values"] = Rcpp::IntegerVector::create(
+          _["earlier"] = sample.coarse, _["skeleton"] = sample.by_skeleton, _["direct"] = sample.direct));
 }
 
 Rcpp::List list_index(const VarianceIndex& index) {
@@ -75,10 +75,12 @@ Rcpp::List list_index(const VarianceIndex& index) {
 Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
                             const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const KernelModel model(make_kernel_data(data), make_kernel_priors(priors));
+  const KernelData kernel = make_kernel_data(data);
+  const KernelModel model(kernel, make_kernel_priors(priors));
   const PaperOptions options{convert::ais_options(control["ais"]), Rcpp::as<double>(control["tolerance"]),
                              Rcpp::as<bool>(control["shared_lambda"])};
-  const PaperFit fit = calibrate_paper(model, Emulator(convert::emulator_state(emulator_list)), options, context);
+  const PaperFit fit = calibrate_paper(model, PaperCalibration(kernel.y, kernel.basis),
+                                       Emulator(convert::emulator_state(emulator_list)), options, context);
   const VarianceIndex index = variance_index(model, fit.draws, fit.outside.posterior.weights,
                                              Rcpp::as<double>(control["probability"]), context);
   Rcpp::List outside = convert::ais_list(fit.outside.posterior), inside = convert::ais_list(fit.inside);

@@ -2,8 +2,8 @@
 
 namespace amiss {
 
-PaperFit calibrate_paper(const KernelModel& model, const Emulator& emulator, const PaperOptions& options,
-                         const Context& context) {
+PaperFit calibrate_paper(const KernelModel& model, const PaperCalibration& coefficients,
+                         const Emulator& emulator, const PaperOptions& options, const Context& context) {
   PaperFit fit;
   const KernelTarget outside(model);
   if (options.tolerance > 0) {
@@ -17,7 +17,6 @@ PaperFit calibrate_paper(const KernelModel& model, const Emulator& emulator, con
   const Eigen::MatrixXd& draws = fit.outside.posterior.draws;
   for (Eigen::Index i = 0; i < draws.cols(); ++i) fit.draws.push_back(outside.parameters(draws.col(i)));
 
-  const PaperCalibration coefficients(model.data().y, model.data().basis);
   const PaperCalibrationTarget inside(coefficients, emulator, model.priors().noise, options.shared_lambda);
   fit.inside = sample_ais(inside, options.ais, Context{context.seed + 1, context.threads, context.poll});
   fit.unit = inside.unit(fit.inside.draws);

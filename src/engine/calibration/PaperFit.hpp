@@ -21,7 +21,7 @@ struct PaperFit {
 };
 
 /// Posterior (6) of the discrepancy, and posterior (5) of the parameters, each on its own part of the record.
-PaperFit calibrate_paper(const KernelModel& model, const Emulator& emulator, const PaperOptions& options,
-                         const Context& context);
+PaperFit calibrate_paper(const KernelModel& model, const PaperCalibration& coefficients,
+                         const Emulator& emulator, const PaperOptions& options, const Context& context);
 
 }  // namespace amiss
