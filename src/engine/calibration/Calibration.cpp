@@ -21,10 +21,17 @@ namespace {
 enum Purpose : std::uint64_t { kFirstHistory, kSecondHistory, kPopulation, kPosterior };
 enum StreamPurpose : std::uint64_t { kPriorPoints = 61, kModes, kMixture, kCloser };
 
-constexpr int kHistoryPoints = 3;    // at which the modes of the parameters are sought
-constexpr int kHistoryChains = 128;  // of the posterior under a Gaussian simulator
-constexpr double kHistoryDrop = 0.5;
-constexpr int kHistorySweeps = 5;
+// How error and discrepancy are sampled under a Gaussian simulator, and at how many of the draws the modes of
+// the parameters are sought.
+struct StartOptions {
+  int chains;
+  double ess_drop;
+  int max_sweeps;
+  int points;
+  ModeOptions modes;
+};
+const StartOptions kFirstStart{64, 0.3, 3, 2, {128, 3}};
+const StartOptions kSecondStart{128, 0.5, 5, 3, {64, 3}};
 constexpr double kReferenceDof = 8.0;
 constexpr Index kRoundDraws = 25;         // that bring the reference closer, each round, per coordinate
 constexpr std::uint64_t kPriorSeed = 20;  // the spread of the simulator is part of the model, not of a run
@@ -47,21 +54,22 @@ struct Start {
 };
 
 // Error and discrepancy under a Gaussian simulator, and where the parameters lie then.
-Start start_from(const CalibrationTarget& target, const GaussianSimulator& simulator,
+Start start_from(const CalibrationTarget& target, const GaussianSimulator& simulator, const StartOptions& how,
                  const AisOptions& options, const Context& context, long& evaluations) {
   const HistoryTarget history(target.model(), target.coordinates().active(), simulator);
   AisOptions rough = options;
-  rough.pilot_chains = kHistoryChains;
-  rough.ess_drop = std::min(options.ess_drop, kHistoryDrop);
-  rough.max_sweeps = std::min(options.max_sweeps, kHistorySweeps);
+  rough.pilot_chains = how.chains;
+  rough.ess_drop = std::min(options.ess_drop, how.ess_drop);
+  rough.max_sweeps = std::min(options.max_sweeps, how.max_sweeps);
+  rough.sweeps = std::min(options.sweeps, rough.max_sweeps);
   rough.gradient = false;
   MatrixXd draws =
       sample_population(history, StandardNormal(history.dimension()), rough, context, evaluations);
   std::vector<HistoryParameters> points;
-  for (int k = 0; k < kHistoryPoints; ++k)
-    points.push_back(history.parameters(draws.col((2 * k + 1) * draws.cols() / (2 * kHistoryPoints))));
+  for (int k = 0; k < how.points; ++k)
+    points.push_back(history.parameters(draws.col((2 * k + 1) * draws.cols() / (2 * how.points))));
   Stream stream(context.seed, kModes, 0);
-  ParameterModes modes = parameter_modes(target, points, ModeOptions(), context, stream);
+  ParameterModes modes = parameter_modes(target, points, how.modes, context, stream);
   return {std::move(draws), std::move(modes)};
 }
 
@@ -69,8 +77,9 @@ CloserReference closer_reference(const CalibrationTarget& target, const AisOptio
                                  const Context& context, long& evaluations) {
   const Emulator& emulator = target.emulator();
   const GaussianSimulator first = over_priors(emulator, Stream(kPriorSeed, kPriorPoints, 0));
-  const Start rough = start_from(target, first, options, context.fork(kFirstHistory), evaluations);
-  const Start start = start_from(target, tangent_at(emulator, rough.modes.best), options,
+  const Start rough =
+      start_from(target, first, kFirstStart, options, context.fork(kFirstHistory), evaluations);
+  const Start start = start_from(target, tangent_at(emulator, rough.modes.best), kSecondStart, options,
                                  context.fork(kSecondHistory), evaluations);
   evaluations += rough.modes.evaluations + start.modes.evaluations;
   const Index n = start.history.cols();
