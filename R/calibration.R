@@ -59,7 +59,7 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
                         weights = posterior$weights, posterior = posterior, kept = result$kept, priors = priors,
                         coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
                         centre = result$centre, scale = result$scale,
-                        reach = stats::setNames(result$reach, format(control$reach)),
+                        reach = stats::setNames(result$reach, format(control$reach, trim = TRUE)),
                         log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
                         interval = posterior$interval), class = "amiss_calibration")
   checked <- checked_by_runs(fit, threads)
