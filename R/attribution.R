@@ -38,12 +38,17 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   threads <- check_threads(threads)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   draws <- list(posterior = fit$posterior, kept = fit$kept, tangent = fit$tangent)
-  asked <- c(control, list(least = control$least_log10_bf * log(10)))
-  result <- call_engine(attribute_(data, fit$priors, fit$emulator$processes, draws, asked, engine_context(seed, threads)))
   conditions <- fit$measurements$conditions
-  log10_bf <- result$sets$lost / log(10)
-  significant <- result$adjusted <= control$level & log10_bf >= control$least_log10_bf
   own <- seq_along(conditions)
+  attributed <- function(least) {
+    asked <- c(control, list(least = least * log(10)))
+    result <- call_engine(attribute_(data, fit$priors, fit$emulator$processes, draws, asked, engine_context(seed, threads)))
+    matters <- result$sets$lost / log(10) >= control$least_log10_bf
+    c(result, list(significant = matters & result$adjusted <= control$level, hidden = (matters & result$adjusted > control$level)[own]))
+  }
+  result <- with_hidden_groups(attributed(control$least_log10_bf), attributed, own)
+  log10_bf <- result$sets$lost / log(10)
+  significant <- result$significant
   table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf[own], standard_error = result$sets$standard_error[own] / log(10),
                       share = colMeans(result$shares), p_value = result$adjusted[own], p_value_single = result$p_value[own],
                       significant = significant[own], trusted = result$sets$trusted[own], group = NA_character_)
@@ -64,6 +69,16 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   structure(list(format_version = format_version, table = table, groups = groups, surrogates = nrow(result$null_statistics),
                  statistic = result$statistic, null_statistics = result$null_statistics,
                  control = control, seed = seed), class = "amiss_attribution")
+}
+
+# Of two conditions that say the same, one may earn just enough to stay out of the search for groups, and yet no surrogate
+# misses it, as the other takes its place. Where a condition earns its evidence but no p-value, groups are sought once more with it.
+with_hidden_groups <- function(first, attributed, own) {
+  if (!any(first$hidden)) return(first)
+  again <- attributed((max(first$sets$lost[own][first$hidden]) + 1e-6) / log(10))
+  grouped <- unlist(again$sets$conditions[-own]) + 1L
+  # What was significant by itself keeps its own name.
+  if (length(grouped) && !any(first$significant[grouped])) again else first
 }
 
 # The largest correlation between columns of two different conditions of a group, over the calibration rows.

@@ -21,11 +21,14 @@ checked_by_runs <- function(fit, threads) {
 # The runs of the check serve the exact evidence; where they cost milliseconds, more are made for it.
 default_exact <- function(fit) if (inherits(fit$emulator$simulator, "amiss_zone")) max(200, fit$control$check) else fit$control$check
 
-# Runs of the simulator at n draws spread evenly over the posterior: list(draws, values, unit, runs), failed ones left out.
+# Runs of the simulator at n draws spread evenly over the posterior: list(draws, times, runs, failed), failed ones left out.
+# A draw of more weight than one of n is run once, and counts as often as it was drawn.
 posterior_runs <- function(fit, n, threads) {
   # In the order of a coordinate, so that draws of equal weight cover the posterior evenly.
   order <- order(fit$values[, 1])
-  draws <- unique(order[systematic_draws(fit$weights[order], n)])
+  drawn <- order[systematic_draws(fit$weights[order], n)]
+  draws <- unique(drawn)
+  times <- tabulate(match(drawn, draws))
   runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate", threads))
   failed <- colSums(!is.finite(runs)) > 0
   if (mean(failed) > largest_failed_share) {
@@ -34,7 +37,7 @@ posterior_runs <- function(fit, n, threads) {
                       x = "The first is run {which(failed)[1]} at {paste(colnames(fit$values), signif(fit$values[worst, ], 4), sep = ' = ', collapse = ', ')}.",
                       i = "Find out why it fails there, or narrow the priors."))
   }
-  list(draws = draws[!failed], runs = runs[, !failed, drop = FALSE], failed = sum(failed))
+  list(draws = draws[!failed], times = times[!failed], runs = runs[, !failed, drop = FALSE], failed = sum(failed))
 }
 
 # The check tells of failed runs itself.
@@ -45,7 +48,7 @@ emulation_check <- function(fit, made) {
   w <- predict_emulator_(emulator$processes, posterior_unit(fit)[made$draws, , drop = FALSE])
   error <- made$runs - tcrossprod(emulator$basis$vectors, w$mean)
   new_check(fit, error, series_variance(emulator$basis, w$variance), made$failed, "runs of the simulator at posterior draws",
-            mean = rowMeans(made$runs))
+            mean = as.numeric(made$runs %*% made$times) / sum(made$times))
 }
 
 # Leave-one-out errors of the runs nearest to the posterior's centre, in the unit cube.
@@ -79,7 +82,7 @@ exact_evidence <- function(fit, made, threads) {
                  t = posterior$t[own, , drop = FALSE])
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   exact <- call_engine(run_likelihood_(data, fit$priors, fit$emulator$processes, points, made$runs, engine_context(fit$seed, threads)))
-  log_ratio <- exact - posterior$log_likelihood[own]
+  log_ratio <- rep(exact - posterior$log_likelihood[own], made$times)
   ratio <- exp(log_ratio - max(log_ratio))
   weights <- ratio / sum(ratio)
   n <- length(ratio)

@@ -191,7 +191,9 @@ change_words <- function(before, after, unit) {
 }
 
 clock <- function(time) {
-  if (is.numeric(time) || inherits(time, "POSIXct")) time else as.POSIXct(3600 * read_time(time, "time"), origin = "1970-01-01", tz = "UTC")
+  if (is.numeric(time) || inherits(time, "POSIXct")) return(time)
+  # Rounded to milliseconds, as hours are not whole: a second before 00:10:00 is in another minute.
+  as.POSIXct(round(3600 * read_time(time, "time"), 3), origin = "1970-01-01", tz = "UTC")
 }
 
 time_label <- function(time) if (is.numeric(time)) "time [h]"

@@ -19,6 +19,10 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
   check_input(checkmate::check_count(draws, positive = TRUE), "draws")
   threads <- check_threads(threads)
   seed <- pick_seed(seed)
+  check_input(checkmate::check_flag(discrepancy), "discrepancy")
+  if (discrepancy && !inherits(object, "amiss_calibration")) {
+    abort_input("{.arg discrepancy} needs a fit of {.fun calibrate}: that of the paper does not carry over to other rows.")
+  }
   m <- object$measurements
   simulator <- object$emulator$simulator
   if (is.null(simulator)) {
@@ -43,7 +47,6 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
 
 # The lacking response at the rows of these uses (rows x kept draws), and what it leaves in calibration.
 carried_response <- function(fit, use, threads) {
-  if (!inherits(fit, "amiss_calibration")) abort_input("{.arg discrepancy} needs a fit of {.fun calibrate}: that of the paper does not carry over to other rows.")
   m <- fit$measurements
   rows <- which(m$use %in% use & !is.na(m$y))
   responses <- filter_responses(m, fit$control$time_constants)
@@ -54,13 +57,17 @@ carried_response <- function(fit, use, threads) {
        sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
 }
 
-# The basis vectors at other rows: the same combinations of the ensemble's runs.
+# The basis vectors at other rows: the same combinations of the ensemble's runs, without those that fail there.
 basis_at <- function(fit, use, threads) {
   emulator <- fit$emulator
   w <- emulator$processes$coefficients
   last <- ncol(w)
-  runs <- simulate_measured(emulator$simulator, unit_to_values(emulator$processes$inputs, emulator$parameters), fit$measurements, use, threads)
-  cbind(sweep(runs, 2, w[, last]) %*% w[, -last, drop = FALSE], 1)
+  values <- unit_to_values(emulator$processes$inputs, emulator$parameters)
+  runs <- suppress_run_warnings(simulate_measured(emulator$simulator, values, fit$measurements, use, threads))
+  made <- colSums(!is.finite(runs)) == 0
+  if (sum(made) < last) abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs when they were made again.")
+  own <- w[made, -last, drop = FALSE]
+  cbind(sweep(runs[, made, drop = FALSE], 2, w[made, last]) %*% own %*% solve(crossprod(own)), 1)
 }
 
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy

@@ -21,7 +21,7 @@ calibrate_refined <- function(ensemble, measurements, rounds = 2, control = NULL
     emulator <- train_emulator(ensemble, measurements, control$emulator, threads = threads)
     calibrated <- calibrate_with_runs(emulator, measurements, control$calibration, seed, threads)
     fit <- calibrated$fit
-    made_runs <- made_runs + NCOL(calibrated$made$runs)
+    made_runs <- made_runs + length(calibrated$made$draws) + sum(calibrated$made$failed)
     if (is.null(calibrated$made) || isTRUE(fit$check$passed) || round == rounds) break
     ensemble <- join_runs(ensemble, fit, calibrated$made)
   }

@@ -34,10 +34,10 @@ remainder_pattern <- function(r, rows, measurements) {
        where = "Look for something that follows the clock and is not among the inputs: a heat gain, a schedule, a door.")
 }
 
-# Hour of the day as the record's own clock shows it.
+# Hour of the day as the record's own clock shows it; of text that states an offset, as everywhere, in UTC.
 clock_hour <- function(time) {
-  if (!inherits(time, "POSIXct")) return(round(as.numeric(time) %% 24, 4))
-  parts <- as.POSIXlt(time)
+  if (is.numeric(time)) return(round(time %% 24, 4))
+  parts <- as.POSIXlt(clock(time))
   round(parts$hour + parts$min / 60, 4)
 }
 

@@ -37,15 +37,14 @@ held_out_gain <- function(parent, model) {
   if (!nrow(before)) return(list(mean = NA_real_, standard_error = NA_real_, improves = NA))
   fall <- (before$observed - before$mean)^2 - (after$observed - after$mean)^2
   n <- length(fall)
-  hours <- record_hours(before$time)
-  block <- floor((hours - hours[1]) / 24)
+  measurements <- model$fit$measurements
+  hours <- measurements$hours[used_rows(measurements, "validate")]
+  block <- floor((hours - hours[1]) / 24 + 1e-6)  # hours of clock times are rounded
   if (length(unique(block)) < 8) block <- floor(8 * (seq_len(n) - 1) / n)
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
 }
-
-record_hours <- function(time) if (inherits(time, "POSIXct")) as.numeric(time) / 3600 else as.numeric(time)
 
 # The condition that drives a mechanism answered before and does so still, with more than half of its evidence.
 still_answers <- function(parent, model, boundary) {
