@@ -89,10 +89,11 @@ exact_evidence <- function(fit, made, threads) {
   effective <- 1 / (n * sum(weights^2))
   fit$check$effective <- effective
   correction <- max(log_ratio) + log(mean(ratio))
-  # Where few draws carry the weight, the mean of the ratios is too low; by their first two moments it is that of lognormal
-  # ones. How far the two are apart is part of the error.
-  lognormal <- mean(log_ratio) + stats::var(log_ratio) / 2
-  error <- sqrt(max(0, 1 / effective - 1) / (n - 1) + (correction - lognormal)^2)
+  # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the upper half it is that of
+  # lognormal ratios; how far the two are apart is part of the error.
+  above <- pmax(log_ratio - stats::median(log_ratio), 0)
+  lognormal <- stats::median(log_ratio) + mean(above^2)  # twice the mean square of one half, over two
+  error <- sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2)
   fit$check$correction <- correction
   fit$log_evidence <- fit$log_evidence + correction
   fit$standard_error <- sqrt(fit$standard_error^2 + error^2)

@@ -171,6 +171,16 @@ StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights,
   return StudentTMixture(std::move(components), std::move(best.weights));
 }
 
+StudentTMixture StudentTMixture::together(const std::vector<StudentTMixture>& mixtures) {
+  std::vector<StudentT> components;
+  std::vector<double> weights;
+  for (const StudentTMixture& mixture : mixtures) {
+    components.insert(components.end(), mixture.components_.begin(), mixture.components_.end());
+    for (double weight : mixture.weights_) weights.push_back(weight / static_cast<double>(mixtures.size()));
+  }
+  return StudentTMixture(std::move(components), std::move(weights));
+}
+
 VectorXd StudentTMixture::log_parts(const VectorXd& x) const {
   VectorXd parts(static_cast<Index>(components_.size()));
   for (std::size_t k = 0; k < components_.size(); ++k)

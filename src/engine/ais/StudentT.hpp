@@ -45,6 +45,9 @@ class StudentTMixture : public Distribution {
   static StudentTMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components,
                              double dof, Stream& stream);
 
+  /// Several mixtures as one, with equal shares.
+  static StudentTMixture together(const std::vector<StudentTMixture>& mixtures);
+
   double log_density(const Eigen::VectorXd& x) const override;
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override;
   Eigen::VectorXd draw(Stream& stream) const override;

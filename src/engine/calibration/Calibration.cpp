@@ -30,8 +30,8 @@ struct StartOptions {
   int points;
   ModeOptions modes;
 };
-const StartOptions kFirstStart{64, 0.3, 3, 2, {128, 3}};
-const StartOptions kSecondStart{128, 0.5, 5, 3, {64, 3}};
+const StartOptions kRoughStart{64, 0.3, 3, 2, {128, 3}};
+const StartOptions kStart{96, 0.5, 5, 2, {64, 3}};  // for each reach
 constexpr double kReferenceDof = 8.0;
 constexpr Index kRoundDraws = 25;         // that bring the reference closer, each round, per coordinate
 constexpr std::uint64_t kPriorSeed = 20;  // the spread of the simulator is part of the model, not of a run
@@ -53,40 +53,50 @@ struct Start {
   ParameterModes modes;
 };
 
-// Error and discrepancy under a Gaussian simulator, and where the parameters lie then.
-Start start_from(const CalibrationTarget& target, const GaussianSimulator& simulator, const StartOptions& how,
-                 const AisOptions& options, const Context& context, long& evaluations) {
-  const HistoryTarget history(target.model(), target.coordinates().active(), simulator);
+// Error and discrepancy under a Gaussian simulator, given a reach (or -1), and where the parameters lie then.
+Start start_from(const CalibrationTarget& target, const GaussianSimulator& simulator, int reach,
+                 const StartOptions& how, const AisOptions& options, const Context& context) {
+  const HistoryTarget history(target.model(), target.coordinates().active(), simulator, reach);
   AisOptions rough = options;
   rough.pilot_chains = how.chains;
   rough.ess_drop = std::min(options.ess_drop, how.ess_drop);
   rough.max_sweeps = std::min(options.max_sweeps, how.max_sweeps);
   rough.sweeps = std::min(options.sweeps, rough.max_sweeps);
   rough.gradient = false;
-  MatrixXd draws =
-      sample_population(history, StandardNormal(history.dimension()), rough, context, evaluations);
+  long spent = 0;
+  MatrixXd draws = sample_population(history, StandardNormal(history.dimension()), rough, context, spent);
   std::vector<HistoryParameters> points;
   for (int k = 0; k < how.points; ++k)
     points.push_back(history.parameters(draws.col((2 * k + 1) * draws.cols() / (2 * how.points))));
   Stream stream(context.seed, kModes, 0);
   ParameterModes modes = parameter_modes(target, points, how.modes, context, stream);
+  modes.evaluations += spent;
+  for (Index i = 0; i < draws.cols(); ++i) draws.col(i) = history.with_reach(draws.col(i), stream.uniform());
   return {std::move(draws), std::move(modes)};
 }
 
+// Each reach has a start of its own: a restrained discrepancy asks for other parameters than a free one, and
+// chains that would have to change both at once do not.
 CloserReference closer_reference(const CalibrationTarget& target, const AisOptions& options,
                                  const Context& context, long& evaluations) {
   const Emulator& emulator = target.emulator();
   const GaussianSimulator first = over_priors(emulator, Stream(kPriorSeed, kPriorPoints, 0));
-  const Start rough =
-      start_from(target, first, kFirstStart, options, context.fork(kFirstHistory), evaluations);
-  const Start start = start_from(target, tangent_at(emulator, rough.modes.best), kSecondStart, options,
-                                 context.fork(kSecondHistory), evaluations);
-  evaluations += rough.modes.evaluations + start.modes.evaluations;
-  const Index n = start.history.cols();
-  Stream stream(context.seed, kMixture, 0);
-  return CloserReference({StudentTMixture::fit(start.history, VectorXd::Constant(n, 1.0 / n),
-                                               options.max_components, kReferenceDof, stream),
-                          start.modes.mixture});
+  const Start rough = start_from(target, first, -1, kRoughStart, options, context.fork(kFirstHistory));
+  evaluations += rough.modes.evaluations;
+  const GaussianSimulator tangent = tangent_at(emulator, rough.modes.best);
+  const Context second = context.fork(kSecondHistory);
+  std::vector<StudentTMixture> history, parameters;
+  for (int k = 0; k < static_cast<int>(target.model().priors().reach.size()); ++k) {
+    const auto purpose = static_cast<std::uint64_t>(k);
+    const Start start = start_from(target, tangent, k, kStart, options, second.fork(purpose));
+    evaluations += start.modes.evaluations;
+    const Index n = start.history.cols();
+    Stream stream(second.seed, kMixture, purpose);
+    history.push_back(StudentTMixture::fit(start.history, VectorXd::Constant(n, 1.0 / static_cast<double>(n)),
+                                           options.max_components, kReferenceDof, stream));
+    parameters.push_back(start.modes.mixture);
+  }
+  return CloserReference({StudentTMixture::together(history), StudentTMixture::together(parameters)});
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "engine/discrepancy/HistoryTarget.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <utility>
@@ -92,17 +93,33 @@ VectorXd HistoryCoordinates::gradient(const Eigen::Ref<const VectorXd>& x, const
 }
 
 HistoryTarget::HistoryTarget(const HistoryModel& model, std::vector<int> active,
-                             const GaussianSimulator& simulator)
-    : coordinates_(model, std::move(active)) {
+                             const GaussianSimulator& simulator, int reach)
+    : coordinates_(model, std::move(active)), reach_(reach) {
   const VectorXd shift = simulator.mean - model.reference();
   for (int g = 0; g < model.settings(); ++g)
     settings_.push_back(model.whitened(g).in_terms_of(shift, simulator.root));
 }
 
+HistoryParameters HistoryTarget::parameters(const VectorXd& x) const {
+  HistoryParameters point = coordinates_.parameters(x);
+  const int errors = coordinates_.model().error_settings();
+  if (reach_ >= 0) point.setting = point.setting % errors + reach_ * errors;
+  return point;
+}
+
+VectorXd HistoryTarget::with_reach(VectorXd x, double u) const {
+  const HistoryPriors& priors = coordinates_.model().priors();
+  const double reaches = static_cast<double>(priors.reach.size());
+  if (reach_ >= 0 && reaches > 1)
+    x[1 + priors.error.correlation_times.size()] =
+        boost::math::quantile(boost::math::normal(), clamp_unit((reach_ + u) / reaches));
+  return x;
+}
+
 VectorXd HistoryTarget::log_likelihood(const MatrixXd& x) const {
   VectorXd values(x.cols());
   for (Index i = 0; i < x.cols(); ++i) {
-    const HistoryParameters point = coordinates_.parameters(x.col(i));
+    const HistoryParameters point = parameters(x.col(i));
     values[i] = coordinates_.model().log_likelihood(settings_[static_cast<std::size_t>(point.setting)],
                                                     std::log(point.variance), point.t);
   }
@@ -113,7 +130,7 @@ VectorXd HistoryTarget::log_likelihood(const MatrixXd& x, MatrixXd& gradient) co
   gradient.resize(x.rows(), x.cols());
   VectorXd values(x.cols()), natural;
   for (Index i = 0; i < x.cols(); ++i) {
-    const HistoryParameters point = coordinates_.parameters(x.col(i));
+    const HistoryParameters point = parameters(x.col(i));
     values[i] = coordinates_.model().log_likelihood(settings_[static_cast<std::size_t>(point.setting)],
                                                     std::log(point.variance), point.t, &natural);
     gradient.col(i) = coordinates_.gradient(x.col(i), point, natural);

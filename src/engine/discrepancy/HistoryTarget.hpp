@@ -39,16 +39,22 @@ struct GaussianSimulator {
 /// value is a matter of microseconds.
 class HistoryTarget : public Target {
  public:
-  HistoryTarget(const HistoryModel& model, std::vector<int> active, const GaussianSimulator& simulator);
+  /// @param reach  number of the reach that is taken as given (its coordinate does nothing); -1: none is.
+  HistoryTarget(const HistoryModel& model, std::vector<int> active, const GaussianSimulator& simulator,
+                int reach = -1);
 
   Eigen::Index dimension() const override { return coordinates_.dimension(); }
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
   bool has_gradient() const override { return true; }
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override;
-  HistoryParameters parameters(const Eigen::VectorXd& x) const { return coordinates_.parameters(x); }
+  HistoryParameters parameters(const Eigen::VectorXd& x) const;
+  /// The same point with the coordinate of the reach, if there is one, where it chooses the given one: u of
+  /// the way through its interval.
+  Eigen::VectorXd with_reach(Eigen::VectorXd x, double u) const;
 
  private:
   HistoryCoordinates coordinates_;
+  int reach_;
   std::vector<WhitenedData> settings_;  // in terms of the simulator's a
 };
 
