@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "engine/discrepancy/HistoryModel.hpp"
+#include "engine/discrepancy/HistoryTarget.hpp"
 #include "engine/discrepancy/KernelModel.hpp"
 #include "engine/random/Stream.hpp"
 
@@ -80,11 +80,15 @@ inline KernelModel kernel_record(Index n, int active, std::uint64_t seed) {
   return KernelModel(data, priors);
 }
 
+/// A simulator that moves by 0.3 along each vector of that basis.
+inline GaussianSimulator daily_simulator() { return {VectorXd::Zero(6), 0.3 * MatrixXd::Identity(6, 6)}; }
+
 /// Conditions with seven filter columns each; seven of them give p = 49.
 inline HistoryData history_record(Index n, Index conditions = 7) {
   Stream stream(5, 1, 1);
   HistoryData data;
   data.basis = daily_basis(n);
+  data.spread = daily_simulator().root;
   data.responses = stream.normals(n, 7 * conditions);
   for (Index j = 0; j < 7 * conditions; ++j) {
     const double keep = 1.0 - 1.0 / static_cast<double>(1 + 3 * (j % 7));

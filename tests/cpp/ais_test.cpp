@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <limits>
+#include <set>
 #include <stdexcept>
 
-#include "engine/ais/DefensiveTarget.hpp"
+#include "engine/ais/AnnealingPath.hpp"
+#include "engine/ais/CloserReference.hpp"
 #include "engine/ais/ImportanceSample.hpp"
 #include "engine/ais/Sampler.hpp"
 #include "engine/ais/SkewedMixture.hpp"
@@ -403,77 +405,180 @@ TEST(SampleAis, CountsEveryEvaluationWithGradients) {
   EXPECT_EQ(sample_ais(target, {}, seeded(25)).evaluations, count);
 }
 
-TEST(DefensiveTarget, ReferenceTimesLikelihoodIsTheSamePosterior) {
-  const LinearGaussian model(4, 0.3);
-  const GradientTarget target(model, 1.0);
-  const StudentTMixture close({StudentT(model.mean().tail(3), 0.3 * MatrixXd::Identity(3, 3), 8.0)}, {1.0});
-  const DefensiveTarget closer(target, close, 1, 0.2);
-  const MatrixXd x = normal_matrix(4, 6, 71);
-  const VectorXd own = target.log_likelihood(x), other = closer.log_likelihood(x);
-  MatrixXd slope, closer_slope;
-  target.log_likelihood(x, slope);
-  closer.log_likelihood(x, closer_slope);
-  for (Index i = 0; i < 6; ++i) {
-    const VectorXd at = x.col(i);
-    EXPECT_NEAR(other[i] + closer.log_reference(at), own[i] + target.log_reference(at),
-                1e-10 * std::abs(own[i]));
-    const VectorXd sum = closer_slope.col(i) + closer.reference_gradient(at);
-    EXPECT_NEAR((sum - slope.col(i) - target.reference_gradient(at)).norm(), 0.0, 1e-10 * slope.norm());
-    for (Index j = 0; j < 4; ++j) {
-      VectorXd up = at, down = at;
-      up[j] += 1e-5;
-      down[j] -= 1e-5;
-      const double difference = (closer.log_reference(up) - closer.log_reference(down)) / 2e-5;
-      EXPECT_NEAR(closer.reference_gradient(at)[j], difference, 1e-6 * (1 + std::abs(difference)));
-    }
+// Two blocks of one posterior, the second a mixture of two.
+CloserReference two_blocks(double prior_share) {
+  const VectorXd low = Eigen::Vector2d(-1.0, 0.4), high = Eigen::Vector2d(0.8, 0.0);
+  const MatrixXd root = (MatrixXd(2, 2) << 0.5, 0.0, 0.2, 0.3).finished();
+  return {{StudentTMixture({StudentT(VectorXd::Constant(1, 0.6), MatrixXd::Constant(1, 1, 0.4), 8.0)}, {1.0}),
+           StudentTMixture({StudentT(low, root, 5.0), StudentT(high, 2.0 * root, 5.0)}, {0.3, 0.7})},
+          prior_share};
+}
+
+TEST(StandardNormal, HasTheDensityGradientAndDrawsOfThePrior) {
+  const StandardNormal prior(3);
+  const VectorXd x = normal_vector(3, 70);
+  EXPECT_NEAR(prior.log_density(x), log_normal_density(x, VectorXd::Zero(3), MatrixXd::Identity(3, 3)),
+              1e-13);
+  EXPECT_EQ(prior.gradient(x), -x);
+  Stream stream(1, 2, 3);
+  std::vector<double> draws;
+  for (int i = 0; i < 3000; ++i) {
+    const VectorXd x = prior.draw(stream);
+    draws.insert(draws.end(), x.data(), x.data() + 3);
   }
+  // Kolmogorov's statistic exceeds 1.95 / sqrt(n) with probability 0.001.
+  EXPECT_LT(kolmogorov_distance(draws, &normal_cdf), 1.95 / std::sqrt(9000.0));
+}
+
+TEST(CloserReference, DensityIsThePriorsMixedWithTheProductOfTheBlocks) {
+  const CloserReference closer = two_blocks(0.2);
+  const VectorXd low = Eigen::Vector2d(-1.0, 0.4), high = Eigen::Vector2d(0.8, 0.0);
+  const MatrixXd root = (MatrixXd(2, 2) << 0.5, 0.0, 0.2, 0.3).finished();
+  const MatrixXd x = normal_matrix(3, 6, 71);
+  for (Index i = 0; i < 6; ++i) {
+    const VectorXd at = x.col(i), second = at.tail(2);
+    const double prior = std::exp(-0.5 * at.squaredNorm() - 1.5 * kLogTwoPi);
+    const double one = std::exp(
+        StudentT(VectorXd::Constant(1, 0.6), MatrixXd::Constant(1, 1, 0.4), 8.0).log_density(at.head(1)));
+    const double two = 0.3 * std::exp(StudentT(low, root, 5.0).log_density(second)) +
+                       0.7 * std::exp(StudentT(high, 2.0 * root, 5.0).log_density(second));
+    EXPECT_NEAR(closer.log_density(at), std::log(0.2 * prior + 0.8 * one * two), 1e-12);
+    const VectorXd slope = numerical_gradient([&](const VectorXd& v) { return closer.log_density(v); }, at);
+    EXPECT_LT((closer.gradient(at) - slope).cwiseAbs().maxCoeff(), 1e-7);  // differences of 1e-5, squared
+  }
+  // Far out only the heavier tail is left, and nothing overflows.
+  const VectorXd far = VectorXd::Constant(3, 300.0);
+  EXPECT_TRUE(std::isfinite(closer.log_density(far)));
+  EXPECT_TRUE(closer.gradient(far).allFinite());
 }
 
 // Independent draws of the reference, weighted by posterior over reference: their mean is the evidence.
-TEST(DefensiveTarget, DrawsHaveTheStatedDensity) {
+TEST(CloserReference, DrawsHaveTheStatedDensity) {
   const LinearGaussian model(3, 1.0);
   const FunctionTarget target = model.target();
-  const StudentTMixture close({StudentT(model.mean(), 0.4 * MatrixXd::Identity(3, 3), 8.0)}, {1.0});
-  const DefensiveTarget closer(target, close);
-  Stream stream(1, 2, 3);
-  MatrixXd x(3, 20000);
-  for (Index i = 0; i < x.cols(); ++i) x.col(i) = closer.draw_reference(stream);
-  const VectorXd log_w = closer.log_likelihood(x);
-  const double se = std::sqrt(normalised_exp(log_w).squaredNorm() - 1.0 / 20000);
-  EXPECT_LT(se, 0.05);
-  EXPECT_NEAR(log_mean_exp(log_w), model.log_evidence(), 4 * se);
+  for (double share : {0.1, 0.6}) {
+    const CloserReference closer(
+        {StudentTMixture({StudentT(model.mean().head(1), MatrixXd::Constant(1, 1, 0.5), 8.0)}, {1.0}),
+         StudentTMixture({StudentT(model.mean().tail(2), 0.4 * MatrixXd::Identity(2, 2), 8.0)}, {1.0})},
+        share);
+    const AnnealingPath path{target, closer};
+    Stream stream(1, 2, 3);
+    VectorXd log_w(20000);
+    for (Index i = 0; i < log_w.size(); ++i) {
+      const VectorXd x = closer.draw(stream);
+      log_w[i] = path.rise(x, target.log_likelihood(MatrixXd(x))[0]);
+    }
+    const double se = std::sqrt(normalised_exp(log_w).squaredNorm() - 1.0 / 20000);
+    EXPECT_LT(se, 0.05);
+    EXPECT_NEAR(log_mean_exp(log_w), model.log_evidence(), 4 * se);
+  }
+}
+
+TEST(CloserReference, RefusesAShareThatIsNone) {
+  EXPECT_THROW(two_blocks(0.0), std::invalid_argument);
+  EXPECT_THROW(two_blocks(1.0), std::invalid_argument);
+  EXPECT_THROW(two_blocks(std::nan("")), std::invalid_argument);
+  EXPECT_THROW(StudentTMixture({}, {}), std::invalid_argument);
 }
 
 // Where the close distribution is wrong, the share of the prior is what the annealing lives on.
-TEST(DefensiveTarget, AWrongGuessDoesNotMoveTheEvidence) {
+TEST(SampleAis, AWrongReferenceDoesNotMoveTheEvidence) {
   const LinearGaussian model(3, 0.3);
-  const FunctionTarget target = model.target();
-  const StudentTMixture wrong({StudentT(model.mean().array() + 2.0, 0.1 * MatrixXd::Identity(3, 3), 8.0)},
-                              {1.0});
-  const AisResult result = sample_ais(DefensiveTarget(target, wrong), {}, seeded(26));
+  const CloserReference wrong(
+      {StudentTMixture({StudentT(model.mean().array() + 2.0, 0.1 * MatrixXd::Identity(3, 3), 8.0)}, {1.0})});
+  const AisResult result = sample_ais(model.target(), wrong, {}, seeded(26));
   EXPECT_TRUE(result.trusted) << result.verdict;
   expect_evidence(result, model.log_evidence());
 }
 
-TEST(DefensiveTarget, AGoodGuessSavesEvaluations) {
+TEST(SampleAis, AGoodReferenceSavesEvaluations) {
   const LinearGaussian model(10, 0.1);
   const FunctionTarget target = model.target();
   const Eigen::LLT<MatrixXd> root(model.covariance());
-  const StudentTMixture close({StudentT(model.mean(), root.matrixL(), 8.0)}, {1.0});
+  const CloserReference close({StudentTMixture({StudentT(model.mean(), root.matrixL(), 8.0)}, {1.0})});
   const AisResult from_prior = sample_ais(target, {}, seeded(27));
-  const AisResult result = sample_ais(DefensiveTarget(target, close), {}, seeded(27));
+  const AisResult result = sample_ais(target, close, {}, seeded(27));
   expect_evidence(result, model.log_evidence());
   EXPECT_LT(4 * result.ladder.size(), from_prior.ladder.size());
   EXPECT_LT(2 * result.evaluations, from_prior.evaluations);
 }
 
-TEST(DefensiveTarget, RefusesAShareThatIsNone) {
+// The annealed run alone, whose chains go from the reference to the posterior.
+TEST(SampleAis, EvidenceAndLikelihoodsAreTheTargetsWhateverTheReference) {
+  const LinearGaussian model(4, 0.3);
+  const GradientTarget target(model, 1.0);
+  const auto around = [&](double width) {
+    return StudentTMixture({StudentT(model.mean(), width * MatrixXd::Identity(4, 4), 8.0)}, {1.0});
+  };
+  const StudentTMixture near = around(0.2);
+  const CloserReference mixed({around(0.05)}, 0.3);
+  const StandardNormal prior(4);
+  AisOptions options;
+  options.importance_draws = 0;
+  options.groups = 24;
+  for (const Distribution* reference : std::vector<const Distribution*>{&near, &mixed, &prior}) {
+    for (bool gradient : {true, false}) {
+      options.gradient = gradient;
+      const AisResult result = sample_ais(target, *reference, options, seeded(28));
+      ASSERT_EQ(result.estimator, "annealed");
+      expect_evidence(result, model.log_evidence(), 0.4);
+      EXPECT_EQ(result.log_likelihood, target.log_likelihood(result.draws));
+      // Some hundred effective draws: four of their standard errors, the posterior standardised.
+      const Eigen::LLT<MatrixXd> factor(model.covariance());
+      const VectorXd z = factor.matrixL().solve(result.draws * result.weights - model.mean());
+      EXPECT_LT(z.cwiseAbs().maxCoeff(), 4 / std::sqrt(result.ess / 4)) << gradient;
+    }
+  }
+}
+
+TEST(SampleAis, WithoutAReferenceItStartsFromThePrior) {
   const LinearGaussian model(3, 0.3);
   const FunctionTarget target = model.target();
-  const StudentTMixture close({StudentT(model.mean(), MatrixXd::Identity(3, 3), 8.0)}, {1.0});
-  EXPECT_THROW(DefensiveTarget(target, close, 0, 0.0), std::invalid_argument);
-  EXPECT_THROW(DefensiveTarget(target, close, 0, 1.0), std::invalid_argument);
-  EXPECT_THROW(StudentTMixture({}, {}), std::invalid_argument);
+  EXPECT_EQ(sample_ais(target, {}, seeded(29)).log_evidence,
+            sample_ais(target, StandardNormal(3), {}, seeded(29)).log_evidence);
+}
+
+TEST(SamplePopulation, DrawsHaveThePosteriorsMoments) {
+  const LinearGaussian model(4, 0.3);
+  AisOptions options;
+  options.pilot_chains = 1000;
+  long evaluations = 7;
+  const MatrixXd draws =
+      sample_population(model.target(), StandardNormal(4), options, seeded(30), evaluations);
+  ASSERT_EQ(draws.cols(), 1000);
+  EXPECT_GE(evaluations, 7 + 1000);
+  const Eigen::LLT<MatrixXd> factor(model.covariance());
+  const MatrixXd z = factor.matrixL().solve(draws.colwise() - model.mean());
+  // Chains that share ancestors: four standard errors of 250 independent draws.
+  EXPECT_LT(z.rowwise().mean().cwiseAbs().maxCoeff(), 4 / std::sqrt(250.0));
+  EXPECT_LT((z * z.transpose() / 1000.0 - MatrixXd::Identity(4, 4)).cwiseAbs().maxCoeff(),
+            4 * std::sqrt(2.0 / 250.0));
+}
+
+TEST(Context, ForksOfAllSeedsAndPurposesAreUnrelated) {
+  std::set<std::uint64_t> seeds;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    const Context context = seeded(seed);
+    seeds.insert(seed);
+    for (std::uint64_t purpose = 0; purpose < 60; ++purpose) {
+      seeds.insert(context.fork(purpose).seed);
+      seeds.insert(context.fork(purpose).fork(purpose / 2).seed);
+    }
+  }
+  EXPECT_EQ(seeds.size(), 60u * (1 + 2 * 60));  // none twice: seed 2 forked is not seed 1's second purpose
+  EXPECT_NE(Stream(seeded(2).fork(0).seed, 1, 0).uniform(), Stream(seeded(1).fork(1).seed, 1, 0).uniform());
+}
+
+TEST(Context, AForkKeepsThreadsAndPolls) {
+  int polled = 0;
+  Context context = seeded(3, 2);
+  context.poll = [&] { ++polled; };
+  const Context fork = context.fork(5);
+  EXPECT_EQ(fork.threads, 2);
+  fork.poll();
+  EXPECT_EQ(polled, 1);
+  EXPECT_EQ(context.alone().threads, 1);
+  EXPECT_EQ(context.alone().seed, 3u);
 }
 
 // Two thin shells: no Student-t mixture comes close, and the chains move slowly at the cold end.

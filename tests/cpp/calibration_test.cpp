@@ -1,11 +1,14 @@
 #include <gtest/gtest.h>
 
-#include <boost/math/distributions/normal.hpp>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
 
-#include "engine/ais/Sampler.hpp"
+#include "engine/ais/StandardNormal.hpp"
 #include "engine/calibration/Calibration.hpp"
 #include "engine/calibration/ParameterModes.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
+#include "engine/random/transform.hpp"
 #include "helpers.hpp"
 
 namespace amiss {
@@ -14,9 +17,10 @@ namespace {
 using namespace test;
 
 constexpr Index kN = 30;
+constexpr double kNoise = 0.9, kInfinity = std::numeric_limits<double>::infinity();
 
 // Two coefficients of very different size, smooth in the parameters; hyper-parameters as given.
-Emulator make_emulator(Index n_inputs) {
+Emulator make_emulator(Index n_inputs, double log_nugget = -5.0) {
   EmulatorState state;
   state.inputs = uniform_matrix(15, n_inputs, 81);
   state.coefficients.resize(15, 2);
@@ -26,7 +30,7 @@ Emulator make_emulator(Index n_inputs) {
   }
   state.parameters = MatrixXd::Constant(2, n_inputs + 3, 1.5);
   state.parameters.col(0).setConstant(1.0);
-  state.parameters.col(1).setConstant(-5.0);
+  state.parameters.col(1).setConstant(log_nugget);
   state.parameters.col(2).setConstant(6.0);
   return Emulator(state);
 }
@@ -36,119 +40,131 @@ HistoryData make_data() {
   data.axis = uneven_axis(kN, {14});
   data.basis.resize(kN, 2);
   data.basis << 60.0 * normal_vector(kN, 82), VectorXd::Ones(kN);
+  data.spread = Eigen::Vector2d(0.006, 0.9).asDiagonal();
   data.responses = normal_matrix(kN, 3, 83);
   data.condition = {0, 0, 1};
   data.y = data.basis * Eigen::Vector2d(0.015, 21.4) + normal_vector(kN, 84);
   return data;
 }
 
-HistoryModel make_model(const ErrorOptions& error) {
+HistoryPriors make_priors(const ErrorOptions& error) {
   HistoryPriors priors;
-  priors.noise_sd = 0.9;
+  priors.noise_sd = kNoise;
   priors.error = error;
-  return HistoryModel(make_data(), priors, Context());
+  return priors;
+}
+
+HistoryModel make_model(const ErrorOptions& error, const HistoryData& data = make_data()) {
+  return HistoryModel(data, make_priors(error), Context());
 }
 
 const ErrorOptions kError{VectorXd::Constant(1, 2.0), Eigen::Vector2d(0.0, 3.0)};
 
-StudentTMixture make_reference(Index dimension, double width) {
-  Stream stream(1, 1, 1);
-  const MatrixXd points = width * normal_matrix(dimension, 300, 85);
-  return StudentTMixture::fit(points, VectorXd::Constant(300, 1.0 / 300), 1, 8.0, stream);
+void predict(const Emulator& emulator, const VectorXd& u, VectorXd& mean, VectorXd& variance) {
+  MatrixXd m, v;
+  emulator.predict(u.transpose(), m, v);
+  mean = m.row(0);
+  variance = v.row(0);
 }
 
-double log_prior(const VectorXd& x) {
-  return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));
-}
-
-double cdf_normal(double x) { return cdf(boost::math::normal(), x); }
-
-// log p(y | sigma, t, z) written down for y itself: y = K w + discrepancy + error, w ~ N(w'(z), S(z)), the
-// discrepancy in the complement of K under the metric of the error.
-double dense_density(const HistoryData& data, const HistoryParameters& p, const VectorXd& ratios,
-                     const Emulator& emulator, const VectorXd& u) {
-  const MatrixXd error = error_covariance(data.axis, kError.correlation_times, ratios);
-  const MatrixXd inverse = error.inverse();
-  const MatrixXd& k = data.basis;
+// log p(y | sigma, t, kappa, z) written down: y = K w + discrepancy + error, w ~ N(w'(z), S(z)).
+double dense_density(const HistoryModel& model, const HistoryData& data, const HistoryParameters& p,
+                     const Emulator& emulator, const VectorXd& u, double variances = 1.0) {
+  const int g = p.setting % 2;
+  const double reach = model.priors().reach[static_cast<std::size_t>(p.setting / 2)];
   MatrixXd phi = data.responses.rowwise() - data.responses.colwise().mean();
-  for (Index j = 0; j < 3; ++j) {
-    phi.col(j) *= std::sqrt(p.t[data.condition[j]] / (j < 2 ? 2.0 : 1.0) * kN / phi.col(j).squaredNorm());
+  for (Index j = 0; j < 3; ++j)
+    phi.col(j) *= std::sqrt(p.t[data.condition[static_cast<std::size_t>(j)]] / (j < 2 ? 2.0 : 1.0) * kN /
+                            phi.col(j).squaredNorm());
+  if (!std::isinf(reach)) {
+    const MatrixXd moves = data.basis * data.spread,
+                   a = moves * moves.transpose() / (reach * kNoise * kNoise);
+    phi = (MatrixXd::Identity(kN, kN) + a * a).ldlt().solve(phi);
   }
-  phi -= MatrixXd(k * (k.transpose() * inverse * k).inverse() * k.transpose() * inverse * phi);
-  MatrixXd mean, variance;
-  emulator.predict(u.transpose(), mean, variance);
+  VectorXd mean, variance;
+  predict(emulator, u, mean, variance);
   const MatrixXd covariance =
-      p.variance * error + phi * phi.transpose() + k * MatrixXd(variance.row(0).asDiagonal()) * k.transpose();
-  return log_normal_density(data.y, k * mean.row(0).transpose(), covariance);
+      p.variance * error_covariance(data.axis, kError.correlation_times, kError.setting(g)) +
+      phi * phi.transpose() + variances * data.basis * variance.asDiagonal() * data.basis.transpose();
+  return log_normal_density(data.y, data.basis * mean, covariance);
 }
 
 struct Joint {
   Emulator emulator = make_emulator(2);
-  HistoryModel model = make_model(kError);
-  HistoryTarget history{model, {0, 1}};
-  CalibrationTarget target(double width = 1.0) const {
-    return {history, make_reference(history.dimension(), width), emulator};
-  }
+  HistoryModel model;
+  explicit Joint(const HistoryData& data = make_data())
+      : model([&] {
+          HistoryPriors priors = make_priors(kError);
+          priors.reach = {20.0, kInfinity};
+          return HistoryModel(data, priors, Context());
+        }()) {}
+  CalibrationTarget target() const { return {model, {0, 1}, emulator}; }
 };
 
 TEST(CalibrationTarget, CoordinatesAreTheHistorysThenTheParameters) {
   const Joint joint;
   const CalibrationTarget target = joint.target();
-  ASSERT_EQ(target.dimension(), 4 + 2);
-  const MatrixXd x = normal_matrix(6, 3, 86), u = target.unit(x);
+  const HistoryCoordinates history(joint.model, {0, 1});
+  ASSERT_EQ(history.dimension(), 1 + 1 + 1 + 2);
+  ASSERT_EQ(target.dimension(), 5 + 2);
+  const MatrixXd x = normal_matrix(7, 3, 86), u = target.unit(x);
   ASSERT_EQ(u.rows(), 3);
   ASSERT_EQ(u.cols(), 2);
   for (Index i = 0; i < 3; ++i) {
-    for (Index p = 0; p < 2; ++p) EXPECT_NEAR(u(i, p), cdf_normal(x(4 + p, i)), 1e-14);
-    const HistoryParameters own = target.history(x.col(i)),
-                            expected = joint.history.parameters(x.col(i).head(4));
+    for (Index p = 0; p < 2; ++p) EXPECT_EQ(u(i, p), normal_cdf(x(5 + p, i)));
+    const HistoryParameters own = target.history(x.col(i)), expected = history.parameters(x.col(i).head(5));
     EXPECT_EQ(own.variance, expected.variance);
     EXPECT_EQ(own.setting, expected.setting);
     EXPECT_EQ(own.t, expected.t);
   }
 }
 
-TEST(CalibrationTarget, ReferenceTimesLikelihoodIsPriorTimesTheDenseDensityOfTheMeasurement) {
+TEST(CalibrationTarget, LikelihoodIsTheDenseDensityOfTheMeasurement) {
   const Joint joint;
   const CalibrationTarget target = joint.target();
-  const MatrixXd x = 0.7 * normal_matrix(6, 8, 87);
+  const MatrixXd x = 0.9 * normal_matrix(7, 12, 87);
   const VectorXd own = target.log_likelihood(x);
   const MatrixXd u = target.unit(x);
+  double most = 0.0;
   for (Index i = 0; i < x.cols(); ++i) {
     const HistoryParameters p = target.history(x.col(i));
-    const double dense =
-        dense_density(make_data(), p, kError.setting(p.setting), joint.emulator, u.row(i).transpose());
-    EXPECT_NEAR(own[i] + target.log_reference(x.col(i)), log_prior(x.col(i)) + dense,
-                1e-8 * (1 + std::abs(dense)));
+    const double dense = dense_density(joint.model, make_data(), p, joint.emulator, u.row(i).transpose());
+    EXPECT_NEAR(own[i], dense, 1e-8 * (1 + std::abs(dense)));  // eigenvalues from 0.3 to 1e3, values near 100
+    most = std::max(most, std::abs(dense - dense_density(joint.model, make_data(), p, joint.emulator,
+                                                         u.row(i).transpose(), 0.0)));
   }
+  EXPECT_GT(most, 1e-3);  // else the comparison would not see the emulator's variance
 }
 
-TEST(CalibrationTarget, EmulatorVarianceMatters) {
+TEST(CalibrationTarget, UnitsOfTheBasisDoNotMatter) {
   const Joint joint;
-  MatrixXd mean, variance;
-  joint.emulator.predict(MatrixXd::Constant(1, 2, 0.5), mean, variance);
-  const MatrixXd root = joint.model.whitened(0).root;
-  const MatrixXd noise = (root.transpose() * root).inverse();
-  // Else the dense comparison would not see it.
-  EXPECT_GT(variance(0, 0) / noise(0, 0), 1e-3);
-  EXPECT_GT(variance(0, 1) / noise(1, 1), 1e-3);
+  HistoryData scaled = make_data();
+  scaled.basis *= 100.0;
+  scaled.spread /= 100.0;
+  EmulatorState state = joint.emulator.state();
+  state.coefficients /= 100.0;
+  const Emulator emulator(state);
+  const HistoryModel model(scaled, joint.model.priors(), Context());
+  const CalibrationTarget other(model, {0, 1}, emulator);
+  const MatrixXd x = normal_matrix(7, 5, 89);
+  const VectorXd a = joint.target().log_likelihood(x), b = other.log_likelihood(x);
+  for (Index i = 0; i < 5; ++i) EXPECT_NEAR(a[i], b[i], 1e-8 * (1 + std::abs(a[i])));  // rounding, as above
 }
 
-TEST(CalibrationTarget, ReferenceIsTheMixtureTimesThePriorOfTheParameters) {
-  const Joint joint;
-  const CalibrationTarget target = joint.target(0.5);
-  const StudentTMixture mixture = make_reference(4, 0.5);
-  const VectorXd x = normal_vector(6, 88);
-  EXPECT_NEAR(target.log_reference(x), mixture.log_density(x.head(4)) + log_prior(x.tail(2)), 1e-12);
-  Stream stream(1, 2, 3);
-  MatrixXd draws(6, 4000);
-  for (Index i = 0; i < draws.cols(); ++i) draws.col(i) = target.draw_reference(stream);
-  const VectorXd sd = (draws.rowwise().squaredNorm() / 4000).cwiseSqrt();
-  // A t of 8 degrees of freedom with scale 0.5 has sd 0.577; scale of 300 points 4 %, sd of 4000 draws 2 %: 4
-  // of both.
-  for (Index d = 0; d < 4; ++d) EXPECT_NEAR(sd[d], 0.577, 0.18 * 0.577);
-  // Standard normal: sd of 4000 draws is known to 1.1 %; 4.5 of them.
-  for (Index d = 4; d < 6; ++d) EXPECT_NEAR(sd[d], 1.0, 0.05);
+TEST(CalibrationTarget, RefusesAnEmulatorOfAnotherBasis) {
+  HistoryData data = make_data();
+  data.basis = normal_matrix(kN, 3, 1);
+  data.spread.resize(0, 0);
+  const HistoryModel model = make_model({}, data);
+  const Emulator emulator = make_emulator(1);
+  EXPECT_THROW(CalibrationTarget(model, {}, emulator), std::invalid_argument);
+}
+
+TEST(ConditionsBut, AreAllOthers) {
+  const HistoryModel model = make_model({});
+  EXPECT_EQ(conditions_but(model, {}), (std::vector<int>{0, 1}));
+  EXPECT_EQ(conditions_but(model, {0}), (std::vector<int>{1}));
+  EXPECT_TRUE(conditions_but(model, {1, 0}).empty());
 }
 
 // Log evidence of a target of two coordinates: trapezoidal rule over prior times likelihood, accurate to
@@ -161,153 +177,350 @@ double evidence_by_quadrature(const CalibrationTarget& target) {
   for (int i = 0; i <= m; ++i) {
     for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
     const VectorXd ll = target.log_likelihood(row);
-    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + target.log_reference(row.col(j));
+    for (int j = 0; j <= m; ++j)
+      log_terms[i * (m + 1) + j] = ll[j] + StandardNormal::log_density_at(row.col(j));
   }
-  const double top = log_terms.maxCoeff();
-  return top + std::log((log_terms.array() - top).exp().sum() * h * h);
+  return log_sum_exp(log_terms) + 2.0 * std::log(h);
 }
 
-TEST(CalibrationTarget, EvidenceEqualsQuadratureWhateverTheReference) {
+void expect_likelihoods_of(const CalibrationTarget& target, const AisResult& result) {
+  const VectorXd again = target.log_likelihood(result.draws.leftCols(20));
+  for (Index i = 0; i < 20; ++i)  // in other blocks, so that products round otherwise
+    EXPECT_NEAR(result.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
+}
+
+// Coordinates: sigma and one parameter; a record near the simulator, and one that no parameter reaches.
+TEST(SamplePosterior, EvidenceEqualsQuadrature) {
   const Emulator emulator = make_emulator(1);
-  const HistoryModel model = make_model({});
-  const HistoryTarget history(model, {});  // coordinates: sigma and one parameter
-  const CalibrationTarget exact(history, make_reference(1, 1.0), emulator);
-  const double truth = evidence_by_quadrature(exact);
-  for (double width : {0.6, 1.0, 1.5}) {
-    const CalibrationTarget target(history, make_reference(1, width), emulator);
-    const AisResult result = sample_ais(target, {}, Context());
+  for (double off : {0.0, 8.0}) {
+    HistoryData data = make_data();
+    data.y.array() += off;
+    const HistoryModel model = make_model({}, data);
+    const CalibrationTarget target(model, {}, emulator);
+    const AisResult result = sample_posterior(target, {}, Context());
     EXPECT_TRUE(result.trusted) << result.verdict;
     // Four reported standard errors, and well below what matters to a Bayes factor.
-    EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.1)) << width;
+    EXPECT_LT(std::abs(result.log_evidence - evidence_by_quadrature(target)),
+              std::min(std::max(4 * result.standard_error, 0.02), 0.1))
+        << off;
+    expect_likelihoods_of(target, result);
   }
 }
 
-TEST(CalibrationTarget, UnitsOfTheBasisDoNotMatter) {
+TEST(SamplePosterior, IsTheOneAnnealedFromThePriorForLess) {
   const Joint joint;
-  HistoryData scaled = make_data();
-  scaled.basis *= 100.0;
-  EmulatorState state = joint.emulator.state();
-  state.coefficients /= 100.0;
-  const Emulator emulator(state);
-  HistoryPriors priors = joint.model.priors();
-  const HistoryModel model(scaled, priors, Context());
-  const HistoryTarget history(model, {0, 1});
-  const CalibrationTarget other(history, make_reference(4, 1.0), emulator);
-  const MatrixXd x = normal_matrix(6, 5, 89);
-  const VectorXd a = joint.target().log_likelihood(x), b = other.log_likelihood(x);
-  for (Index i = 0; i < 5; ++i) EXPECT_NEAR(a[i], b[i], 1e-7 * (1 + std::abs(a[i])));
+  const CalibrationTarget target = joint.target();
+  AisOptions options;
+  options.precision = 0.05;
+  const AisResult plain = sample_ais(target, options, Context());
+  const AisResult closer = sample_posterior(target, options, Context());
+  EXPECT_TRUE(plain.trusted) << plain.verdict;
+  EXPECT_TRUE(closer.trusted) << closer.verdict;
+  const double error = std::hypot(plain.standard_error, closer.standard_error);
+  EXPECT_LT(error, 0.15);
+  EXPECT_LT(std::abs(plain.log_evidence - closer.log_evidence), 4 * error);
+  EXPECT_LT(closer.ladder.size(), plain.ladder.size());
+  expect_likelihoods_of(target, closer);
+  // The means of all coordinates too: four standard errors of both.
+  const VectorXd a = plain.draws * plain.weights, b = closer.draws * closer.weights;
+  EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 4 * std::sqrt(1 / plain.ess + 1 / closer.ess));
 }
 
 // One parameter: modes and their scales are seen on a fine grid.
 TEST(ParameterModes, AreThoseOfAFineGrid) {
   const Emulator emulator = make_emulator(1);
   const HistoryModel model = make_model({});
-  const HistoryTarget history(model, {});
-  const CalibrationTarget target(history, make_reference(1, 1.0), emulator);
-  const HistoryParameters point = history.parameters(VectorXd::Zero(1));
+  const CalibrationTarget target(model, {}, emulator);
+  const HistoryParameters point = target.history(VectorXd::Zero(2));
   const MatrixXd grid = Eigen::RowVectorXd::LinSpaced(4001, -4.0, 4.0);
-  MatrixXd mean, variance;
-  emulator.predict(target.unit((MatrixXd(2, 4001) << MatrixXd::Zero(1, 4001), grid).finished()), mean,
-                   variance);
-  VectorXd exact(4001), fitted(4001);
   Stream stream(1, 2, 3);
   const ParameterModes modes = parameter_modes(target, {point}, {}, Context(), stream);
-  EXPECT_GT(modes.evaluations, 256);
-  for (Index i = 0; i < 4001; ++i) {
-    exact[i] = target.log_density_inside(point, mean.row(i), variance.row(i)) - 0.5 * grid(0, i) * grid(0, i);
-    fitted[i] = modes.mixture.log_density(grid.col(i));
-  }
+  EXPECT_GT(modes.evaluations, 192);
+  MatrixXd x(2, 4001);
+  x << MatrixXd::Zero(1, 4001), grid;
+  const VectorXd exact = target.log_likelihood(x) - 0.5 * grid.cwiseAbs2().transpose();
+  VectorXd fitted(4001);
+  for (Index i = 0; i < 4001; ++i) fitted[i] = modes.mixture.log_density(grid.col(i));
   const VectorXd p = normalised_exp(exact), q = normalised_exp(fitted);
   // The weights p / q have a second moment of 1 / (effective share); the widened t gives up a few tenths.
   EXPECT_LT((p.array().square() / q.array()).sum(), 1.6);
+  // A search ends at a gain of 0.01 nats: 0.14 standard deviations from the top.
+  Index top = 0;
+  exact.maxCoeff(&top);
+  const double mean = p.dot(grid.row(0)), sd = std::sqrt(p.dot(grid.row(0).cwiseAbs2()) - mean * mean);
+  EXPECT_NEAR(modes.best[0], grid(0, top), 0.15 * sd);
 }
 
-TEST(ParameterModes, TellWhereTheRecordContradictsTheHistoryPosterior) {
-  const Emulator emulator = make_emulator(1);
-  const HistoryModel model = make_model({});
-  const HistoryTarget history(model, {});
-  const CalibrationTarget target(history, make_reference(1, 1.0), emulator);
-  const HistoryParameters point = history.parameters(VectorXd::Zero(1));
+// w'_0 = 0.02 sin(pi u) rises and falls: two values of the parameter give the same coefficient.
+TEST(ParameterModes, FindBothOfTwo) {
+  EmulatorState state = make_emulator(1).state();
+  state.inputs.col(0) = VectorXd::LinSpaced(15, 0.0, 1.0);
+  state.coefficients.col(0) = 0.02 * (M_PI * state.inputs.col(0).array()).sin();
+  state.coefficients.col(1) = 20.0 + 0.01 * (7.0 * state.inputs.col(0).array()).cos();
+  const Emulator emulator(state);
+  HistoryData data = make_data();
+  data.basis.col(0) *= 10.0;
+  data.y = data.basis * Eigen::Vector2d(0.014, 20.0) + 0.9 * normal_vector(kN, 84);
+  const HistoryModel model = make_model({}, data);
+  const CalibrationTarget target(model, {}, emulator);
+  ModeOptions options;
+  options.searches = 16;  // the four best of all starts may lie near the same of the two
   Stream stream(1, 2, 3);
-  const ParameterModes near = parameter_modes(target, {point}, {}, Context(), stream);
-  ASSERT_EQ(near.misfits.size(), 1);
-  EXPECT_LT(near.misfits[0], 6.0);
-  // Misfit at the mode, written down: one parameter, two coefficients.
-  MatrixXd mean, variance;
-  double least = 0.0, best = -1e300;
-  for (double x = -4.0; x <= 4.0; x += 0.002) {
-    emulator.predict(MatrixXd::Constant(1, 1, cdf_normal(x)), mean, variance);
-    const double density = target.log_density_inside(point, mean.row(0), variance.row(0)) - 0.5 * x * x;
-    if (density <= best) continue;
-    best = density;
-    const VectorXd apart = target.estimate(point) - mean.row(0).transpose();
-    least = apart.dot(target.covariance_inside(point, variance.row(0)).llt().solve(apart));
+  const ParameterModes modes =
+      parameter_modes(target, {target.history(VectorXd::Zero(2))}, options, Context(), stream);
+  ASSERT_EQ(modes.mixture.size(), 2u);
+  // u = 1/4 and 3/4, x = -0.67 and 0.67; between them the simulator is far off.
+  const auto density = [&](double x) { return modes.mixture.log_density(VectorXd::Constant(1, x)); };
+  EXPECT_GT(density(0.67), density(0.0) + 1.0);
+  EXPECT_GT(density(-0.67), density(0.0) + 1.0);
+}
+
+TEST(ParameterModes, WithoutAModeThePriorStands) {
+  HistoryData data = make_data();
+  data.y[3] = kInfinity;
+  const HistoryModel model = make_model({}, data);
+  const Emulator emulator = make_emulator(2);
+  const CalibrationTarget target(model, {}, emulator);
+  Stream stream(1, 2, 3);
+  const ParameterModes modes = parameter_modes(target, {{0, 1.0, VectorXd::Zero(2)}}, {}, Context(), stream);
+  EXPECT_EQ(modes.mixture.size(), 1u);
+  EXPECT_EQ(modes.best, VectorXd::Zero(2));
+}
+
+// With a large nugget, so that the emulator's own variance is seen.
+TEST(Linearisation, OverThePriorsItHasTheEmulatorsMomentsThere) {
+  const Emulator emulator = make_emulator(2, 0.0);
+  const GaussianSimulator simulator = over_priors(emulator, Stream(1, 2, 3));
+  constexpr Index n = 150 * 150;  // midpoints of the unit square
+  MatrixXd u(n, 2), mean, variance;
+  for (Index i = 0; i < n; ++i)
+    u.row(i) << (static_cast<double>(i % 150) + 0.5) / 150, (static_cast<double>(i / 150) + 0.5) / 150;
+  emulator.predict(u, mean, variance);
+  const VectorXd centre = mean.colwise().mean();
+  mean.rowwise() -= centre.transpose();
+  MatrixXd covariance = mean.transpose() * mean / n;
+  const VectorXd sd = covariance.diagonal().cwiseSqrt();
+  // Four standard errors of 512 points.
+  EXPECT_LT((simulator.mean - centre).cwiseQuotient(sd).cwiseAbs().maxCoeff(), 4 / std::sqrt(512.0));
+  covariance.diagonal() += variance.colwise().mean().transpose();
+  EXPECT_LT((simulator.root * simulator.root.transpose() - covariance)
+                .cwiseQuotient(VectorXd(covariance.diagonal().cwiseSqrt()) *
+                               covariance.diagonal().cwiseSqrt().transpose())
+                .cwiseAbs()
+                .maxCoeff(),
+            4 * std::sqrt(2.0 / 512));
+  EXPECT_GT(variance(0, 0), 0.8 * sd[0] * sd[0]);  // else it would not be seen
+}
+
+TEST(Linearisation, TangentTouchesTheEmulator) {
+  const Emulator emulator = make_emulator(2, -1.0);
+  const VectorXd x0 = Eigen::Vector2d(0.4, -0.8);
+  const Expansion at = expand(emulator, x0);
+  VectorXd mean, variance;
+  predict(emulator, x0.unaryExpr(&normal_cdf), mean, variance);
+  EXPECT_LT((at.mean - mean).cwiseQuotient(mean).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_LT((at.variance - variance).cwiseQuotient(variance).cwiseAbs().maxCoeff(), 1e-13);
+  for (Index q = 0; q < 2; ++q) {
+    const VectorXd slope = numerical_gradient(
+        [&](const VectorXd& x) {
+          VectorXd m, v;
+          predict(emulator, x.unaryExpr(&normal_cdf), m, v);
+          return m[q];
+        },
+        x0);
+    // Differences of 3e-3 against those of 1e-5, relative to the larger slope.
+    EXPECT_LT((at.slope.row(q).transpose() - slope).cwiseAbs().maxCoeff(),
+              1e-5 * slope.cwiseAbs().maxCoeff());
   }
-  EXPECT_NEAR(near.misfits[0], least, 0.05 * (1.0 + least));
-  HistoryData far = make_data();
-  far.y.array() += 100.0;  // no parameter reaches there
-  const HistoryModel other(far, model.priors(), Context());
-  const HistoryTarget elsewhere(other, {});
-  const CalibrationTarget lost(elsewhere, make_reference(1, 1.0), emulator);
-  EXPECT_GT(parameter_modes(lost, {point}, {}, Context(), stream).misfits[0], 200.0);
+  // w = w'(z0) + W (x - x0) + error, x ~ N(0, I).
+  const GaussianSimulator tangent = tangent_at(emulator, x0);
+  MatrixXd covariance = at.slope * at.slope.transpose();
+  covariance.diagonal() += at.variance;
+  const VectorXd sd = covariance.diagonal().cwiseSqrt();
+  EXPECT_LT((tangent.mean - (at.mean - at.slope * x0)).cwiseQuotient(sd).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((tangent.root * tangent.root.transpose() - covariance)
+                .cwiseQuotient(sd * sd.transpose())
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-12);
 }
 
-TEST(CalibrationTarget, AnnealingFromTheModesGivesTheSameEvidenceForLess) {
-  const Joint joint;
-  const AisResult outside = sample_ais(joint.history, {}, Context());
-  Stream stream(1, 1, 1);
-  const CalibrationTarget target(
-      joint.history, StudentTMixture::fit(outside.draws, outside.weights, 3, 8.0, stream), joint.emulator);
-  const AisResult plain = sample_ais(target, {}, Context());
-  const CalibrationSample sample = sample_calibration(target, outside, {}, Context());
-  const AisResult& closer = sample.posterior;
-  EXPECT_GT(sample.misfits.minCoeff(), 0.0);
-  EXPECT_LT(sample.misfits.mean(), 10.0);  // chi-squared with two degrees of freedom exceeds it in 1 of 150
-  const double error = std::hypot(plain.standard_error, closer.standard_error);
-  EXPECT_LT(std::abs(plain.log_evidence - closer.log_evidence), 4 * error);
-  EXPECT_LT(error, 0.15);
-  EXPECT_LT(closer.ladder.size(), plain.ladder.size());
-  // Likelihoods are told as seen from the target's own reference.
-  const VectorXd again = target.log_likelihood(closer.draws.leftCols(20));
-  for (Index i = 0; i < 20; ++i)
-    EXPECT_NEAR(closer.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
-}
-
-TEST(CalibrationTarget, FromThePriorItIsTheSamePosterior) {
-  const Joint joint;
-  const CalibrationTarget target = joint.target(0.5), wide = target.from_prior();
-  const MatrixXd x = normal_matrix(6, 5, 90);
-  const VectorXd a = target.log_likelihood(x), b = wide.log_likelihood(x);
-  for (Index i = 0; i < 5; ++i) {
-    EXPECT_NEAR(a[i] + target.log_reference(x.col(i)), b[i] + wide.log_reference(x.col(i)),
-                1e-9 * std::abs(a[i]));
-    EXPECT_NEAR(wide.log_reference(x.col(i)), log_prior(x.col(i)), 1.0);  // nearly the prior
+// Coefficients that are linear in x = Phi^-1(u): every tangent is the same Gaussian.
+TEST(Linearisation, TangentOfALineIsTheLine) {
+  EmulatorState state = make_emulator(1).state();
+  const VectorXd x = VectorXd::LinSpaced(40, -1.6, 1.6);
+  state.coefficients.resize(40, 2);
+  state.inputs = x.unaryExpr(&normal_cdf);
+  state.coefficients.col(0) = 0.02 + 0.004 * x.array();
+  state.coefficients.col(1) = 20.0 - 1.5 * x.array();
+  state.parameters.col(1).setConstant(-12.0);  // nugget
+  state.parameters.col(2).setConstant(14.0);   // precision of the noise
+  state.parameters.col(3).setConstant(-3.0);   // as rough as Phi^-1 is
+  const Emulator emulator(state);
+  const VectorXd at_zero = Eigen::Vector2d(0.02, 20.0), line = Eigen::Vector2d(0.004, -1.5);
+  for (double x0 : {-0.7, 0.0, 0.5}) {
+    const GaussianSimulator tangent = tangent_at(emulator, VectorXd::Constant(1, x0));
+    // What the emulator, smooth in u, misses of a function of x: a few hundredths of a standard deviation.
+    EXPECT_LT((tangent.mean - at_zero).cwiseQuotient(line).cwiseAbs().maxCoeff(), 0.05);
+    EXPECT_LT((tangent.root * tangent.root.transpose() - line * line.transpose())
+                  .cwiseQuotient(line.cwiseAbs() * line.cwiseAbs().transpose())
+                  .cwiseAbs()
+                  .maxCoeff(),
+              0.1);
   }
 }
 
-// The record lies where no parameter reaches: the evidence is found all the same, from another start than the
-// history's.
-TEST(CalibrationTarget, AContradictedHistoryPosteriorDoesNotMislead) {
-  const Emulator emulator = make_emulator(1);
-  HistoryData far = make_data();
-  far.y.array() += 8.0;
-  const HistoryModel model(far, make_model({}).priors(), Context());
-  const HistoryTarget history(model, {});
-  const AisResult outside = sample_ais(history, {}, Context());
-  Stream stream(1, 1, 1);
-  const CalibrationTarget target(
-      history, StudentTMixture::fit(outside.draws, outside.weights, 3, 8.0, stream), emulator);
-  const CalibrationSample sample = sample_calibration(target, outside, {}, Context());
-  const AisResult& result = sample.posterior;
-  EXPECT_GT(sample.misfits.minCoeff(), 100.0);
-  const CalibrationTarget exact = target.from_prior();
-  const double truth = evidence_by_quadrature(exact);
-  EXPECT_TRUE(result.trusted) << result.verdict;
-  EXPECT_LT(std::abs(result.log_evidence - truth), std::max(4 * result.standard_error, 0.02));
-  EXPECT_LT(result.standard_error, 0.12);
-  const VectorXd again = target.log_likelihood(result.draws.leftCols(20));
-  for (Index i = 0; i < 20; ++i)
-    EXPECT_NEAR(result.log_likelihood[i], again[i], 1e-9 * (1 + std::abs(again[i])));
+constexpr Index kLong = 60;
+
+// The first condition is a response of which four fifths lie along the simulator's first vector, by which it
+// moves by a standard deviation of 0.6 at most; the second condition has nothing to do with the record.
+struct Reaching {
+  VectorXd along, across, response;
+  HistoryData data;
+
+  Reaching() {
+    const auto centred = [](VectorXd v) {
+      v.array() -= v.mean();
+      return VectorXd(v * std::sqrt(static_cast<double>(v.size()) / v.squaredNorm()));
+    };
+    along = centred(normal_vector(kLong, 61));
+    across = normal_vector(kLong, 62);
+    across -= along * across.dot(along) / along.squaredNorm();
+    across = centred(across);
+    across -= along * across.dot(along) / along.squaredNorm();
+    response = 0.8 * along + 0.6 * across;
+    data.axis = even_axis(kLong);
+    data.basis.resize(kLong, 2);
+    data.basis << 100.0 * along, VectorXd::Ones(kLong);
+    data.responses.resize(kLong, 2);
+    data.responses << response, normal_vector(kLong, 63);
+    data.condition = {0, 1};
+  }
+  HistoryModel model(const VectorXd& discrepancy, const Emulator& emulator) const {
+    HistoryData own = data;
+    own.y = data.basis * Eigen::Vector2d(0.012, 22.5) + discrepancy + 0.5 * normal_vector(kLong, 64);
+    HistoryPriors priors;
+    priors.noise_sd = 0.5;
+    priors.error = kError;
+    priors.reach = {2.0, kInfinity};
+    return history_model(own, priors, emulator, Context());
+  }
+};
+
+TEST(HistoryModelOfAnEmulator, SpreadIsTheEmulatorsOverThePriorsWhateverTheSeed) {
+  const Emulator emulator = make_emulator(2);
+  Context other;
+  other.seed = 99;
+  const HistoryModel a = history_model(make_data(), make_priors(kError), emulator, Context()),
+                     b = history_model(make_data(), make_priors(kError), emulator, other);
+  EXPECT_EQ(a.data().spread, b.data().spread);
+  const MatrixXd first = a.data().spread, second = over_priors(emulator, Stream(7, 8, 9)).root;
+  // Four standard errors of variances from 512 points, twice.
+  for (Index q = 0; q < 2; ++q)
+    EXPECT_NEAR(first.row(q).squaredNorm() / second.row(q).squaredNorm(), 1.0, 4 * std::sqrt(4.0 / 512));
+}
+
+TEST(Calibrate, DiscrepancyWhereTheParametersCouldMoveIsFree) {
+  const Reaching record;
+  const Emulator emulator = make_emulator(2);
+  const VectorXd truth = 4.0 * record.response;
+  const HistoryModel model = record.model(truth, emulator);
+  const Calibration c = calibrate(model, emulator, {}, Context());
+  EXPECT_TRUE(c.posterior.trusted) << c.posterior.verdict;
+  EXPECT_GT(c.reach[1], 0.99);
+  const MatrixXd seen = model.data().responses * c.coefficients - model.data().basis * c.withheld;
+  // The simulator takes its share of what lies along it: a standard deviation of 0.6 of 4.
+  for (Index k = 0; k < seen.cols(); ++k) EXPECT_LT((seen.col(k) - truth).norm(), 0.35 * truth.norm()) << k;
+}
+
+TEST(Calibrate, DiscrepancyThatKeepsOutOfTheParametersWayDoesNotReachFar) {
+  const Reaching record;
+  const Emulator emulator = make_emulator(2);
+  const VectorXd truth = 2.4 * record.across;
+  const HistoryModel model = record.model(truth, emulator);
+  const Calibration c = calibrate(model, emulator, {}, Context());
+  EXPECT_TRUE(c.posterior.trusted) << c.posterior.verdict;
+  EXPECT_GT(c.reach[0], 0.99);
+  const MatrixXd seen = model.data().responses * c.coefficients - model.data().basis * c.withheld;
+  // Noise of 0.5 leaves one coefficient of 60 values an error of a fortieth of 2.4.
+  for (Index k = 0; k < seen.cols(); ++k) EXPECT_LT((seen.col(k) - truth).norm(), 0.2 * truth.norm()) << k;
+}
+
+TEST(Calibrate, WhatItReportsFollowsFromItsDraws) {
+  const Joint joint;
+  CalibrationOptions options;
+  options.kept = 20;
+  const Calibration c = calibrate(joint.model, joint.emulator, options, Context());
+  const CalibrationTarget target = joint.target();
+  const Index n = c.posterior.draws.cols();
+  EXPECT_EQ(c.posterior.draws.rows(), 7);
+  ASSERT_EQ(static_cast<Index>(c.history.size()), n);
+  EXPECT_EQ(c.unit, target.unit(c.posterior.draws));
+  VectorXd reach = VectorXd::Zero(2);
+  for (Index i = 0; i < n; ++i) {
+    const HistoryParameters& p = c.history[static_cast<std::size_t>(i)];
+    EXPECT_EQ(p.t, target.history(c.posterior.draws.col(i)).t);
+    reach[joint.model.reach_of(p.setting) == 20.0 ? 0 : 1] += c.posterior.weights[i];
+  }
+  EXPECT_LT((c.reach - reach).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_NEAR(c.reach.sum(), 1.0, 1e-12);
+  ASSERT_EQ(c.coefficients.rows(), 3);
+  ASSERT_EQ(c.coefficients.cols(), 20);
+  ASSERT_EQ(c.withheld.rows(), 2);
+  ASSERT_EQ(c.withheld.cols(), 20);
+  ASSERT_EQ(c.kept.size(), 20u);
+  for (Index k = 0; k < 20; ++k) {
+    const Index i = c.kept[static_cast<std::size_t>(k)];
+    // Draw i holds the weight at which a (k + 1/2)-th part of 20 is reached.
+    const double middle = (static_cast<double>(k) + 0.5) / 20;
+    EXPECT_GE(c.posterior.weights.head(i + 1).sum(), middle - 1e-12);
+    EXPECT_LE(c.posterior.weights.head(i).sum(), middle + 1e-12);
+    const HistoryParameters& p = c.history[static_cast<std::size_t>(i)];
+    VectorXd mean, variance;
+    predict(joint.emulator, c.unit.row(i), mean, variance);
+    const VectorXd expected = joint.model.coefficients(p, mean, variance);
+    EXPECT_LT((c.coefficients.col(k) - expected).cwiseAbs().maxCoeff(), 1e-9);  // emulated one by one
+    EXPECT_LT((c.withheld.col(k) - joint.model.withheld(p.setting) * expected).cwiseAbs().maxCoeff(), 1e-9);
+  }
+  const GaussianSimulator tangent =
+      tangent_at(joint.emulator, (c.posterior.draws * c.posterior.weights).tail(2));
+  EXPECT_LT((c.tangent.mean - tangent.mean).cwiseQuotient(tangent.mean).cwiseAbs().maxCoeff(), 1e-9);
+}
+
+TEST(Calibrate, OneAndTwoThreadsGiveTheSameBits) {
+  const Joint joint;
+  Context two;
+  two.threads = 2;
+  const Calibration a = calibrate(joint.model, joint.emulator, {}, Context()),
+                    b = calibrate(joint.model, joint.emulator, {}, two);
+  EXPECT_EQ(a.posterior.log_evidence, b.posterior.log_evidence);
+  EXPECT_EQ(a.posterior.evaluations, b.posterior.evaluations);
+  EXPECT_EQ(a.posterior.draws, b.posterior.draws);
+  EXPECT_EQ(a.coefficients, b.coefficients);
+  EXPECT_EQ(a.withheld, b.withheld);
+  EXPECT_EQ(a.reach, b.reach);
+}
+
+TEST(Calibrate, SeedsGiveDifferentRunsOfTheSamePosterior) {
+  const Joint joint;
+  Context other;
+  other.seed = 2;
+  const AisResult a = calibrate(joint.model, joint.emulator, {}, Context()).posterior,
+                  b = calibrate(joint.model, joint.emulator, {}, other).posterior;
+  EXPECT_NE(a.log_evidence, b.log_evidence);
+  EXPECT_LT(std::abs(a.log_evidence - b.log_evidence), 4 * std::hypot(a.standard_error, b.standard_error));
+}
+
+TEST(Calibrate, NumberingOfTheConditionsLeavesTheEvidenceUnchanged) {
+  HistoryData other = make_data();
+  other.responses << make_data().responses.col(2), make_data().responses.leftCols(2);
+  other.condition = {0, 1, 1};
+  const Joint a, b(other);
+  const Calibration first = calibrate(a.model, a.emulator, {}, Context()),
+                    second = calibrate(b.model, b.emulator, {}, Context());
+  // The same chains; only the order of the sums in the likelihood differs.
+  EXPECT_NEAR(first.posterior.log_evidence, second.posterior.log_evidence, 1e-8);
+  EXPECT_EQ(first.posterior.evaluations, second.posterior.evaluations);
 }
 
 }  // namespace
