@@ -17,6 +17,7 @@ test_that("every mechanism of the shipped catalogues applies to its model", {
     expect_gt(length(free_parameters(extended)), length(free_parameters(study$model)))
     expect_true(all(driver_names(extended) %in% colnames(study$measurements$raw$drivers)))
   }
+  expect_no_warning(amiss:::warn_absent_drivers(study$catalogue, study$measurements))
   for (entry in box_catalogue()) {
     expect_gt(length(free_parameters(amiss:::extend(paper_box("M2"), entry))), length(free_parameters(paper_box("M2"))))
   }
