@@ -5,7 +5,8 @@ test_that("runs made elsewhere give the same as runs made here", {
   expect_equal(there$unit, here$unit, tolerance = 1e-12)
   a <- calibrate(train_emulator(here, m), m, quick_ais, seed = 1)
   b <- calibrate(train_emulator(there, m), m, quick_ais, seed = 1)
-  expect_equal(b$log_evidence, a$log_evidence, tolerance = 1e-6)
+  expect_equal(b$posterior$log_evidence, a$posterior$log_evidence, tolerance = 1e-6)
+  expect_lt(abs(b$log_evidence - a$log_evidence), 0.05)  # corrected here by runs of the simulator, there by none
   expect_error(predict(b), "made elsewhere", class = "amiss_error_input")
 })
 

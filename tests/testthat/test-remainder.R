@@ -1,7 +1,7 @@
 model_of <- function(r, hours = seq_along(r), noise = 1, time = hours) {
   m <- list(hours = hours, time = time, noise_sd = noise, unit = "K", target = "Ti")
   model <- list(prediction = data.frame(use = "calibrate", observed = r, mean = 0),
-                fit = list(rows = seq_along(r), emulator = list(basis = list(vectors = matrix(0, length(r), 2)))))
+                fit = list(rows = seq_along(r), emulator = list(parameters = list(a = 1, b = 2))))
   amiss:::remaining_error(model, m)
 }
 
@@ -34,6 +34,23 @@ test_that("the hour is that of the record's clock", {
   expect_match(left$pattern$what, "around 07:30")
 })
 
+test_that("the clock is read from times that are text, without a warning", {
+  stamp <- as.POSIXct("2013-08-30 00:10:00", tz = "UTC") + 600 * (seq_len(600) - 1)
+  hours <- as.numeric(stamp) / 3600
+  clock <- as.POSIXlt(stamp)$hour + as.POSIXlt(stamp)$min / 60
+  for (form in c("%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ")) {
+    expect_no_warning(own <- amiss:::clock_hour(format(stamp, form)))
+    expect_equal(own, clock, tolerance = 1e-4)
+  }
+  expect_identical(amiss:::clock_hour(format(stamp, "%Y-%m-%d %H:%M:%S")), amiss:::clock_hour(stamp))
+  expect_equal(amiss:::clock_hour(c("23", "24.5", "49")), c(23, 0.5, 1))
+  expect_equal(amiss:::clock_hour(factor(c("2013-08-30 00:10:00", "2013-08-30 01:10:00"))), c(1, 7) / 6, tolerance = 1e-3)
+  expect_equal(amiss:::clock_hour("2013-08-30T02:10:00+02:00"), 1 / 6, tolerance = 1e-3)  # in UTC, as in the figures
+  noise <- withr::with_seed(1, rnorm(600))
+  expect_no_warning(left <- model_of(noise + 20 * (abs(clock - 7.5) < 0.01), hours, time = format(stamp, "%Y-%m-%d %H:%M:%S")))
+  expect_match(left$pattern$what, "around 07:30")
+})
+
 test_that("two days say nothing of every day", {
   hours <- seq_len(48)
   noise <- withr::with_seed(1, rnorm(48))
@@ -50,18 +67,19 @@ test_that("a large error that answers to nothing makes the verdict unexplained",
   expect_equal(verdict$verdict, "unexplained")
   expect_match(verdict$headline, "every day around")
   upgrade$models[[1]]$prediction$observed <- p$mean + withr::with_seed(1, rnorm(nrow(p), 0, 0.05))
-  upgrade$models[[1]]$fit$misfit$p <- 0.5
   expect_equal(amiss:::diagnosis_verdict(upgrade)$verdict, "nothing")
-  upgrade$models[[1]]$fit$misfit$p <- 1e-4
-  expect_equal(amiss:::diagnosis_verdict(upgrade)$verdict, "unexplained")
+  # Silence of numbers that are not trusted is told as such.
+  upgrade$models[[1]]$fit$trust <- list(trusted = FALSE, verdict = "chains stick")
+  verdict <- amiss:::diagnosis_verdict(upgrade)
+  expect_equal(verdict$verdict, "nothing")
+  expect_match(verdict$headline, "not to be trusted: chains stick")
 })
 
-test_that("a model that cannot follow the measurements even inside the simulation space is doubted", {
+test_that("a discrepancy that reaches into what the parameters can do is told", {
   upgrade <- small_upgrade()
-  expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "best parameters")
-  upgrade$models[[2]]$fit$misfit$p <- 1e-4
-  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "cannot follow the measurements")
-  expect_match(paste(summary(upgrade)$remains, collapse = " "), "Even with the best parameters")
+  expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "do not read their values")
+  upgrade$models[[2]]$fit$reach[] <- c(0.01, 0.01, 0.98)
+  expect_match(summary(upgrade)$remains, "they may hide a part of it, so do not read their values as physical", all = FALSE)
 })
 
 test_that("a cause that leaves a good part of the error is only likely", {
@@ -70,22 +88,23 @@ test_that("a cause that leaves a good part of the error is only likely", {
   # Both models as they were, plus an error that neither explains.
   extra <- withr::with_seed(1, rnorm(nrow(p), 0, 5))
   for (k in 1:2) upgrade$models[[k]]$prediction$observed <- upgrade$models[[k]]$prediction$observed + extra
-  expect_true(amiss:::much_remains(upgrade))
-  expect_false(amiss:::much_remains(small_upgrade()))
-  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a good part of the error remains")
+  expect_true(amiss:::much_remains(upgrade$models, upgrade$measurements))
+  expect_false(amiss:::much_remains(small_upgrade()$models, upgrade$measurements))
 })
 
 test_that("a cause is only likely where a drift would explain the record as well", {
   upgrade <- small_upgrade()
-  expect_false(amiss:::drift_rivals(upgrade))
-  expect_identical(amiss:::diagnosis_verdict(upgrade)$verdict, "named")
+  rivals <- function(u) amiss:::drift_rivals(u$models, u$measurements, u$control)
+  expect_false(rivals(upgrade))
   # The base model off by a parabola; the extended one no better than that.
   p <- upgrade$models[[1]]$prediction
   hours <- upgrade$measurements$hours[match(p$time, upgrade$measurements$time)]
   noise <- withr::with_seed(1, rnorm(nrow(p), 0, upgrade$measurements$noise_sd))
   upgrade$models[[1]]$prediction$observed <- p$mean + noise + 3 * (hours / max(hours))^2
   upgrade$models[[2]]$prediction$observed <- upgrade$models[[2]]$prediction$mean + 1.5 * noise
-  expect_true(amiss:::drift_rivals(upgrade))
+  expect_true(rivals(upgrade))
+  upgrade$models <- amiss:::judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements, upgrade$control)
+  expect_match(upgrade$models[[2]]$doubts, "a drifting sensor would explain the error as well", all = FALSE)
   expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a drifting sensor would explain the error as well")
 })
 

@@ -34,16 +34,77 @@ test_that("a summary says when nothing is named, and why", {
   expect_match(summary(upgrade)$sure, "No mechanism was tried")
 })
 
-test_that("a cause with rivals, or without gain on held-out data, is only likely", {
-  upgrade <- small_upgrade()
-  doubtful <- upgrade
+rejudged <- function(upgrade) {
+  upgrade$models <- amiss:::judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements, upgrade$control)
+  upgrade
+}
+
+test_that("a cause with rivals is only likely", {
+  doubtful <- small_upgrade()
   doubtful$candidates$probability <- c(0.6, 0.3)
-  expect_match(summary(doubtful)$tag, "other causes are possible")
-  doubtful <- upgrade
-  doubtful$models[[2]]$scores$validate[["rmse"]] <- 2 * doubtful$models[[1]]$scores$validate[["rmse"]]
-  told <- summary(doubtful)
+  told <- summary(rejudged(doubtful))
   expect_identical(told$verdict, "likely")
-  expect_match(told$note, "does not improve")
+  expect_identical(told$tag, "Likely cause, but other causes are possible")
+  expect_match(told$headline, "^Most likely: Sun enters")
+  expect_match(told$change, "Against sun speaks that other causes are possible", all = FALSE)
+})
+
+test_that("a change without gain on held-out data is a hint, and no cause", {
+  upgrade <- small_upgrade()
+  held <- upgrade$models[[2]]$prediction$use == "validate"
+  upgrade$models[[2]]$prediction$mean[held] <- upgrade$models[[1]]$prediction$mean[held] + 1
+  upgrade$models[[2]]$scores <- amiss:::prediction_scores(upgrade$models[[2]]$prediction)
+  told <- summary(rejudged(upgrade))
+  expect_identical(told$verdict, "unexplained")
+  expect_identical(told$tag, "Unexplained; a stand-in fits")
+  expect_match(told$note, "does not improve predictions of data the model has not seen")
+  expect_match(told$change, "not more than the uncertainty of that change", all = FALSE)
+})
+
+test_that("each step tells what it brought, and what could do the same", {
+  told <- summary(small_upgrade())$change
+  expect_match(told[1], "^sun \\(named\\), driven by Gv: Sun enters")
+  expect_match(told, "With sun the typical error falls from [0-9.]+ to [0-9.]+ K in calibration; on held-out data it falls .* more than the uncertainty",
+               all = FALSE)
+  upgrade <- small_upgrade()
+  upgrade$models[[2]]$confounded_with <- "gain"
+  expect_match(summary(upgrade)$change, "What sun does, gain could do in part as well .correlated beyond 0.4", all = FALSE)
+  upgrade$models[[2]]["confounded_with"] <- list(character())
+  expect_no_match(paste(summary(upgrade)$change, collapse = " "), "could do in part")
+})
+
+test_that("conditions that cannot be told apart are told as such in what remains", {
+  upgrade <- base_only(small_upgrade())
+  attribution <- upgrade$models[[1]]$attribution
+  attribution$table[c("significant", "group")] <- list(TRUE, "Te or Gv")
+  attribution$groups <- list(list(conditions = c("Te", "Gv"), log10_bf_dropped = 9, p_value = 0.01, significant = TRUE, correlation = 0.97))
+  upgrade$models[[1]]$attribution <- attribution
+  told <- summary(upgrade)
+  expect_match(told$headline, "Something that answers to Te or Gv is missing")
+  expect_match(told$remains, "Te and Gv cannot be told apart in this record", all = FALSE)
+})
+
+test_that("an upgrade prints each mechanism with its verdict, within fifteen lines", {
+  upgrade <- small_upgrade()
+  lines <- cli::cli_fmt(print(upgrade))
+  expect_lte(length(lines), 15)
+  expect_match(lines, "named: .*sun.* \\(Gv\\), log10 Bayes factor [0-9.]+", all = FALSE)
+  # As if five had been adopted: four are printed.
+  sun <- upgrade$models[[2]]
+  for (name in paste("mechanism", letters[1:4])) {
+    parent <- upgrade$models[[length(upgrade$models)]]
+    step <- utils::modifyList(sun, list(name = paste(parent$name, "+", name), parent = parent$name, mechanism = name, verdict = "likely",
+                                        doubts = rep("a doubt of more than a few words", 8)))
+    row <- upgrade$candidates[1, ]
+    row[c("from", "mechanism")] <- list(parent$name, name)
+    upgrade$candidates <- rbind(upgrade$candidates, row)
+    upgrade$catalogue[[name]] <- upgrade$catalogue$sun
+    upgrade$models <- c(upgrade$models, list(step))
+  }
+  lines <- cli::cli_fmt(print(upgrade))
+  expect_lte(length(lines), 15)
+  expect_match(lines[1], "5 mechanisms adopted")
+  expect_match(lines, "likely: .*mechanism a", all = FALSE)
 })
 
 test_that("odds are written out while they can be read", {

@@ -30,8 +30,22 @@ test_that("a study writes its files with the agreed fields", {
                     "trusted", "rmse_calibration", "rmse_validation", "coverage95_validation", "parameters", "attribution") %in% names(json$models[[1]])))
   expect_null(json$models[[1]]$parent)
   expect_named(json$models[[1]]$parameters[[1]], c("name", "unit", "median", "lower95", "upper95"))
-  expect_named(json$models[[1]]$attribution[[1]], c("boundary", "log10_bf_dropped", "share", "p_value", "significant"))
+  expect_named(json$models[[1]]$attribution[[1]], c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group"))
   expect_true(all(c("from", "mechanism", "log10_bf", "interval", "probability") %in% names(json$candidates[[1]])))
+  adopted <- json$models[[2]]
+  expect_true(all(c("verdict", "doubts", "confounded_with", "held_out_gain", "emulator_error", "emulator_ratio", "emulator_checked", "refinements",
+                    "reach", "trust") %in% names(adopted)))
+  own <- upgrade$models[[2]]
+  expect_equal(adopted$verdict, own$verdict)
+  expect_equal(adopted$doubts, as.list(own$doubts))
+  expect_equal(adopted$confounded_with, as.list(own$confounded_with))
+  expect_equal(adopted$held_out_gain, own$held_out_gain[c("mean", "standard_error")])
+  expect_equal(adopted$emulator_error, own$fit$check$error)
+  expect_true(adopted$emulator_checked)
+  expect_equal(adopted$trust, own$fit$trust$verdict)
+  expect_named(adopted$reach, c("13", "300", "Inf"))
+  expect_null(json$models[[1]]$verdict)
+  expect_equal(json$diagnosis$verdict, "named")
   expect_equal(json$named_cause$mechanism, "sun")
   expect_equal(json$named_cause$boundary, list("Gv"))
   expect_length(json$gain$interval, 2)

@@ -1,0 +1,149 @@
+# A simulator that counts its runs and does as `misbehave(count, series)` says from the run `after` on.
+counting <- function(misbehave, after) {
+  count <- 0
+  function_simulator(function(values, drivers) {
+    count <<- count + 1
+    series <- values[["offset"]] + values[["gain"]] * drivers[, "Te"]
+    if (count > after) misbehave(count - after, series) else series
+  }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te", name = "counting")
+}
+
+# Runs misbehave at posterior draws alone: the design has 30.
+checked <- function(misbehave) {
+  m <- linear_measurements()
+  emulator <- train_emulator(simulate_design(counting(misbehave, 30), m, runs = 30, seed = 3), m)
+  calibrate(emulator, m, quick_ais, seed = 3)
+}
+
+test_that("a good emulator passes the check by runs", {
+  fit <- linear_fit()
+  expect_true(fit$check$passed)
+  expect_lt(fit$check$ratio, 0.01)  # two vectors hold a linear simulator exactly
+  expect_true(fit$trust$trusted)
+  expect_match(fit$check$verdict, "by 40 runs of the simulator at posterior draws", fixed = TRUE)
+  expect_identical(glance(fit)$emulator_error, fit$check$ratio)
+  expect_equal(fitted(fit), fit$check$mean)
+})
+
+test_that("the error of the check is that of runs at the record's rows", {
+  fit <- linear_fit()
+  made <- amiss:::posterior_runs(fit, 40, 1)
+  own <- function(i) {
+    run <- fit$values[made$draws[i], "offset"] + fit$values[made$draws[i], "gain"] * linear_data()$Te
+    run - stats::predict(fit$emulator, fit$values[made$draws[i], , drop = FALSE])$mean[, 1]
+  }
+  # Both are differences of numbers near 25: rounding, of 1e-4.
+  expect_equal(fit$check$error, sqrt(mean(vapply(seq_along(made$draws), own, numeric(240))^2)), tolerance = 1e-6)
+  expect_lte(fit$check$noise, 0.1)
+  expect_equal(fit$check$ratio, fit$check$error / fit$check$noise)
+})
+
+test_that("spoiled coefficients fail the check, and the calibration says why it is not trusted", {
+  m <- linear_measurements()
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
+  emulator$processes$coefficients <- 1.02 * emulator$processes$coefficients  # 2 % of 24 K beside a noise of 0.1 K
+  fit <- calibrate(emulator, m, quick_ais, seed = 3)
+  expect_false(fit$check$passed)
+  expect_gt(fit$check$ratio, 1)
+  expect_false(fit$trust$trusted)
+  expect_match(fit$trust$verdict, "not trusted: by .* runs .* of the noise, more than a third: it is not good enough")
+  expect_false(glance(fit)$trusted)
+  expect_match(printed(fit), "not good enough")
+})
+
+test_that("too few runs fail the check", {
+  m <- bent_measurements()
+  fit <- calibrate(train_emulator(simulate_design(bent_simulator(), m, runs = 6, seed = 1), m), m, quick_ais, seed = 1)
+  expect_gt(fit$check$ratio, 1)
+  expect_false(fit$trust$trusted)
+})
+
+test_that("the check can be left out", {
+  m <- linear_measurements()
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
+  fit <- calibrate(emulator, m, c(quick_ais, list(check = 0)), seed = 3)
+  expect_null(fit$check)
+  expect_true(fit$trust$trusted)
+  expect_identical(fit$log_evidence, fit$posterior$log_evidence)
+  expect_no_match(printed(fit), "of the noise")
+})
+
+test_that("runs that fail at posterior draws are left out and told", {
+  for (failing in list(function(k, y) if (k %% 10 == 0) NaN * y else y, function(k, y) if (k %% 10 == 0) stop("no steady state") else y,
+                       function(k, y) if (k %% 10 == 0) replace(y, 7, Inf) else y)) {
+    expect_no_warning(fit <- checked(failing))
+    expect_equal(fit$check$failed, 4)
+    expect_lte(fit$check$runs, 36)
+    expect_match(fit$check$verdict, "(4 more failed)", fixed = TRUE)
+    expect_true(fit$trust$trusted)
+  }
+})
+
+test_that("where more than a fifth of the runs at posterior draws fail, one of them is named", {
+  expect_error(checked(function(k, y) if (k %% 3 == 0) NaN * y else y),
+               "failed at 1[23] of [34][0-9] draws.*more than 20 %.*first is run 3 at offset = [0-9.]+, gain = [0-9.]+",
+               class = "amiss_error_numerical")
+  expect_error(checked(function(k, y) stop("no steady state")), "failed at 40 of 40", class = "amiss_error_numerical")
+})
+
+test_that("a simulator that returns another number of values at posterior draws is refused", {
+  expect_error(checked(function(k, y) y[-1]), "returned 239 value.*240 numbers", class = "amiss_error_input")
+  expect_error(checked(function(k, y) as.character(y)), "class <character>", class = "amiss_error_input")
+})
+
+test_that("runs made elsewhere are checked by those left out", {
+  m <- bent_measurements()
+  elsewhere <- function(runs) {
+    made <- simulate_design(bent_simulator(), m, runs, seed = 1)
+    calibrate(train_emulator(ensemble(made$values, made$outputs, made$parameters), m), m, quick_ais, seed = 1)
+  }
+  good <- elsewhere(60)
+  expect_true(good$check$passed)
+  expect_identical(good$check$runs, 20L)  # a fifth would be 12
+  expect_match(good$check$verdict, "by 20 runs left out, those nearest to the posterior", fixed = TRUE)
+  expect_true(is.na(good$check$effective))
+  expect_identical(good$log_evidence, good$posterior$log_evidence)
+  expect_null(good$check$mean)
+  bad <- elsewhere(6)
+  expect_false(bad$check$passed)
+  expect_match(bad$trust$verdict, "by 6 runs left out.*not good enough")
+})
+
+test_that("of a linear simulator the exact evidence is the emulated one", {
+  fit <- linear_fit()
+  # The emulator's error is below 1e-3 of the noise, at 240 rows: less than 0.05 nats of a likelihood.
+  expect_lt(abs(fit$check$correction), 0.05)
+  expect_equal(fit$log_evidence, fit$posterior$log_evidence + fit$check$correction)
+  expect_gt(fit$check$effective, 0.99)
+})
+
+test_that("with a coarse basis the exact evidence comes closer to that of a fine one", {
+  m <- bent_measurements()
+  runs <- simulate_design(bent_simulator(), m, runs = 40, seed = 2)
+  calibrated <- function(control) suppressWarnings(calibrate(train_emulator(runs, m, control), m, quick_ais, seed = 1))
+  fine <- calibrated(list(explained = 1, noise_fraction = 1e-6))
+  for (noise_fraction in c(1, 10)) {
+    coarse <- calibrated(list(explained = 0.5, noise_fraction = noise_fraction))
+    expect_lt(ncol(coarse$emulator$basis$vectors), ncol(fine$emulator$basis$vectors))
+    off <- abs(c(coarse$log_evidence, coarse$posterior$log_evidence) - fine$log_evidence)
+    expect_lt(off[1], 0.5 * off[2])
+    # What few draws say of the correction is part of the error.
+    expect_gt(coarse$standard_error, coarse$posterior$standard_error)
+    expect_lt(off[1], 4 * sqrt(coarse$standard_error^2 + fine$standard_error^2))
+  }
+})
+
+test_that("a draw of much weight is run once and counts as often as it was drawn", {
+  fit <- linear_fit()
+  fit$weights[] <- 0.5 / (length(fit$weights) - 1)
+  fit$weights[5] <- 0.5
+  made <- amiss:::posterior_runs(fit, 40, 1)
+  expect_identical(anyDuplicated(made$draws), 0L)
+  expect_equal(sum(made$times), 40)
+  expect_equal(made$times[made$draws == 5], 20)
+  expect_equal(amiss:::emulation_check(fit, made)$mean, as.numeric(made$runs %*% made$times) / 40)
+  # The same draws one by one: the same correction.
+  each <- rep(seq_along(made$draws), made$times)
+  twice <- list(draws = made$draws[each], times = rep(1, 40), runs = made$runs[, each], failed = 0)
+  expect_equal(amiss:::exact_evidence(fit, made, 1)$log_evidence, amiss:::exact_evidence(fit, twice, 1)$log_evidence)
+})

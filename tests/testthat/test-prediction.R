@@ -1,0 +1,109 @@
+# What is measured answers linearly to Tn, of which the simulator knows nothing.
+hidden <- withr::with_seed(6, as.numeric(stats::filter(rnorm(480), 0.9, "recursive")))
+lacking <- function(reach = c(13, 300, Inf), ...) {
+  data <- linear_data(480)
+  data$Tn <- hidden
+  data$Ti <- data$Ti + 0.3 * lagged(hidden, 3)
+  m <- linear_measurements(data, boundary = c("Te", "Gv", "Tn"), calibrate = data$hour <= 320, validate = data$hour > 320)
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
+  calibrate(emulator, m, c(quick_ais, list(reach = reach), ...), seed = 3)
+}
+
+scores <- function(p) amiss:::prediction_scores(p)$validate
+
+test_that("the discrepancy carried along lowers the error of held-out rows, and its band is honest", {
+  for (reach in list(c(13, 300, Inf), Inf)) {
+    fit <- lacking(reach)
+    without <- scores(predict(fit))
+    with <- scores(predict(fit, discrepancy = TRUE))
+    # The response is 0.45 K, the noise 0.1 K: its RMS over 160 values has an error of 6 %.
+    expect_gt(without[["rmse"]], 0.4)
+    expect_lt(with[["rmse"]], 0.13)
+    expect_lt(with[["crps"]], 0.4 * without[["crps"]])
+    # 160 errors about 95 %: below 0.85 or all of them are far from it.
+    expect_gt(with[["coverage95"]], 0.85)
+    expect_lte(with[["coverage95"]], 1)
+  }
+})
+
+test_that("the band with a discrepancy is not as wide as without", {
+  fit <- lacking()
+  width <- function(p) mean(p$upper95 - p$lower95)
+  with <- width(predict(fit, "validate", discrepancy = TRUE))
+  expect_lt(with, 0.5 * width(predict(fit, "validate")))
+  expect_gt(with, 2 * 1.96 * 0.1 * 0.9)  # no less than the noise
+})
+
+test_that("only held-out measurements' conditions are used, not their values", {
+  fit <- lacking()
+  spoilt <- fit
+  held <- spoilt$measurements$use == "validate"
+  spoilt$measurements$y[held] <- 1e3
+  expect_identical(predict(spoilt, "validate", discrepancy = TRUE)$mean, predict(fit, "validate", discrepancy = TRUE)$mean)
+})
+
+test_that("the basis at other rows is that of the same runs", {
+  fit <- lacking()
+  expect_equal(amiss:::basis_at(fit, "calibrate", 1), unname(fit$emulator$basis$vectors), tolerance = 1e-10)
+  both <- amiss:::basis_at(fit, c("calibrate", "validate"), 1)
+  expect_equal(both[1:320, ], unname(fit$emulator$basis$vectors), tolerance = 1e-10)
+  # The space of offset and gain: the vectors of all rows lie in it as well.
+  expect_lt(max(abs(stats::lm.fit(cbind(1, linear_data(480)$Te), both)$residuals)), 1e-8 * max(abs(both)))
+})
+
+test_that("runs that fail at other rows are left out of the basis there", {
+  fit <- lacking()
+  fragile <- fit
+  fragile$emulator$simulator <- function_simulator(function(values, drivers) {
+    if (values[["gain"]] > 0.9 && nrow(drivers) > 320) stop("too hot")
+    values[["offset"]] + values[["gain"]] * drivers[, "Te"]
+  }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
+  expect_no_warning(own <- amiss:::basis_at(fragile, "validate", 1))
+  expect_equal(own, amiss:::basis_at(fit, "validate", 1), tolerance = 1e-8)
+  never <- fit
+  never$emulator$simulator <- function_simulator(function(values, drivers) NaN * drivers[, 1], free("offset", uniform(10, 30), "K"),
+                                                 free("gain", uniform(0, 1)), boundary = "Te")
+  expect_error(amiss:::basis_at(never, "validate", 1), "failed at 30 of the ensemble's 30 runs", class = "amiss_error_numerical")
+})
+
+test_that("the discrepancy is the whole response that the model lacks", {
+  truth <- 0.3 * lagged(hidden, 3)[1:320]
+  fit <- lacking(Inf)
+  own <- discrepancy(fit)$series
+  # But for its level, which the simulator's offset takes; the filter bank's time constants are 2 and 4 h, the truth's 3 h.
+  expect_lt(sd(own$discrepancy - truth), 0.05 * sd(truth))
+  expect_true(all(own$lower95 <= own$discrepancy & own$discrepancy <= own$upper95))
+  for (reach in list(Inf, c(13, 300, Inf))) {
+    own <- discrepancy(lacking(reach))$series
+    # Where it keeps out of the parameters' way they take a part; together they are what was made, to a third of the noise.
+    made <- 20 + 0.4 * linear_data(480)$Te[1:320] + truth
+    expect_lt(sqrt(mean((own$simulated + own$discrepancy - made)^2)), 0.1 / 3)
+    expect_equal(own$residual, own$observed - own$simulated)
+  }
+})
+
+test_that("each condition's response is told, and their sum is the discrepancy where it is free", {
+  fit <- lacking(Inf)
+  own <- discrepancy(fit)
+  expect_identical(colnames(own$responses), c("Te", "Gv", "Tn"))
+  expect_equal(rowSums(own$responses), own$series$discrepancy, tolerance = 1e-8)
+  expect_gt(cor(own$responses[, "Tn"], lagged(hidden, 3)[1:320]), 0.99)
+})
+
+test_that("where nothing lacks, nothing is carried", {
+  data <- linear_data()
+  fit <- linear_fit(linear_measurements(data, calibrate = data$hour <= 160, validate = data$hour > 160))
+  with <- predict(fit, "validate", discrepancy = TRUE)
+  # A sixth of the noise of 0.1 K.
+  expect_lt(max(abs(with$mean - predict(fit, "validate")$mean)), 0.1 / 6)
+})
+
+test_that("what cannot be carried is refused", {
+  m <- linear_measurements(linear_data(60))
+  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
+  paper <- calibrate_paper(emulator, m, list(ais = list(pilot_chains = 24, groups = 4, chains = 12)), seed = 1)
+  expect_error(predict(paper, discrepancy = TRUE), "needs a fit of `calibrate\\(\\)`", class = "amiss_error_input")
+  expect_s3_class(predict(paper, "calibrate"), "data.frame")
+  expect_error(predict(lacking(), discrepancy = "yes"), "discrepancy", class = "amiss_error_input")
+  expect_error(predict(linear_fit(), "validate"), "no row", class = "amiss_error_input")
+})

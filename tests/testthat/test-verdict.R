@@ -1,0 +1,186 @@
+# Two models by hand, of ten days held out by the hour: the second one's error is `after`, the first one's `before`.
+models_of <- function(before, after, time = NULL) {
+  n <- length(before)
+  m <- list(use = rep("validate", n), y = rep(0, n), hours = 1e5 + seq_len(n), time = time)
+  model <- function(error) {
+    list(fit = list(measurements = m), prediction = data.frame(use = "validate", observed = 0, mean = error, time = time %||% m$hours))
+  }
+  lapply(list(before, after), model)
+}
+
+errors <- function(n = 240) withr::with_seed(3, list(before = rnorm(n, 0, 2), after = rnorm(n)))
+
+judged <- function(change = function(upgrade) upgrade) {
+  upgrade <- change(small_upgrade())
+  models <- amiss:::judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements, upgrade$control)
+  models[[2]][c("verdict", "doubts")]
+}
+
+expect_doubt <- function(pattern, change, verdict = "likely") {
+  own <- judged(change)
+  expect_identical(own$verdict, verdict)
+  expect_length(own$doubts, 1)
+  expect_match(own$doubts, pattern)
+}
+
+test_that("a mechanism that nothing speaks against is named", {
+  expect_identical(judged()$verdict, "named")
+  model <- small_upgrade()$models[[2]]
+  expect_identical(model$verdict, "named")
+  expect_length(model$doubts, 0)
+  expect_true(model$held_out_gain$improves)
+  expect_null(small_upgrade()$models[[1]]$verdict)
+})
+
+test_that("each doubt makes a mechanism likely", {
+  expect_doubt("other causes are possible", function(u) {
+    u$candidates$probability <- c(0.6, 0.3)
+    u
+  })
+  for (k in 1:2) {
+    expect_doubt("numbers behind it are not trusted", function(u) {
+      u$models[[k]]$fit$trust <- list(trusted = FALSE, verdict = "chains stick")
+      u
+    })
+  }
+  expect_doubt("the error in calibration rose with it", function(u) {
+    u$models[[2]]$scores$calibrate[["rmse"]] <- 1.03 * u$models[[1]]$scores$calibrate[["rmse"]]
+    u
+  })
+  expect_doubt("what drives it is still answered to", function(u) {
+    u$models[[2]]$attribution <- u$models[[1]]$attribution
+    u
+  })
+  expect_doubt("at the edge of what was thought possible", function(u) {
+    u$models[[2]]$fit$posterior$unit[, 3] <- 1 - 0.001 * u$models[[2]]$fit$posterior$unit[, 3]
+    u
+  })
+  # Both models as they were, plus an error that neither explains.
+  expect_doubt("a good part of the error remains", function(u) {
+    p <- u$models[[2]]$prediction
+    extra <- ifelse(p$use == "calibrate", withr::with_seed(1, rnorm(nrow(p))), 0)
+    for (k in 1:2) u$models[[k]]$prediction$observed <- p$observed + extra
+    u
+  })
+})
+
+test_that("a parameter of the base model at the edge of its prior is no doubt about the mechanism", {
+  expect_identical(judged(function(u) {
+    u$models[[2]]$fit$posterior$unit[, 1] <- 0.999
+    u
+  })$verdict, "named")
+})
+
+test_that("a mechanism by which data held out do not gain is a stand-in, whatever its evidence", {
+  worse <- function(upgrade) {
+    held <- upgrade$models[[1]]$prediction$use == "validate"
+    upgrade$models[[2]]$prediction$mean[held] <- upgrade$models[[1]]$prediction$mean[held]
+    upgrade
+  }
+  expect_doubt("data held out do not gain by it", worse, "stand-in")
+  upgrade <- worse(small_upgrade())
+  upgrade$models <- amiss:::judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements, upgrade$control)
+  told <- summary(upgrade)
+  expect_identical(told$verdict, "unexplained")
+  expect_match(told$headline, "take it as a stand-in for something else")
+})
+
+test_that("without data held out nothing is said of a gain", {
+  upgrade <- without_held_out(small_upgrade())
+  gain <- amiss:::held_out_gain(upgrade$models[[1]], upgrade$models[[2]])
+  expect_identical(gain$improves, NA)
+  expect_identical(judged(without_held_out)$verdict, "named")
+})
+
+test_that("the gain on data held out has the standard error of sums over days", {
+  e <- errors()
+  models <- models_of(e$before, e$after)
+  gain <- amiss:::held_out_gain(models[[1]], models[[2]])
+  fall <- e$before^2 - e$after^2
+  days <- colSums(matrix(fall, 24))
+  expect_equal(gain$mean, mean(fall))
+  expect_equal(gain$standard_error, sqrt(10) * sd(days) / 240)
+  expect_true(gain$improves)
+  # Its size: of 240 independent differences. A standard deviation of ten values has an error of 24 %.
+  expect_equal(gain$standard_error, sd(fall) / sqrt(240), tolerance = 0.75)
+  # Of a short record, sums over eighths.
+  short <- models_of(e$before[1:80], e$after[1:80])
+  eighths <- colSums(matrix(fall[1:80], 10))
+  expect_equal(amiss:::held_out_gain(short[[1]], short[[2]])$standard_error, sqrt(8) * sd(eighths) / 80)
+})
+
+test_that("days are counted by the hours of the measurements, whatever their time is written in", {
+  e <- errors()
+  gain <- function(time) {
+    models <- models_of(e$before, e$after, time)
+    expect_no_warning(own <- amiss:::held_out_gain(models[[1]], models[[2]]))
+    own
+  }
+  stamp <- as.POSIXct("2013-08-30 00:10:00", tz = "UTC") + 3600 * seq_len(240)
+  expect_identical(gain(format(stamp, "%Y-%m-%d %H:%M:%S")), gain(NULL))
+  expect_identical(gain(stamp), gain(NULL))
+  # Hours of clock times are not whole: a day of 10-minute steps stays one.
+  models <- models_of(rep(e$before, 6), rep(e$after, 6))
+  exact <- as.numeric(as.POSIXct("2013-08-30 00:10:00", tz = "UTC") + 600 * (seq_len(1440) - 1)) / 3600
+  for (k in 1:2) models[[k]]$fit$measurements$hours <- exact
+  days <- colSums(matrix(rep(e$before^2 - e$after^2, 6), 144))
+  expect_equal(amiss:::held_out_gain(models[[1]], models[[2]])$standard_error, sqrt(10) * sd(days) / 1440)
+})
+
+test_that("a record with times as text is judged without a warning", {
+  data <- small_record()
+  data$time <- format(data$time, "%Y-%m-%d %H:%M:%S")
+  m <- measurements(data, time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05, warmup = 12,
+                    calibrate = seq_len(240) <= 168, validate = seq_len(240) > 168)
+  as_text <- function(u) {
+    u$models <- lapply(u$models, function(model) {
+      model$fit$measurements <- m
+      model$prediction$time <- m$time[m$use %in% c("calibrate", "validate")]
+      # Large enough to be looked at by the clock.
+      model$prediction$observed <- model$prediction$observed + 2 * (seq_len(nrow(model$prediction)) %% 24 == 9)
+      model
+    })
+    u$measurements <- m
+    u
+  }
+  expect_no_warning(own <- judged(as_text))
+  expect_match(own$doubts, "a good part of the error remains", all = FALSE)
+  pattern <- remaining_error(as_text(small_upgrade())$models[[2]], m)$pattern
+  expect_match(pattern$what, "every day around")
+})
+
+test_that("what drives a mechanism is still answered to with more than half of its evidence", {
+  model <- function(log10_bf, significant = TRUE) {
+    table <- data.frame(boundary = c("Gv", "Te"), log10_bf_dropped = c(log10_bf, 30), significant = c(significant, TRUE))
+    list(attribution = list(table = table))
+  }
+  still <- function(...) amiss:::still_answers(..., boundary = "Gv")
+  expect_true(still(model(10), model(6)))
+  expect_false(still(model(10), model(4)))
+  expect_false(still(model(10), model(6, FALSE)))
+  expect_false(still(model(10, FALSE), model(6)))  # it did not answer before
+  expect_true(amiss:::still_answers(model(10), model(1), c("Gv", "Te")))
+})
+
+test_that("parameters that are correlated with those of a mechanism beyond 0.4 are named", {
+  unit <- withr::with_seed(2, {
+    new <- runif(400)
+    cbind(new, 0.5 * new + 0.5 * runif(400), runif(400), 0.1 * new + 0.9 * runif(400))
+  })
+  fit <- list(values = `colnames<-`(unit, c("new", "close", "far", "loose")), weights = rep(1 / 400, 400), posterior = list(unit = unit))
+  expect_identical(amiss:::confounded_parameters(fit, "new"), "close")
+  expect_identical(amiss:::confounded_parameters(fit, c("new", "close")), character())
+  expect_identical(amiss:::confounded_parameters(fit, character()), character())
+  expect_identical(amiss:::confounded_parameters(fit, c("new", "close", "far", "loose")), character())
+  # Weights count: where the correlated part has none, nothing is left.
+  half <- fit
+  half$posterior$unit[201:400, 2] <- withr::with_seed(5, runif(200))
+  half$weights <- rep(c(0, 1), each = 200)
+  expect_identical(amiss:::confounded_parameters(half, "new"), character())
+})
+
+test_that("the edge of a prior is where the interval ends and the median lies", {
+  draws <- cbind(top = 1 - 0.02 * (1:500) / 500, bottom = 0.02 * (1:500) / 500, wide = (1:500) / 500, inside = 0.4 + 0.2 * (1:500) / 500)
+  fit <- list(values = draws, weights = rep(1 / 500, 500), posterior = list(unit = draws))
+  expect_identical(amiss:::edge_of_prior(fit), c(top = TRUE, bottom = TRUE, wide = FALSE, inside = FALSE))
+})
