@@ -77,8 +77,9 @@ best_on_record <- function(simulator, measurements, seed, starts = 5, known = NU
 #' @param effect_at Function of a size in (0, 1]: what the effect adds to the true output, at the rows of the drivers.
 #' @param base,unit The base model and the place in its cube from which its parameters adapt.
 #' @param noise,limits The noise that was drawn, and its least and largest value.
+#' @param most RMS of the largest effect, from most_left().
 #' @return size, effect, noise, achieved.
-hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, limits) {
+hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, limits, most) {
   plain <- base$f(amiss:::unit_to_values(t(unit), base$parameters)[1, ], drivers)
   last <- unit
   rms_at <- function(size, starts = list(unit, last)) {
@@ -87,7 +88,6 @@ hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, l
     fit$rms
   }
   centre <- rep(0.5, length(unit))
-  most <- rms_at(1, list(unit, centre))
   noise <- min(noise, max(limits[1], most / strength))
   wanted <- strength * noise
   size <- 1
@@ -103,8 +103,15 @@ hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, l
   list(size = size, effect = effect_at(size), noise = noise, achieved = rms / noise)
 }
 
+# What the parameters leave of the largest effect. Worlds in which that is below the least noise that the wanted strength
+# allows are drawn again, a few times, as nobody could tell them from worlds without an effect.
+most_left <- function(effect_at, base, unit, drivers, rows) {
+  plain <- base$f(amiss:::unit_to_values(t(unit), base$parameters)[1, ], drivers)
+  adapt_to(base, plain + effect_at(1), drivers, rows, list(unit, rep(0.5, length(unit))))$rms
+}
+
 # Rows of a fine grid averaged to the models' step.
 block_means <- function(x, width) {
-  group <- rep(seq_len(NROW(x) / width), each = width)
-  if (is.null(dim(x))) as.numeric(rowsum(x, group)) / width else rowsum(x, group) / width
+  if (!is.null(dim(x))) return(apply(x, 2, block_means, width))
+  .colMeans(x, width, length(x) / width)
 }

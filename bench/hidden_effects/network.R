@@ -265,35 +265,41 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
   weather <- draw_network_weather(days, step, fine)
   network$start[] <- c(stats::runif(1, 18, 23), mean(weather[seq_len(24 * fine / step), "Te"]))
   base <- network_simulator(network, step)
-  unit <- true_unit(base$parameters)
-  values <- amiss:::unit_to_values(t(unit), base$parameters)[1, ]
-  # A heater of the size of the house: on for good, it would lift it by 15 to 30 K.
-  weather[, "P"] <- weather[, "P"] * stats::runif(1, 15, 30) / lift_per_kw(network, values)
-  drivers <- block_means(weather, fine)
-  colnames(drivers) <- network_conditions
-  hours <- seq_len(nrow(drivers)) * step
+  hours <- seq_len(round(24 * days / step)) * step
   warmup <- if (days < 10) 24 else 48
   calibrate <- hours <= warmup + 24 * ceiling(0.6 * (days - warmup / 24))
   rows <- which(calibrate & hours > warmup)
-
-  real <- if (second_zone) with_second_zone(base) else list(simulator = base, values = values)
-  run_truth <- function(simulator, v) block_means(network_output(network_plan(simulator$network), v, weather, step / fine), fine)
-  if (second_zone) real$values <- c(values, real$values)
-  plain <- run_truth(real$simulator, real$values)
-  if (second_zone) {
-    # An effect counts beside what the wrong base makes of the truth without one; what it cannot is to show in the noise.
-    adapted <- adapt_to(base, plain, drivers, rows, list(unit, rep(0.5, length(unit))))
-    noise <- min(max(adapted$rms / sample(c(1, 2, 4, 8), 1), 0.02), 0.3)
-  }
-  hidden <- list(noise = noise, achieved = 0, effect = 0)
-  effect_values <- list()
-  if (kind != "none") {
+  heating <- weather[, "P"]
+  limits <- c(0.02, 0.3)
+  for (attempt in 1:10) {
+    unit <- true_unit(base$parameters)
+    values <- amiss:::unit_to_values(t(unit), base$parameters)[1, ]
+    # A heater of the size of the house: on for good, it would lift it by 15 to 30 K.
+    weather[, "P"] <- heating * stats::runif(1, 15, 30) / lift_per_kw(network, values)
+    drivers <- block_means(weather, fine)
+    run_truth <- function(simulator, v) block_means(network_output(network_plan(simulator$network), v, weather, step / fine), fine)
+    real <- if (second_zone) with_second_zone(base) else list(simulator = base)
+    real$values <- c(values, real$values)
+    plain <- run_truth(real$simulator, real$values)
+    adapted <- list(unit = unit)
+    if (second_zone) {
+      # An effect counts beside what the wrong base makes of the truth without one; what it cannot is to show in the noise.
+      adapted <- adapt_to(base, plain, drivers, rows, list(unit, rep(0.5, length(unit))))
+      noise <- min(max(adapted$rms / sample(c(1, 2, 4, 8), 1), limits[1]), limits[2])
+    }
+    if (kind == "none") break
     true <- network_with(real$simulator, kind)
     new <- true$parameters[setdiff(names(true$parameters), names(real$simulator$parameters))]
     other <- amiss:::unit_to_values(t(true_unit(new)), new)[1, ]
     at_size <- function(size) replace(other, 1, 0.95 * size * new[[1]]$prior$upper)
-    hidden <- hide_effect(function(size) run_truth(true, c(real$values, at_size(size))) - plain, base,
-                          if (second_zone) adapted$unit else unit, drivers, rows, strength, noise, c(0.02, 0.3))
+    effect_at <- function(size) run_truth(true, c(real$values, at_size(size))) - plain
+    most <- most_left(effect_at, base, adapted$unit, drivers, rows)
+    if (most >= strength * limits[1]) break
+  }
+  hidden <- list(noise = noise, achieved = 0, effect = 0)
+  effect_values <- list()
+  if (kind != "none") {
+    hidden <- hide_effect(effect_at, base, adapted$unit, drivers, rows, strength, noise, limits, most)
     effect_values[[kind]] <- c(at_size(hidden$size), size = hidden$size)
   }
   clean <- plain + hidden$effect

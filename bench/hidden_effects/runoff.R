@@ -54,29 +54,30 @@ linear_reservoir <- function(inflow, time, step, start = 0) {
 
 # The same with a second outlet above a level: each step is solved exactly on either side, with one crossing at most.
 overflowing_reservoir <- function(inflow, time, level, rate, step) {
-  below <- 1 / time
-  above <- below + rate
+  above <- 1 / time + rate
+  low <- inflow * time  # where the store tends to, below the level and above it
+  high <- (inflow + rate * level) / above
+  kept_low <- exp(-step / time)
+  kept_high <- exp(-above * step)
   store <- 0
-  out <- numeric(length(inflow))
+  stores <- numeric(length(inflow) + 1)
   for (k in seq_along(inflow)) {
-    into <- inflow[k]
-    before <- store
-    left <- step
-    high <- store > level || (store == level && into > below * level)
-    for (side in 1:2) {
-      r <- if (high) above else below
-      balance <- if (high) (into + rate * level) / above else into * time
-      store_then <- balance + (store - balance) * exp(-r * left)
-      crosses <- if (high) store_then < level else store_then > level
-      if (side == 2 || !crosses) break
-      left <- left - log((store - balance) / (level - balance)) / r
-      store <- level
-      high <- !high
+    if (store < level || store == level && low[k] <= level) {
+      after <- low[k] + (store - low[k]) * kept_low
+      if (after > level) {
+        crossed <- time * log((store - low[k]) / (level - low[k]))
+        after <- high[k] + (level - high[k]) * exp(-above * (step - crossed))
+      }
+    } else {
+      after <- high[k] + (store - high[k]) * kept_high
+      if (after < level) {
+        crossed <- log((store - high[k]) / (level - high[k])) / above
+        after <- low[k] + (level - low[k]) * exp(-(step - crossed) / time)
+      }
     }
-    store <- store_then
-    out[k] <- into - (store - before) / step
+    stores[k + 1] <- store <- after
   }
-  out
+  inflow - diff(stores) / step
 }
 
 # Water that reaches the ground: where snow lies, what falls below zero waits for a melt of so much a degree.
@@ -149,7 +150,7 @@ runoff_in_parts <- function(model, values, drivers, step, parts) {
   lapply(flows, block_means, parts)
 }
 
-runoff_part <- 1.5  # hours, in the models; truth has six parts in each
+runoff_part <- 0.5  # hours, in the models; truth has six parts in each
 
 root_flow <- function(flows) sqrt(flows$quick + flows$slow)
 
@@ -223,7 +224,7 @@ draw_runoff_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
   drawn_strength <- sample(c(0.5, 1, 2, 4, 8), 1)
   kind <- if (is.null(kind)) drawn_kind else kind
   strength <- if (kind == "none") 0 else if (is.null(strength)) drawn_strength else strength
-  step <- sample(c(3, 6, 12), 1)
+  step <- sample(c(2, 4, 6), 1)
   drawn_steps <- sample(300:700, 1)
   steps <- if (is.null(days)) drawn_steps else round(24 * days / step)
   ar1 <- sample(c(0, 0, 0.5, 0.8), 1)
@@ -238,31 +239,39 @@ draw_runoff_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
   rows <- setdiff(which(calibrate), 1:10)
   fine <- 6L
   truth <- function(simulator, v) runoff_in_parts(simulator$model, v, drivers, step, fine * step / runoff_part)
-  # A record in which the catchment hardly ever overflows says nothing of floods, and nobody would model it: drawn again.
-  for (attempt in 1:100) {
+  true <- if (kind == "none") base else runoff_with(base, kind)
+  new <- true$parameters[setdiff(names(true$parameters), names(base$parameters))]
+  # Records that say nothing are drawn again: those in which the catchment hardly ever overflows, so that nobody would model
+  # its floods, and those in which the mechanism at its largest hardly acts (no frost, or soil that never dries).
+  hopeless <- 0
+  for (attempt in 1:200) {
     first_day <- if (cold) stats::runif(1, 320, 400) else stats::runif(1, 1, 365)
     drivers <- block_means(draw_runoff_weather(steps * fine, step / fine, climate, first_day), fine)
     colnames(drivers) <- runoff_conditions
     unit <- true_unit(base$parameters)
     values <- amiss:::unit_to_values(t(unit), base$parameters)[1, ]
+    other <- if (length(new)) amiss:::unit_to_values(t(true_unit(new)), new)[1, ]
+    at_size <- function(size) replace(other, 1, 0.95 * size * new[[1]]$prior$upper)
     flows <- truth(base, values)
-    if (sum(flows$quick[rows]) >= 0.2 * sum(flows$slow[rows] + flows$quick[rows])) break
+    plain <- root_flow(flows)
+    effect_at <- function(size) root_flow(truth(true, c(values, at_size(size)))) - plain
+    # Noise of 2 to 20 % of the target's standard deviation: gauges are this good or bad. It hides the models' coarser steps.
+    largest <- if (length(new)) effect_at(1) else 0 * plain
+    spread <- min(stats::sd(plain[rows]), stats::sd((plain + largest)[rows]))
+    resolution <- sqrt(mean((base$f(values, drivers) - plain)[rows]^2))
+    limits <- c(max(0.02 * spread, 4 * resolution), max(0.2 * spread, 4 * resolution))
+    floods <- sum(flows$quick[rows]) >= 0.2 * sum(flows$slow[rows] + flows$quick[rows])
+    if (!floods || sqrt(mean(largest[rows]^2)) < strength * limits[1]) next
+    most <- if (length(new)) most_left(effect_at, base, unit, drivers, rows) else 0
+    if (most >= strength * limits[1] || hopeless == 10) break
+    hopeless <- hopeless + 1
   }
-  plain <- root_flow(flows)
   hours <- seq_len(steps) * step
   warmup <- 10 * step
-  # Noise of 2 to 20 % of the target's standard deviation: gauges are this good or bad.
-  limits <- c(0.02, 0.2) * stats::sd(plain[rows])
-  noise <- exp(stats::runif(1, log(limits[1]), log(limits[2])))
-  hidden <- list(noise = noise, achieved = 0, effect = 0)
+  hidden <- list(noise = exp(stats::runif(1, log(limits[1]), log(limits[2]))), achieved = 0, effect = 0)
   effect_values <- list()
   if (kind != "none") {
-    true <- runoff_with(base, kind)
-    new <- true$parameters[setdiff(names(true$parameters), names(base$parameters))]
-    other <- amiss:::unit_to_values(t(true_unit(new)), new)[1, ]
-    at_size <- function(size) replace(other, 1, 0.95 * size * new[[1]]$prior$upper)
-    hidden <- hide_effect(function(size) root_flow(truth(true, c(values, at_size(size)))) - plain, base, unit, drivers, rows,
-                          strength, noise, limits)
+    hidden <- hide_effect(effect_at, base, unit, drivers, rows, strength, hidden$noise, limits, most)
     effect_values[[kind]] <- c(at_size(hidden$size), size = hidden$size)
   }
   clean <- plain + hidden$effect
