@@ -6,7 +6,7 @@ inside_cube <- function(unit) pmin(pmax(unit, 1e-4), 1 - 1e-4)
 #' @param error_at Function of a matrix of places in the cube, one a row, that returns their errors, one column each.
 #' @param starts List of places in the cube.
 #' @return unit, rms: the best place found and the RMS of its error.
-least_squares_in_cube <- function(error_at, starts, iterations = 60) {
+least_squares_in_cube <- function(error_at, starts, iterations = 40) {
   search <- function(start) {
     start <- inside_cube(start)
     scale <- sum(error_at(t(start))^2)
@@ -19,7 +19,7 @@ least_squares_in_cube <- function(error_at, starts, iterations = 60) {
     }
     slopes <- function(unit) {
       own <- at(unit)
-      if (is.null(own$slopes)) seen$slopes <<- cube_slopes(error_at, unit)
+      if (is.null(own$slopes)) seen$slopes <<- cube_slopes(error_at, unit, own$error)
       seen$slopes
     }
     objective <- function(unit) {
@@ -28,7 +28,7 @@ least_squares_in_cube <- function(error_at, starts, iterations = 60) {
     }
     found <- stats::nlminb(start, objective, gradient = function(u) 2 * as.numeric(crossprod(slopes(u), at(u)$error)) / scale,
                            hessian = function(u) 2 * crossprod(slopes(u)) / scale, lower = 1e-4, upper = 1 - 1e-4,
-                           control = list(iter.max = iterations, eval.max = 2 * iterations, rel.tol = 1e-8))
+                           control = list(iter.max = iterations, eval.max = 2 * iterations, rel.tol = 1e-6))
     c(found[c("par", "objective")], scale = scale)
   }
   tried <- lapply(starts, search)
@@ -36,17 +36,12 @@ least_squares_in_cube <- function(error_at, starts, iterations = 60) {
   list(unit = best$par, rms = sqrt(mean(error_at(t(best$par))^2)))
 }
 
-cube_slopes <- function(error_at, unit, step = 1e-3) {
+# One-sided differences, towards the middle of the cube.
+cube_slopes <- function(error_at, unit, error, step = 1e-4) {
   d <- length(unit)
-  down <- pmax(unit - step, 1e-5)
-  up <- pmin(unit + step, 1 - 1e-5)
-  moved <- function(to) {
-    points <- matrix(unit, d, d, byrow = TRUE)
-    diag(points) <- to
-    points
-  }
-  errors <- error_at(rbind(moved(down), moved(up)))
-  sweep(errors[, d + seq_len(d), drop = FALSE] - errors[, seq_len(d), drop = FALSE], 2, up - down, "/")
+  step <- ifelse(unit > 0.5, -step, step)
+  errors <- error_at(matrix(unit, d, d, byrow = TRUE) + diag(step, d))
+  sweep(errors - error, 2, step, "/")
 }
 
 # The simulator's parameters fitted to a series without noise at some rows of its drivers.
@@ -96,7 +91,7 @@ hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, l
     over <- function(s) log(max(rms_at(exp(s)), 1e-12) / wanted)
     least <- log(1e-4)
     lower <- over(least)
-    size <- if (lower >= 0) 1e-4 else exp(stats::uniroot(over, c(least, 0), f.lower = lower, f.upper = log(most / wanted), tol = 0.02)$root)
+    size <- if (lower >= 0) 1e-4 else exp(stats::uniroot(over, c(least, 0), f.lower = lower, f.upper = log(most / wanted), tol = 0.1)$root)
   }
   rms <- rms_at(size, list(unit, centre, last))
   noise <- min(max(rms / strength, limits[1]), limits[2])

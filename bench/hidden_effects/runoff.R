@@ -253,15 +253,15 @@ draw_runoff_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
     other <- if (length(new)) amiss:::unit_to_values(t(true_unit(new)), new)[1, ]
     at_size <- function(size) replace(other, 1, 0.95 * size * new[[1]]$prior$upper)
     flows <- truth(base, values)
+    if (sum(flows$quick[rows]) < 0.2 * sum(flows$slow[rows] + flows$quick[rows])) next
     plain <- root_flow(flows)
     effect_at <- function(size) root_flow(truth(true, c(values, at_size(size)))) - plain
-    # Noise of 2 to 20 % of the target's standard deviation: gauges are this good or bad. It hides the models' coarser steps.
     largest <- if (length(new)) effect_at(1) else 0 * plain
+    # Noise of 2 to 20 % of the target's standard deviation: gauges are this good or bad. It hides the models' coarser steps.
     spread <- min(stats::sd(plain[rows]), stats::sd((plain + largest)[rows]))
     resolution <- sqrt(mean((base$f(values, drivers) - plain)[rows]^2))
-    limits <- c(max(0.02 * spread, 4 * resolution), max(0.2 * spread, 4 * resolution))
-    floods <- sum(flows$quick[rows]) >= 0.2 * sum(flows$slow[rows] + flows$quick[rows])
-    if (!floods || sqrt(mean(largest[rows]^2)) < strength * limits[1]) next
+    limits <- pmax(c(0.02, 0.2) * spread, 4 * resolution)
+    if (sqrt(mean(largest[rows]^2)) < strength * limits[1]) next
     most <- if (length(new)) most_left(effect_at, base, unit, drivers, rows) else 0
     if (most >= strength * limits[1] || hopeless == 10) break
     hopeless <- hopeless + 1
