@@ -143,7 +143,7 @@ network_plan <- function(network) {
 }
 
 # Temperature of the air, averaged over each step, driven by conditions that are constant over a step: exact, mode by mode.
-network_output <- function(plan, values, drivers, step) {
+network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
   n <- plan$n
   values <- c(values, plan$fixed)
   root <- 1 / sqrt(pmax(unname(values[plan$capacity]) * plan$share, 1e-6))
@@ -186,7 +186,7 @@ network_output <- function(plan, values, drivers, step) {
     out <- out + left[1, k] * (begun * to / step + (1 - to / step) / rate[k] * forcing[, k])
   }
   out
-}
+})
 
 # Temperature that a kilowatt of heating adds in the long run.
 lift_per_kw <- function(network, values) {

@@ -2,6 +2,7 @@
 # potential evaporation pe (mm/h) and temperature (degC). The target is the square root of the discharge in mm/h: a
 # gauge's error grows with the flow, and on this scale (Box-Cox with 1/2, usual in hydrology) it is about the same
 # everywhere, so that low flows count as well. Base models lack five things, which are the mechanisms.
+# Loops over the steps are compiled here: R would compile them again at each call once this file is read a second time.
 
 runoff_conditions <- c("rain", "pe", "temperature")
 
@@ -53,7 +54,7 @@ linear_reservoir <- function(inflow, time, step, start = 0) {
 }
 
 # The same with a second outlet above a level: each step is solved exactly on either side, with one crossing at most.
-overflowing_reservoir <- function(inflow, time, level, rate, step) {
+overflowing_reservoir <- compiler::cmpfun(function(inflow, time, level, rate, step) {
   above <- 1 / time + rate
   low <- inflow * time  # where the store tends to, below the level and above it
   high <- (inflow + rate * level) / above
@@ -78,10 +79,10 @@ overflowing_reservoir <- function(inflow, time, level, rate, step) {
     stores[k + 1] <- store <- after
   }
   inflow - diff(stores) / step
-}
+})
 
 # Water that reaches the ground: where snow lies, what falls below zero waits for a melt of so much a degree.
-snow_store <- function(rain, temperature, degree_hour, step) {
+snow_store <- compiler::cmpfun(function(rain, temperature, degree_hour, step) {
   melt <- degree_hour * pmax(temperature, 0) * step
   fall <- ifelse(temperature <= 0, rain * step, 0)
   store <- 0
@@ -93,10 +94,10 @@ snow_store <- function(rain, temperature, degree_hour, step) {
     out[k] <- gone
   }
   (rain * step - fall + out) / step
-}
+})
 
 # The soil: rain in, evaporation and percolation out, overflow above the capacity; evaporation falls below `dry`.
-soil_store <- function(rain, pe, capacity, percolation, dry, start, step) {
+soil_store <- compiler::cmpfun(function(rain, pe, capacity, percolation, dry, start, step) {
   n <- length(rain)
   overflow <- percolated <- numeric(n)
   store <- start * capacity
@@ -121,7 +122,7 @@ soil_store <- function(rain, pe, capacity, percolation, dry, start, step) {
     percolated[k] <- drained
   }
   list(overflow = overflow / step, percolated = percolated / step)
-}
+})
 
 # Quick and slow flow in mm/h, averaged over each step.
 runoff_flows <- function(model, values, drivers, step) {

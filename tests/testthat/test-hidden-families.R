@@ -5,7 +5,7 @@ bench <- test_path("..", "..", "bench", "hidden_effects")
 
 families_scope <- function() {
   if (!dir.exists(bench)) skip("bench/ is not part of the installed package")
-  scope <- new.env()
+  scope <- new.env(parent = globalenv())
   parts <- c("worlds", "least_squares", "network", "runoff", "wrong", "families", "score")
   for (part in parts) sys.source(file.path(bench, paste0(part, ".R")), scope)
   scope
