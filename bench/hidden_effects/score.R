@@ -110,7 +110,7 @@ rival_conditions <- function(fit, world, most = 400) {
                                  list(seed = 1, threads = 1))
   forest <- if (requireNamespace("ranger", quietly = TRUE)) {
     strongest(ranger::ranger(x = as.data.frame(unname(x)), y = r, importance = "permutation", num.trees = 300, seed = 1, num.threads = 1)$variable.importance)
-  } else NA
+  }  # not asked where the package is not there
   list(correlation_condition = strongest(abs(stats::cor(x, r))), forest_condition = forest,
        ard_condition = strongest(-ard$hyperparameters[1, -(1:3)]))
 }
