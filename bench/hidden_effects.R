@@ -1,11 +1,11 @@
 #!/usr/bin/env Rscript
 # Hidden-effect benchmark: Rscript bench/hidden_effects.R [--family F,F] --worlds N --seed S --out FILE [--workers N]
-# Worlds S, S+1, ... of each family named are drawn, scored and written as JSON: a row a world, with its family, and rates
-# and means for each family. Figures lie beside it: FILE-detection.png for all, FILE-confusion-FAMILY.png for each.
-# Families (hidden_effects/families.R): box, the test box with eight mechanisms and effects outside the catalogue, which is
-# the default; network, grey-box networks of a house; runoff, a catchment with thresholds; wrong, base models that are wrong
-# in structure besides. Each finished world is kept in FILE.worlds/, so that a stopped run goes on where it was; worlds that
-# failed are tried again. Work goes through the user's future plan if --workers is not given.
+# Worlds S, S+1, ... of each family named are drawn, scored and written as JSON: a row a world, with its family, and
+# rates and means for each family. Figures lie beside it: FILE-detection.png for all, FILE-confusion-FAMILY.png for
+# each. Families (hidden_effects/families.R): box, the test box with eight mechanisms and effects outside the catalogue,
+# which is the default; network, grey-box networks of a house; runoff, a catchment with thresholds; wrong, base models
+# that are wrong in structure besides. Each finished world is kept in FILE.worlds/, so that a stopped run goes on where
+# it was; worlds that failed are tried again. Work goes through the user's future plan if --workers is not given.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -16,8 +16,8 @@ out <- option("out", "hidden_effects.json")
 workers <- option("workers")
 suppressPackageStartupMessages(library(amiss))
 
-parts <- file.path(normalizePath(here), "hidden_effects",
-                   c("worlds.R", "least_squares.R", "network.R", "runoff.R", "wrong.R", "families.R", "score.R", "figures.R"))
+parts <- c("worlds", "least_squares", "network", "runoff", "wrong", "families", "score", "figures")
+parts <- file.path(normalizePath(here), "hidden_effects", paste0(parts, ".R"))
 scope <- new.env(parent = globalenv())
 for (part in parts) sys.source(part, scope)
 unknown <- setdiff(asked, names(scope$families))
@@ -38,20 +38,23 @@ one_world <- function(seed, family, file, parts, total) {
   part <- tempfile("part-", dirname(file))
   saveRDS(row, part)
   file.rename(part, file)
-  said <- if (is.null(row$error)) sprintf("%s x%g: %s %s", row$kind, row$strength, row$verdict, row$mechanism) else row$error
+  said <- row$error
+  if (is.null(said)) said <- sprintf("%s x%g: %s %s", row$kind, row$strength, row$verdict, row$mechanism)
   message(sprintf("%d of %d, %s world %d, %s", length(list.files(dirname(file), "rds$")), total, family, seed, said))
 }
 
 if (!is.null(workers)) future::plan(future::multisession, workers = as.integer(workers))
 missing <- tasks[!vapply(tasks$file, finished, NA), ]
 invisible(future.apply::future_mapply(one_world, missing$seed, missing$family, missing$file,
-                                      MoreArgs = list(parts = parts, total = nrow(tasks)), future.seed = NULL, future.scheduling = Inf))
+                                      MoreArgs = list(parts = parts, total = nrow(tasks)), future.seed = NULL,
+                                      future.scheduling = Inf))
 rows <- lapply(tasks$file, readRDS)
 failed <- Filter(function(r) !is.null(r$error), rows)
 scored <- Filter(function(r) is.null(r$error), rows)
 rates <- scope$by_family(scored, scope$score_rates)
 as_arrays <- function(row) {  # also where there is one value, or none
-  for (name in intersect(names(row), c("true_boundary", "true_mechanism", "adopted", "verdicts", "rmse"))) row[[name]] <- as.list(row[[name]])
+  arrays <- c("true_boundary", "true_mechanism", "adopted", "verdicts", "rmse")
+  for (name in intersect(names(row), arrays)) row[[name]] <- as.list(row[[name]])
   row
 }
 write_rows(list(worlds = lapply(rows, as_arrays), failed = length(failed), rates = rates,
@@ -61,7 +64,8 @@ for (family in names(rates)) {
   cat(family, "\n", sep = "")
   for (name in names(rates[[family]])) {
     r <- rates[[family]][[name]]
-    if (r$n > 0) cat(sprintf("  %-28s %5.1f %% of %d [%.0f, %.0f]\n", name, 100 * r$rate, r$n, 100 * r$lower95, 100 * r$upper95))
+    shares <- 100 * c(r$rate, r$lower95, r$upper95)
+    if (r$n > 0) cat(sprintf("  %-28s %5.1f %% of %d [%.0f, %.0f]\n", name, shares[1], r$n, shares[2], shares[3]))
   }
 }
 if (length(failed)) cat(length(failed), "worlds failed:", failed[[1]]$error, "\n")

@@ -17,7 +17,8 @@ detection_table <- function(rows) {
     found <- rate(right)
     data.frame(rule = rule, strength = strength, share = found$rate, lower95 = found$lower95, upper95 = found$upper95, n = found$n)
   }
-  grid <- expand.grid(rule = names(rules), strength = sort(unique(vapply(with_effect, reached, 0))), stringsAsFactors = FALSE)
+  strengths <- sort(unique(vapply(with_effect, reached, 0)))
+  grid <- expand.grid(rule = names(rules), strength = strengths, stringsAsFactors = FALSE)
   do.call(rbind, Map(one, grid$rule, grid$strength))
 }
 
@@ -54,12 +55,13 @@ confusion_figure <- function(rows, name = rows[[1]]$family, family = families[[n
   rows <- Filter(function(r) r$kind == "none" || r$achieved >= 1.95, rows)
   if (!length(rows)) return(NULL)
   table <- data.frame(kind = vapply(rows, `[[`, "", "kind"), told = vapply(rows, told_kind, ""))
-  told_levels <- c("nothing", family$mechanisms, "likely cause only", if ("stand-in" %in% table$told) "stand-in", "unexplained")
-  told_levels <- union(told_levels, table$told)
+  stood_in <- if ("stand-in" %in% table$told) "stand-in"
+  told_levels <- union(c("nothing", family$mechanisms, "likely cause only", stood_in, "unexplained"), table$told)
   counts <- as.data.frame(table(kind = factor(table$kind, rev(family$kinds)), told = factor(table$told, told_levels)))
   counts$share <- counts$Freq / stats::ave(counts$Freq, counts$kind, FUN = sum)
   counts <- counts[counts$Freq > 0, ]
-  subtitle <- sprintf("Number of worlds of the family %s, of %d with an effect at least twice the noise, or none.", name, nrow(table))
+  subtitle <- sprintf("Number of worlds of the family %s, of %d with an effect at least twice the noise, or none.",
+                      name, nrow(table))
   ggplot2::ggplot(counts, ggplot2::aes(.data$told, .data$kind, fill = .data$share)) +
     ggplot2::geom_tile(colour = "white") +
     ggplot2::geom_text(ggplot2::aes(label = .data$Freq, colour = .data$share > 0.5), size = 4, show.legend = FALSE) +
@@ -77,7 +79,8 @@ write_figures <- function(rows, out) {
   stem <- sub("(\\.json)?$", "", out)
   count <- length(unique(vapply(rows, `[[`, "", "family")))
   save <- function(figure, name, height, width = 11) {
-    if (!is.null(figure)) ggplot2::ggsave(paste0(stem, "-", name, ".png"), figure, width = width, height = height, dpi = 110, bg = "white")
+    if (is.null(figure)) return()
+    ggplot2::ggsave(paste0(stem, "-", name, ".png"), figure, width = width, height = height, dpi = 110, bg = "white")
   }
   save(detection_figure(rows), "detection", if (count > 2) 8 else 5.5, if (count > 1) 12 else 10)
   figures <- by_family(rows, confusion_figure)

@@ -26,8 +26,9 @@ least_squares_in_cube <- function(error_at, starts, iterations = 40) {
       value <- sum(at(unit)$error^2) / scale
       if (is.finite(value)) value else 1e6
     }
-    found <- stats::nlminb(start, objective, gradient = function(u) 2 * as.numeric(crossprod(slopes(u), at(u)$error)) / scale,
-                           hessian = function(u) 2 * crossprod(slopes(u)) / scale, lower = 1e-4, upper = 1 - 1e-4,
+    gradient <- function(unit) 2 * as.numeric(crossprod(slopes(unit), at(unit)$error)) / scale
+    hessian <- function(unit) 2 * crossprod(slopes(unit)) / scale
+    found <- stats::nlminb(start, objective, gradient, hessian, lower = 1e-4, upper = 1 - 1e-4,
                            control = list(iter.max = iterations, eval.max = 2 * iterations, rel.tol = 1e-6))
     c(found[c("par", "objective")], scale = scale)
   }
@@ -48,7 +49,8 @@ cube_slopes <- function(error_at, unit, error, step = 1e-4) {
 adapt_to <- function(simulator, series, drivers, rows, starts) {
   error_at <- function(unit) {
     values <- amiss:::unit_to_values(unit, simulator$parameters)
-    vapply(seq_len(nrow(unit)), function(i) simulator$f(values[i, ], drivers)[rows] - series[rows], numeric(length(rows)))
+    output <- function(i) simulator$f(values[i, ], drivers)[rows]
+    vapply(seq_len(nrow(unit)), output, numeric(length(rows))) - series[rows]
   }
   least_squares_in_cube(error_at, starts)
 }
@@ -66,9 +68,9 @@ best_on_record <- function(simulator, measurements, seed, starts = 5, known = NU
   least_squares_in_cube(error_at, c(list(rep(0.5, length(parameters))), known, drawn))
 }
 
-# An effect hidden at a given strength: its RMS, once the base model's parameters have adapted by least squares, over the
-# noise. As in worlds.R, its size gives way first; where the largest is still too small, the noise is lowered, to the least
-# allowed. The noise then takes up what the search for the size left over.
+# An effect hidden at a given strength: its RMS, once the base model's parameters have adapted by least squares, over
+# the noise. As in worlds.R, its size gives way first; where the largest is still too small, the noise is lowered, to
+# the least allowed. The noise then takes up what the search for the size left over.
 #' @param effect_at Function of a size in (0, 1]: what the effect adds to the true output, at the rows of the drivers.
 #' @param base,unit The base model and the place in its cube from which its parameters adapt.
 #' @param noise,limits The noise that was drawn, and its least and largest value.
@@ -91,15 +93,17 @@ hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, l
     over <- function(s) log(max(rms_at(exp(s)), 1e-12) / wanted)
     least <- log(1e-4)
     lower <- over(least)
-    size <- if (lower >= 0) 1e-4 else exp(stats::uniroot(over, c(least, 0), f.lower = lower, f.upper = log(most / wanted), tol = 0.1)$root)
+    upper <- log(most / wanted)
+    search <- function() stats::uniroot(over, c(least, 0), f.lower = lower, f.upper = upper, tol = 0.1)$root
+    size <- exp(if (lower >= 0) least else search())
   }
   rms <- rms_at(size, list(unit, centre, last))
   noise <- min(max(rms / strength, limits[1]), limits[2])
   list(size = size, effect = effect_at(size), noise = noise, achieved = rms / noise)
 }
 
-# What the parameters leave of the largest effect. Worlds in which that is below the least noise that the wanted strength
-# allows are drawn again, a few times, as nobody could tell them from worlds without an effect.
+# What the parameters leave of the largest effect. Worlds in which that is below the least noise that the wanted
+# strength allows are drawn again, a few times, as nobody could tell them from worlds without an effect.
 most_left <- function(effect_at, base, unit, drivers, rows) {
   plain <- base$f(amiss:::unit_to_values(t(unit), base$parameters)[1, ], drivers)
   adapt_to(base, plain + effect_at(1), drivers, rows, list(unit, rep(0.5, length(unit))))$rms

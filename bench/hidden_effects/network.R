@@ -12,6 +12,9 @@ decade <- function(name, centre, unit, label, flat) {
   amiss::free(name, amiss::lognormal(log(centre), sdlog, centre / sqrt(10), centre * sqrt(10)), unit, label)
 }
 
+# How much there is of a mechanism, from nothing on.
+extent <- function(name, most, unit, label) amiss::free(name, amiss::uniform(0, most), unit, label)
+
 add_parameter <- function(network, parameter) {
   network$parameters[[parameter$name]] <- parameter
   network
@@ -25,27 +28,34 @@ add_node <- function(network, node, capacity, share = 1) {
 
 # A resistance between two nodes, or a node and the air outside; `conductance` if the parameter is its inverse.
 add_link <- function(network, from, to, parameter, conductance = FALSE) {
-  network$links <- rbind(network$links, data.frame(from = from, to = to, parameter = parameter, conductance = conductance))
+  link <- data.frame(from = from, to = to, parameter = parameter, conductance = conductance)
+  network$links <- rbind(network$links, link)
   network
 }
 
 # Heat that a driver gives to a node: times a number, and times a parameter if one is named.
 add_gain <- function(network, node, driver, factor, parameter = NA_character_) {
-  network$gains <- rbind(network$gains, data.frame(node = node, driver = driver, factor = factor, parameter = parameter))
+  gain <- data.frame(node = node, driver = driver, factor = factor, parameter = parameter)
+  network$gains <- rbind(network$gains, gain)
   network
 }
 
 # Base networks. The envelope is one node or a chain of them, a roof or a floor stands beside it; some of the heating
 # may go to the inner surface of the wall; the sun may already reach the floor.
-network_topologies <- c("one wall", "lined wall", "layered wall", "thick wall", "wall and roof", "wall and floor", "sunny floor")
+network_topologies <- c("one wall", "lined wall", "layered wall", "thick wall", "wall and roof", "wall and floor",
+                        "sunny floor")
 
 #' @param scale Size of the house: capacities and conductances grow with it.
 #' @param radiant Share of the heating that reaches the inner surface of the wall.
 base_network <- function(topology, scale = 1, flat = FALSE, radiant = 0) {
-  network <- list(topology = topology, scale = scale, flat = flat, pieces = character(), parameters = list(), fixed = c(R_ground = 12 / scale),
-                  start = c(held = 20, remembered = 10))
-  capacity <- function(network, name, centre, label) add_parameter(network, decade(name, centre * scale, "kWh/K", label, flat))
-  resistance <- function(network, name, centre, label) add_parameter(network, decade(name, centre / scale, "K/kW", label, flat))
+  network <- list(topology = topology, scale = scale, flat = flat, pieces = character(), parameters = list(),
+                  fixed = c(R_ground = 12 / scale), start = c(held = 20, remembered = 10))
+  capacity <- function(network, name, centre, label) {
+    add_parameter(network, decade(name, centre * scale, "kWh/K", label, flat))
+  }
+  resistance <- function(network, name, centre, label) {
+    add_parameter(network, decade(name, centre / scale, "K/kW", label, flat))
+  }
   network <- capacity(network, "C_air", 1, "capacity of the air and what follows it")
   network <- capacity(network, "C_wall", 4, "capacity of the wall")
   network <- add_node(network, "air", "C_air")
@@ -93,56 +103,65 @@ base_network <- function(topology, scale = 1, flat = FALSE, radiant = 0) {
   if (radiant > 0) network <- add_gain(network, inner, "P", radiant)
   network <- add_gain(network, "air", "P", 1 - radiant)
   # The air was held at a temperature before the record began; what outdoor temperature the rest remembers is not known.
-  add_parameter(network, amiss::free("remembered", amiss::normal(0, 1.5, -4.5, 4.5), "K", "outdoor temperature that the walls remember, over that of the first day"))
+  add_parameter(network, amiss::free("remembered", amiss::normal(0, 1.5, -4.5, 4.5), "K",
+                                     "outdoor temperature that the walls remember, over that of the first day"))
 }
 
 # The mechanisms. The first parameter of each is its extent, zero where the mechanism is absent.
 network_pieces <- list(
   "solar gain on the air" = function(network) {
-    network <- add_parameter(network, amiss::free("A_window", amiss::uniform(0, 12 * network$scale), "m2", "solar aperture towards the air"))
+    aperture <- extent("A_window", 12 * network$scale, "m2", "solar aperture towards the air")
+    network <- add_parameter(network, aperture)
     add_gain(network, "air", "Gv", 1e-3, "A_window")
   },
   "heater state" = function(network) {
-    network <- add_parameter(network, amiss::free("C_heater", amiss::uniform(0, 3 * network$scale), "kWh/K", "capacity of the heater"))
-    network <- add_parameter(network, decade("R_heater", 0.6 / network$scale, "K/kW", "resistance between heater and air", network$flat))
+    capacity <- extent("C_heater", 3 * network$scale, "kWh/K", "capacity of the heater")
+    resistance <- decade("R_heater", 0.6 / network$scale, "K/kW", "resistance between heater and air", network$flat)
+    network <- add_parameter(add_parameter(network, capacity), resistance)
     network <- add_link(add_node(network, "heater", "C_heater"), "heater", "air", "R_heater")
     network$gains$node[network$gains$driver == "P" & network$gains$node == "air"] <- "heater"
     network
   },
   "interior mass" = function(network) {
-    network <- add_parameter(network, amiss::free("C_mass", amiss::uniform(0, 8 * network$scale), "kWh/K", "capacity of the mass inside"))
-    network <- add_parameter(network, decade("R_mass", 0.8 / network$scale, "K/kW", "resistance between air and mass", network$flat))
+    capacity <- extent("C_mass", 8 * network$scale, "kWh/K", "capacity of the mass inside")
+    resistance <- decade("R_mass", 0.8 / network$scale, "K/kW", "resistance between air and mass", network$flat)
+    network <- add_parameter(add_parameter(network, capacity), resistance)
     add_link(add_node(network, "mass", "C_mass"), "air", "mass", "R_mass")
   },
   "envelope leak" = function(network) {
-    network <- add_parameter(network, amiss::free("H_leak", amiss::uniform(0, 0.15 * network$scale), "kW/K", "direct loss to the outdoor air"))
+    network <- add_parameter(network, extent("H_leak", 0.15 * network$scale, "kW/K", "direct loss to the outdoor air"))
     add_link(network, "air", "outside", "H_leak", conductance = TRUE)
   },
   "sun on the envelope" = function(network) {
-    network <- add_parameter(network, amiss::free("A_wall", amiss::uniform(0, 10 * network$scale), "m2", "solar aperture towards the wall's outer layer"))
+    aperture <- extent("A_wall", 10 * network$scale, "m2", "solar aperture towards the wall's outer layer")
+    network <- add_parameter(network, aperture)
     add_gain(network, network$outermost, "Gv", 1e-3, "A_wall")
   })
 
 network_boundary <- list("solar gain on the air" = "Gv", "heater state" = "P", "interior mass" = c("P", "Te", "Gv"),
                          "envelope leak" = "Te", "sun on the envelope" = "Gv")
 
-network_sentences <- c("solar gain on the air" = "Sun enters through windows and warms the air, which the model leaves out.",
-                       "heater state" = "The heater stores heat and gives it off with a delay that the model leaves out.",
-                       "interior mass" = "The house holds mass, in exchange with the air alone, that the model leaves out.",
-                       "envelope leak" = "Heat passes from the air to outdoors directly, past the mass of the envelope.",
-                       "sun on the envelope" = "The sun warms the outside of the wall, which the model leaves out.")
+network_sentences <- c(
+  "solar gain on the air" = "Sun enters through windows and warms the air, which the model leaves out.",
+  "heater state" = "The heater stores heat and gives it off with a delay that the model leaves out.",
+  "interior mass" = "The house holds mass, in exchange with the air alone, that the model leaves out.",
+  "envelope leak" = "Heat passes from the air to outdoors directly, past the mass of the envelope.",
+  "sun on the envelope" = "The sun warms the outside of the wall, which the model leaves out.")
 
 # A network as numbers to be filled in: where the values of parameters go.
 network_plan <- function(network) {
   nodes <- network$nodes$node
   place <- function(node) ifelse(node == "outside", 0L, match(node, nodes))
-  list(n = length(nodes), capacity = network$nodes$capacity, share = network$nodes$share, from = place(network$links$from),
-       to = place(network$links$to), resistance = network$links$parameter, conductance = network$links$conductance,
-       gain_node = place(network$gains$node), gain_driver = match(network$gains$driver, network_conditions),
-       gain_factor = network$gains$factor, gain_parameter = network$gains$parameter, fixed = network$fixed, start = network$start)
+  links <- network$links
+  gains <- network$gains
+  list(n = length(nodes), capacity = network$nodes$capacity, share = network$nodes$share, from = place(links$from),
+       to = place(links$to), resistance = links$parameter, conductance = links$conductance,
+       gain_node = place(gains$node), gain_driver = match(gains$driver, network_conditions), gain_factor = gains$factor,
+       gain_parameter = gains$parameter, fixed = network$fixed, start = network$start)
 }
 
-# Temperature of the air, averaged over each step, driven by conditions that are constant over a step: exact, mode by mode.
+# Temperature of the air, averaged over each step, driven by conditions that are constant over a step: exact, mode by
+# mode.
 network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
   n <- plan$n
   values <- c(values, plan$fixed)
@@ -199,7 +218,8 @@ lift_per_kw <- function(network, values) {
 #' @param step Length of a row of the drivers in hours.
 network_simulator <- function(network, step, parameters = network$parameters) {
   f <- network_function(network_plan(network), step)
-  built <- do.call(amiss::function_simulator, c(list(f), unname(parameters), list(boundary = network_conditions, name = network$topology)))
+  named <- list(boundary = network_conditions, name = network$topology)
+  built <- do.call(amiss::function_simulator, c(list(f), unname(parameters), named))
   built$network <- network
   built$step <- step
   built
@@ -231,7 +251,8 @@ network_catalogue <- function() {
 # Weather and heating, on a grid finer than the models' step; heating switches at the ends of their steps.
 draw_network_weather <- function(days, step, fine) {
   climate <- climates[[sample.int(length(climates), 1)]]
-  weather <- do.call(amiss::synthetic_weather, c(list(days = days, step_h = step / fine, seed = sample.int(1e9, 1)), climate))
+  record <- list(days = days, step_h = step / fine, seed = sample.int(1e9, 1))
+  weather <- do.call(amiss::synthetic_weather, c(record, climate))
   heating <- amiss::rolbs(round(24 * days / step), step, power = 1, seed = sample.int(1e9, 1))
   cbind(Te = weather$Te, Gv = weather$Gv, P = rep(heating, each = fine))
 }
@@ -277,13 +298,16 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
     # A heater of the size of the house: on for good, it would lift it by 15 to 30 K.
     weather[, "P"] <- heating * stats::runif(1, 15, 30) / lift_per_kw(network, values)
     drivers <- block_means(weather, fine)
-    run_truth <- function(simulator, v) block_means(network_output(network_plan(simulator$network), v, weather, step / fine), fine)
+    run_truth <- function(simulator, v) {
+      block_means(network_output(network_plan(simulator$network), v, weather, step / fine), fine)
+    }
     real <- if (second_zone) with_second_zone(base) else list(simulator = base)
     real$values <- c(values, real$values)
     plain <- run_truth(real$simulator, real$values)
     adapted <- list(unit = unit)
     if (second_zone) {
-      # An effect counts beside what the wrong base makes of the truth without one; what it cannot is to show in the noise.
+      # An effect counts beside what the wrong base makes of the truth without one; what it cannot is to show in the
+      # noise.
       adapted <- adapt_to(base, plain, drivers, rows, list(unit, rep(0.5, length(unit))))
       noise <- min(max(adapted$rms / sample(c(1, 2, 4, 8), 1), limits[1]), limits[2])
     }
@@ -305,12 +329,15 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
   clean <- plain + hidden$effect
   data <- data.frame(hour = hours, drivers, Ti = clean + draw_noise(length(clean), hidden$noise, ar1))
   average <- step * c(1, 2, 4)[findInterval(length(rows), c(0, 500, 1000))]
-  measured <- suppressMessages(amiss::measurements(data, time = "hour", target = "Ti", boundary = network_conditions,
-                                                   noise_sd = hidden$noise * averaged_noise(average / step, ar1), average = if (average > step) average, warmup = warmup, calibrate = calibrate,
-                                                   validate = !calibrate, name = kind, unit = "K"))
-  list(seed = seed, family = "network", kind = kind, kinds = setdiff(kind, "none"), strength = strength, achieved = hidden$achieved,
-       noise = hidden$noise, ar1 = ar1, days = days, values = values, effects = effect_values, clean = clean, data = data,
-       measurements = measured, base = base, catalogue = network_catalogue(),
+  noise_sd <- hidden$noise * averaged_noise(average / step, ar1)
+  measured <- suppressMessages(
+    amiss::measurements(data, time = "hour", target = "Ti", boundary = network_conditions, noise_sd = noise_sd,
+                        average = if (average > step) average, warmup = warmup, calibrate = calibrate,
+                        validate = !calibrate, name = kind, unit = "K"))
+  list(seed = seed, family = "network", kind = kind, kinds = setdiff(kind, "none"), strength = strength,
+       achieved = hidden$achieved, noise = hidden$noise, ar1 = ar1, days = days, values = values,
+       effects = effect_values, clean = clean, data = data, measurements = measured, base = base,
+       catalogue = network_catalogue(),
        true_boundary = as.character(unlist(network_boundary[setdiff(kind, "none")], use.names = FALSE)),
        misfit = if (second_zone) adapted$rms / hidden$noise)
 }

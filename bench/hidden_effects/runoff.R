@@ -1,13 +1,14 @@
-# Rainfall-runoff of a small catchment: a soil store that overflows, a quick and a slow reservoir. Conditions: rain (mm/h),
-# potential evaporation pe (mm/h) and temperature (degC). The target is the square root of the discharge in mm/h: a
-# gauge's error grows with the flow, and on this scale (Box-Cox with 1/2, usual in hydrology) it is about the same
-# everywhere, so that low flows count as well. Base models lack five things, which are the mechanisms.
-# Loops over the steps are compiled here: R would compile them again at each call once this file is read a second time.
+# Rainfall-runoff of a small catchment: a soil store that overflows, a quick and a slow reservoir. Conditions: rain
+# (mm/h), potential evaporation pe (mm/h) and temperature (degC). The target is the square root of the discharge in
+# mm/h: a gauge's error grows with the flow, and on this scale (Box-Cox with 1/2, usual in hydrology) it is about the
+# same everywhere, so that low flows count as well. Base models lack five things, which are the mechanisms. Loops over
+# the steps are compiled here: R would compile them again at each call once this file is read a second time.
 
 runoff_conditions <- c("rain", "pe", "temperature")
 
-runoff_boundary <- list("overflow threshold" = "rain", "snow store" = c("temperature", "rain"), "groundwater leak" = "rain",
-                        "evaporation of dry soil" = c("pe", "rain"), "delayed routing" = "rain")
+runoff_boundary <- list("overflow threshold" = "rain", "snow store" = c("temperature", "rain"),
+                        "groundwater leak" = "rain", "evaporation of dry soil" = c("pe", "rain"),
+                        "delayed routing" = "rain")
 
 runoff_sentences <- c("overflow threshold" = "Above a level, the quick store empties by a second and faster way.",
                       "snow store" = "In part of the catchment precipitation lies as snow until it melts.",
@@ -18,17 +19,17 @@ runoff_sentences <- c("overflow threshold" = "Above a level, the quick store emp
 # Parameters of the mechanisms; the first of each is its extent, zero where the mechanism is absent.
 runoff_parameters <- function(piece, flat) {
   switch(piece,
-    "overflow threshold" = list(amiss::free("overflow_rate", amiss::uniform(0, 0.5), "1/h", "rate of the overflow of the quick store"),
+    "overflow threshold" = list(extent("overflow_rate", 0.5, "1/h", "rate of the overflow of the quick store"),
                                 decade("overflow_level", 4, "mm", "level above which the quick store overflows", flat)),
-    "snow store" = list(amiss::free("snow_share", amiss::uniform(0, 1), "", "share of the catchment where snow lies"),
+    "snow store" = list(extent("snow_share", 1, "", "share of the catchment where snow lies"),
                         decade("degree_day", 3, "mm/K/d", "melt for each degree above zero and day", flat)),
-    "groundwater leak" = list(amiss::free("leak_share", amiss::uniform(0, 0.9), "", "share of percolation that leaks")),
-    "evaporation of dry soil" = list(amiss::free("dry_level", amiss::uniform(0, 1), "", "share of the capacity below which evaporation falls")),
-    "delayed routing" = list(amiss::free("delay", amiss::uniform(0, 48), "h", "mean delay of quick flow")))
+    "groundwater leak" = list(extent("leak_share", 0.9, "", "share of percolation that leaks")),
+    "evaporation of dry soil" = list(extent("dry_level", 1, "", "share of the capacity below which evaporation falls")),
+    "delayed routing" = list(extent("delay", 48, "h", "mean delay of quick flow")))
 }
 
-# Base models differ in what feeds the slow reservoir (percolation from the soil, or a share of its overflow) and in what
-# is known of the start.
+# Base models differ in what feeds the slow reservoir (percolation from the soil, or a share of its overflow) and in
+# what is known of the start.
 runoff_structures <- c("percolation", "split")
 
 base_runoff <- function(structure, flat, known) {
@@ -41,10 +42,12 @@ base_runoff <- function(structure, flat, known) {
     amiss::free("start_soil", amiss::uniform(0.1, 0.9), "", "filling of the soil at the start"),
     decade("start_flow", 0.02, "mm/h", "slow flow at the start", flat))
   parameters <- stats::setNames(parameters, vapply(parameters, `[[`, "", "name"))
-  list(structure = structure, flat = flat, pieces = character(), known = known, parameters = parameters[setdiff(names(parameters), names(known))])
+  list(structure = structure, flat = flat, pieces = character(), known = known,
+       parameters = parameters[setdiff(names(parameters), names(known))])
 }
 
-# Outflow of a linear reservoir averaged over each step, for an inflow constant over a step; `start` is its first outflow.
+# Outflow of a linear reservoir averaged over each step, for an inflow constant over a step; `start` is its first
+# outflow.
 linear_reservoir <- function(inflow, time, step, start = 0) {
   kept <- exp(-step / max(time, 1e-6))
   end <- as.numeric(stats::filter((1 - kept) * inflow, kept, "recursive", init = start))
@@ -130,8 +133,12 @@ runoff_flows <- function(model, values, drivers, step) {
   of <- function(name, absent = 0) if (name %in% names(values)) values[[name]] else absent
   rain <- unname(drivers[, "rain"])  # arithmetic on values with names takes ten times as long
   share <- of("snow_share")
-  if (share > 0) rain <- (1 - share) * rain + share * snow_store(rain, unname(drivers[, "temperature"]), of("degree_day") / 24, step)
-  soil <- soil_store(rain, unname(drivers[, "pe"]), of("soil_capacity"), of("percolation"), of("dry_level"), of("start_soil"), step)
+  if (share > 0) {
+    melted <- snow_store(rain, unname(drivers[, "temperature"]), of("degree_day") / 24, step)
+    rain <- (1 - share) * rain + share * melted
+  }
+  soil <- soil_store(rain, unname(drivers[, "pe"]), of("soil_capacity"), of("percolation"), of("dry_level"),
+                     of("start_soil"), step)
   split <- of("slow_share")
   quick <- (1 - split) * soil$overflow
   slow <- (soil$percolated + split * soil$overflow) * (1 - of("leak_share"))
@@ -144,8 +151,8 @@ runoff_flows <- function(model, values, drivers, step) {
   list(quick = quick, slow = linear_reservoir(slow, of("slow_time"), step, of("start_flow")))
 }
 
-# The same for conditions that are constant over a step, computed in so many parts of it and averaged again: a store that
-# reaches its threshold does so within a step.
+# The same for conditions that are constant over a step, computed in so many parts of it and averaged again: a store
+# that reaches its threshold does so within a step.
 runoff_in_parts <- function(model, values, drivers, step, parts) {
   flows <- runoff_flows(model, values, drivers[rep(seq_len(nrow(drivers)), each = parts), , drop = FALSE], step / parts)
   lapply(flows, block_means, parts)
@@ -158,7 +165,8 @@ root_flow <- function(flows) sqrt(flows$quick + flows$slow)
 #' A simulator of a catchment: a function_simulator() that carries the model it was built from.
 runoff_simulator <- function(model, step, parameters = model$parameters) {
   f <- runoff_function(model, step)
-  built <- do.call(amiss::function_simulator, c(list(f), unname(parameters), list(boundary = runoff_conditions, name = model$structure)))
+  named <- list(boundary = runoff_conditions, name = model$structure)
+  built <- do.call(amiss::function_simulator, c(list(f), unname(parameters), named))
   built$model <- model
   built$step <- step
   built
@@ -188,7 +196,8 @@ runoff_catalogue <- function() {
   do.call(amiss::catalogue, lapply(names(runoff_boundary), one))
 }
 
-# Mean temperature and its yearly swing (degC), latitude, hours from storm to storm, their mean length (h) and rain (mm/h).
+# Mean temperature and its yearly swing (degC), latitude, hours from storm to storm, their mean length (h) and rain
+# (mm/h).
 runoff_climates <- list(
   maritime = list(latitude = 52, mean = 10, swing = 6, between = 60, length = 10, rain = 1.0),
   alpine = list(latitude = 47, mean = 4, swing = 9, between = 70, length = 9, rain = 1.6),
@@ -239,49 +248,61 @@ draw_runoff_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
   calibrate <- seq_len(steps) <= round(0.6 * steps)
   rows <- setdiff(which(calibrate), 1:10)
   fine <- 6L
-  truth <- function(simulator, v) runoff_in_parts(simulator$model, v, drivers, step, fine * step / runoff_part)
   true <- if (kind == "none") base else runoff_with(base, kind)
   new <- true$parameters[setdiff(names(true$parameters), names(base$parameters))]
-  # Records that say nothing are drawn again: those in which the catchment hardly ever overflows, so that nobody would model
-  # its floods, and those in which the mechanism at its largest hardly acts (no frost, or soil that never dries).
-  hopeless <- 0
-  for (attempt in 1:200) {
+  # A record with weather and true values of its own; NULL where it says nothing: where the catchment hardly ever
+  # overflows, so that nobody would model its floods, or where the mechanism at its largest hardly acts (no frost, or
+  # soil that never dries).
+  draw_record <- function() {
     first_day <- if (cold) stats::runif(1, 320, 400) else stats::runif(1, 1, 365)
     drivers <- block_means(draw_runoff_weather(steps * fine, step / fine, climate, first_day), fine)
     colnames(drivers) <- runoff_conditions
     unit <- true_unit(base$parameters)
     values <- amiss:::unit_to_values(t(unit), base$parameters)[1, ]
     other <- if (length(new)) amiss:::unit_to_values(t(true_unit(new)), new)[1, ]
-    at_size <- function(size) replace(other, 1, 0.95 * size * new[[1]]$prior$upper)
+    truth <- function(simulator, v) runoff_in_parts(simulator$model, v, drivers, step, fine * step / runoff_part)
     flows <- truth(base, values)
-    if (sum(flows$quick[rows]) < 0.2 * sum(flows$slow[rows] + flows$quick[rows])) next
+    if (sum(flows$quick[rows]) < 0.2 * sum(flows$slow[rows] + flows$quick[rows])) return(NULL)
     plain <- root_flow(flows)
+    at_size <- function(size) replace(other, 1, 0.95 * size * new[[1]]$prior$upper)
     effect_at <- function(size) root_flow(truth(true, c(values, at_size(size)))) - plain
     largest <- if (length(new)) effect_at(1) else 0 * plain
-    # Noise of 2 to 20 % of the target's standard deviation: gauges are this good or bad. It hides the models' coarser steps.
+    # Noise of 2 to 20 % of the target's standard deviation: gauges are this good or bad. It hides the models' coarser
+    # steps.
     spread <- min(stats::sd(plain[rows]), stats::sd((plain + largest)[rows]))
     resolution <- sqrt(mean((base$f(values, drivers) - plain)[rows]^2))
     limits <- pmax(c(0.02, 0.2) * spread, 4 * resolution)
-    if (sqrt(mean(largest[rows]^2)) < strength * limits[1]) next
+    if (sqrt(mean(largest[rows]^2)) < strength * limits[1]) return(NULL)
     most <- if (length(new)) most_left(effect_at, base, unit, drivers, rows) else 0
-    if (most >= strength * limits[1] || hopeless == 10) break
-    hopeless <- hopeless + 1
+    list(drivers = drivers, unit = unit, values = values, plain = plain, at_size = at_size, effect_at = effect_at,
+         limits = limits, most = most, enough = most >= strength * limits[1])
   }
+  drawn <- list()
+  for (attempt in 1:300) {
+    record <- draw_record()
+    drawn <- c(drawn, list(record)[!is.null(record)])
+    if (length(drawn) && (isTRUE(record$enough) || length(drawn) == 10)) break
+  }
+  if (!length(drawn)) stop("no record in which anything happens was drawn", call. = FALSE)
+  record <- drawn[[length(drawn)]]
   hours <- seq_len(steps) * step
   warmup <- 10 * step
-  hidden <- list(noise = exp(stats::runif(1, log(limits[1]), log(limits[2]))), achieved = 0, effect = 0)
+  noise <- exp(stats::runif(1, log(record$limits[1]), log(record$limits[2])))
+  hidden <- list(noise = noise, achieved = 0, effect = 0)
   effect_values <- list()
   if (kind != "none") {
-    hidden <- hide_effect(effect_at, base, unit, drivers, rows, strength, hidden$noise, limits, most)
-    effect_values[[kind]] <- c(at_size(hidden$size), size = hidden$size)
+    hidden <- hide_effect(record$effect_at, base, record$unit, record$drivers, rows, strength, noise, record$limits,
+                          record$most)
+    effect_values[[kind]] <- c(record$at_size(hidden$size), size = hidden$size)
   }
-  clean <- plain + hidden$effect
-  data <- data.frame(hour = hours, drivers, flow = clean + draw_noise(length(clean), hidden$noise, ar1))
+  clean <- record$plain + hidden$effect
+  data <- data.frame(hour = hours, record$drivers, flow = clean + draw_noise(length(clean), hidden$noise, ar1))
   measured <- suppressMessages(amiss::measurements(data, time = "hour", target = "flow", boundary = runoff_conditions,
                                                    noise_sd = hidden$noise, warmup = warmup, calibrate = calibrate,
                                                    validate = !calibrate, name = kind, unit = "sqrt(mm/h)"))
-  list(seed = seed, family = "runoff", kind = kind, kinds = setdiff(kind, "none"), strength = strength, achieved = hidden$achieved,
-       noise = hidden$noise, ar1 = ar1, days = steps * step / 24, values = values, effects = effect_values, clean = clean,
-       data = data, measurements = measured, base = base, catalogue = runoff_catalogue(),
+  list(seed = seed, family = "runoff", kind = kind, kinds = setdiff(kind, "none"), strength = strength,
+       achieved = hidden$achieved, noise = hidden$noise, ar1 = ar1, days = steps * step / 24, values = record$values,
+       effects = effect_values, clean = clean, data = data, measurements = measured, base = base,
+       catalogue = runoff_catalogue(),
        true_boundary = as.character(unlist(runoff_boundary[setdiff(kind, "none")], use.names = FALSE)))
 }

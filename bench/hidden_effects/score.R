@@ -13,11 +13,12 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
   rmse <- vapply(upgrade$models, function(m) m$scores$calibrate[["rmse"]], 0)
   best <- best_rmse(world)
   row <- list(seed = world$seed, family = world$family, structure = c(world$structure, NA)[1],
-              hidden = length(world$kinds) > 0, kind = world$kind, strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1,
-              days = world$days, true_boundary = world$true_boundary,
+              misfit = c(world$misfit, NA)[1], hidden = length(world$kinds) > 0, kind = world$kind,
+              strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1, days = world$days, true_boundary = world$true_boundary,
               true_mechanism = intersect(world$kinds, names(world$catalogue)), condition = told_condition(upgrade, attributed),
               attributed_condition = attributed, mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
-              verdicts = mechanism_verdicts(upgrade, verdict$verdict), check_passed = check_passed(upgrade), verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
+              verdicts = mechanism_verdicts(upgrade, verdict$verdict), check_passed = check_passed(upgrade),
+              verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
               log10_bf = if (length(adopted)) upgrade$named_cause$log10_bf else max(upgrade$candidates$log10_bf),
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
               rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall)
@@ -25,7 +26,8 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
   row
 }
 
-# What is said of each mechanism that was adopted, in turn; of all of them together where the package does not say it of each.
+# What is said of each mechanism that was adopted, in turn; of all of them together where the package does not say it of
+# each.
 mechanism_verdicts <- function(upgrade, overall) {
   vapply(upgrade$models[-1], function(m) {
     own <- m[["verdict"]]
@@ -40,8 +42,8 @@ check_passed <- function(upgrade) {
   if (is.null(passed)) NA else passed
 }
 
-# The RMSE in calibration that least squares reaches with what is really there; NA where no model of the catalogue is it, or
-# where the effort is not worth it (the box). The search starts from the truth as well.
+# The RMSE in calibration that least squares reaches with what is really there; NA where no model of the catalogue is it,
+# or where the effort is not worth it (the box). The search starts from the truth as well.
 best_rmse <- function(world) {
   if (!world$family %in% c("network", "runoff")) return(NA)
   true <- Reduce(function(model, k) world$catalogue[[k]]$edit(model), world$kinds, world$base)
@@ -150,7 +152,8 @@ score_rates <- function(rows) {
          hidden_among_adopted = rate(flags(strong, function(r) all(r$true_mechanism %in% r$adopted))),
          rmse_ratio_ok = rate(flags(pick(function(r) r$hidden && named_right(r)), function(r) r$rmse_ratio <= 1.2)),
          check_failed = rate(flags(rows, function(r) !r$check_passed)),
-         named_unchecked = rate(flags(pick(function(r) isFALSE(r$check_passed)), function(r) length(named_mechanisms(r)) > 0)),
+         named_unchecked = rate(flags(pick(function(r) isFALSE(r$check_passed)),
+                                      function(r) length(named_mechanisms(r)) > 0)),
          outside_blamed = rate(flags(outside, function(r) r$verdict == "named")),
          outside_unexplained = rate(flags(Filter(function(r) r$achieved >= 1.95, outside), function(r) r$unexplained)),
          both_found = rate(flags(both, function(r) all(r$true_mechanism %in% r$adopted)))))

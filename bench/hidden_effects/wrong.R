@@ -1,7 +1,9 @@
 # Worlds whose base model is wrong in structure besides: whatever its parameters, something is left. In half of them an
 # effect of the catalogue is hidden as well.
-# - "one layer for three": the box of worlds.R, whose walls have three layers, fitted with walls of one (paper_box("M1")).
-# - "one zone for two": a network of network.R with a room behind a door that the model does not have and nobody measures.
+# - "one layer for three": the box of worlds.R, whose walls have three layers, fitted with walls of one
+#   (paper_box("M1")).
+# - "one zone for two": a network of network.R with a room behind a door that the model does not have and nobody
+#   measures.
 
 # A second room: its air, its wall, the door, and part of the heating. Its numbers belong to the truth alone.
 with_second_zone <- function(base) {
@@ -42,7 +44,7 @@ draw_wrong_world <- function(seed, kind = NULL, strength = NULL, days = NULL, st
 }
 
 one_layer_for_three <- function(world) {
-  world$base <- amiss::change_component(amiss::paper_box("M1"), "zone",
-                                        initial_wall_offset = amiss::free("initial_wall_offset", amiss::normal(0, 1, -3, 3), "K"))
+  offset <- amiss::free("initial_wall_offset", amiss::normal(0, 1, -3, 3), "K")
+  world$base <- amiss::change_component(amiss::paper_box("M1"), "zone", initial_wall_offset = offset)
   world
 }

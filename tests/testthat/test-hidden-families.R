@@ -1,6 +1,6 @@
-# The families of worlds beside the box of test-hidden-effects.R: thermal networks, a catchment with thresholds, and base
-# models that are wrong in structure. First the generators, held against least squares on the simulators themselves; then
-# eight worlds of each family, scored. AMISS_WORLD_SEED moves the seeds of the latter.
+# The families of worlds beside the box of test-hidden-effects.R: thermal networks, a catchment with thresholds, and
+# base models that are wrong in structure. First the generators, held against least squares on the simulators
+# themselves; then eight worlds of each family, scored. AMISS_WORLD_SEED moves the seeds of the latter.
 bench <- test_path("..", "..", "bench", "hidden_effects")
 
 families_scope <- function() {
@@ -33,7 +33,8 @@ drawn_noise <- function(world) {
 test_that("worlds of the box are what they were", {
   scope <- families_scope()
   kinds <- vapply(c(1:3, 20001, 20002), function(seed) scope$draw_world(seed)$kind, "")
-  expect_equal(kinds, c("unmetered load", "two effects", "wind-driven infiltration", "missing thermal mass", "wind-driven infiltration"))
+  expect_equal(kinds, c("unmetered load", "two effects", "wind-driven infiltration", "missing thermal mass",
+                        "wind-driven infiltration"))
   world <- scope$draw_world(20001)
   expect_equal(world$family, "box")
   expect_equal(world$true_boundary, c("RHP", "Te", "Gv"))
@@ -51,7 +52,8 @@ test_that("a world follows from its seed, with all that scoring needs", {
     other <- scope$family_world(family, 4, strength = 2, days = short[[family]])
     expect_true(all(fields %in% names(one)), info = family)
     expect_equal(one$family, family)
-    expect_identical(one[c("data", "values", "effects", "noise")], two[c("data", "values", "effects", "noise")], info = family)
+    drawn <- c("data", "values", "effects", "noise")
+    expect_identical(one[drawn], two[drawn], info = family)
     expect_false(identical(one$data, other$data), info = family)
     expect_true(all(one$kinds %in% names(one$catalogue)), info = family)
     expect_true(all(one$true_boundary %in% one$measurements$conditions), info = family)
@@ -75,7 +77,8 @@ test_that("mechanisms stack: parameters are never lost, and where each is at zer
           expect_gt(length(free_parameters(model)), length(before))
         }
         middle <- amiss:::unit_to_values(matrix(0.5, 1, length(model$parameters)), model$parameters)[1, ]
-        extents <- vapply(world$catalogue, function(entry) setdiff(names(entry$edit(world$base)$parameters), names(world$values))[1], "")
+        added <- function(entry) setdiff(names(entry$edit(world$base)$parameters), names(world$values))
+        extents <- vapply(world$catalogue, function(entry) added(entry)[1], "")
         expect_equal(model$f(replace(replace(middle, names(world$values), world$values), extents, 0), drivers), plain,
                      tolerance = 1e-4, info = paste(family, seed))
         expect_gt(rms(model$f(replace(middle, names(world$values), world$values), drivers) - plain), 1e-3)
@@ -107,7 +110,8 @@ test_that("the models' coarser steps stay below the noise: a simulator with the 
 
 test_that("least squares with what is really there reaches the noise, and without it does not", {
   scope <- families_scope()
-  some <- list(network = c("none", "solar gain on the air", "heater state"), runoff = c("none", "overflow threshold", "snow store"))
+  some <- list(network = c("none", "solar gain on the air", "heater state"),
+               runoff = c("none", "overflow threshold", "snow store"))
   for (family in names(some)) {
     kinds <- some[[family]]
     for (i in seq_along(kinds)) {
@@ -142,20 +146,25 @@ test_that("a wrong base leaves what its parameters cannot follow, whether an eff
   expect_true(all(misfit > 0))
   expect_gt(max(misfit), 1)
   layers <- Filter(function(w) !length(w$kinds), worlds[structure == "one layer for three"])
-  ratio <- vapply(layers[1:2], function(w) scope$best_on_record(w$base, w$measurements, 1, starts = 1)$rms / drawn_noise(w), 0)
+  best <- function(world) scope$best_on_record(world$base, world$measurements, 1, starts = 1)$rms
+  ratio <- vapply(layers[1:2], function(w) best(w) / drawn_noise(w), 0)
   expect_gt(min(ratio), 1.5)
 })
 
 test_that("rates tell families, verdicts and checks apart, and do without what the package does not say", {
   scope <- families_scope()
   row <- function(...) {
-    utils::modifyList(list(family = "network", kind = "heater state", hidden = TRUE, true_mechanism = "heater state", true_boundary = "P",
-                           achieved = 4, condition = "P", attributed_condition = "P", mechanism = "heater state",
-                           adopted = c("heater state", "envelope leak"), verdicts = c("named", "likely"), verdict = "named",
-                           unexplained = FALSE, covered = TRUE, check_passed = TRUE, rmse_ratio = 1.1, gain_share = 1, wall_s = 1), list(...))
+    usual <- list(family = "network", kind = "heater state", hidden = TRUE, true_mechanism = "heater state",
+                  true_boundary = "P", achieved = 4, condition = "P", attributed_condition = "P",
+                  mechanism = "heater state", adopted = c("heater state", "envelope leak"),
+                  verdicts = c("named", "likely"), verdict = "named", unexplained = FALSE, covered = TRUE,
+                  check_passed = TRUE, rmse_ratio = 1.1, gain_share = 1, wall_s = 1)
+    utils::modifyList(usual, list(...))
   }
-  rows <- list(row(), row(verdicts = c("named", "named"), rmse_ratio = 1.5), row(check_passed = FALSE), row(check_passed = NA),
-               row(kind = "none", hidden = FALSE, true_mechanism = character(), achieved = 0, verdicts = c("stand-in", "likely")),
+  rows <- list(row(), row(verdicts = c("named", "named"), rmse_ratio = 1.5), row(check_passed = FALSE),
+               row(check_passed = NA),
+               row(kind = "none", hidden = FALSE, true_mechanism = character(), achieved = 0,
+                   verdicts = c("stand-in", "likely")),
                row(family = "runoff"))
   rates <- scope$by_family(rows, scope$score_rates)
   expect_named(rates, c("network", "runoff"))
@@ -177,9 +186,9 @@ test_that("rates tell families, verdicts and checks apart, and do without what t
   expect_true(is.na(scope$check_passed(older)))
 })
 
-# Bounds on eight worlds a family. Networks and catchments: of the worlds with an effect at least 5 of 6 have it among what
-# is adopted, and at most one of the worlds has a mechanism named that is not there. Wrong bases: what is not there is
-# named in at most one of eight. Nowhere is anything named on an emulator that the simulator does not confirm.
+# Bounds on eight worlds a family. Networks and catchments: of the worlds with an effect at least 5 of 6 have it among
+# what is adopted, and at most one of the worlds has a mechanism named that is not there. Wrong bases: what is not there
+# is named in at most one of eight. Nowhere is anything named on an emulator that the simulator does not confirm.
 family_worlds <- function(scope) {
   effects <- function(family) scope$families[[family]]$mechanisms
   network <- c(effects("network"), "solar gain on the air", "none", "none")
@@ -187,7 +196,8 @@ family_worlds <- function(scope) {
   layers <- c("none", "window transmission", "none", "neighbour coupling")
   zones <- c("none", "solar gain on the air", "none", "envelope leak")
   worlds <- data.frame(family = rep(new_families, each = 8), kind = c(network, runoff, layers, zones),
-                       strength = rep_len(c(4, 2, 8, 4), 24), structure = rep(c(NA, scope$wrong_structures), c(16, 4, 4)))
+                       strength = rep_len(c(4, 2, 8, 4), 24),
+                       structure = rep(c(NA, scope$wrong_structures), c(16, 4, 4)))
   worlds$seed <- world_seed(900) + seq_len(24)
   worlds$days <- short[worlds$family]
   worlds
