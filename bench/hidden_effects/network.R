@@ -292,7 +292,7 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
   rows <- which(calibrate & hours > warmup)
   heating <- weather[, "P"]
   limits <- c(0.02, 0.3)
-  for (attempt in 1:10) {
+  for (attempt in 1:20) {
     unit <- true_unit(base$parameters)
     values <- amiss:::unit_to_values(t(unit), base$parameters)[1, ]
     # A heater of the size of the house: on for good, it would lift it by 15 to 30 K.
@@ -307,9 +307,10 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
     adapted <- list(unit = unit)
     if (second_zone) {
       # An effect counts beside what the wrong base makes of the truth without one; what it cannot is to show in the
-      # noise.
+      # noise: a room that leaves the base nearly right is drawn again.
       adapted <- adapt_to(base, plain, drivers, rows, list(unit, rep(0.5, length(unit))))
-      noise <- min(max(adapted$rms / sample(c(1, 2, 4, 8), 1), limits[1]), limits[2])
+      noise <- min(max(adapted$rms / sample(c(2, 4, 8), 1), limits[1]), limits[2])
+      if (adapted$rms < 2 * limits[1] && attempt < 20) next
     }
     if (kind == "none") break
     true <- network_with(real$simulator, kind)

@@ -43,8 +43,14 @@ draw_wrong_world <- function(seed, kind = NULL, strength = NULL, days = NULL, st
   world
 }
 
+# Its misfit, as that of the other: RMS of what its parameters leave of the truth without an effect, over the noise.
 one_layer_for_three <- function(world) {
   offset <- amiss::free("initial_wall_offset", amiss::normal(0, 1, -3, 3), "K")
   world$base <- amiss::change_component(amiss::paper_box("M1"), "zone", initial_wall_offset = offset)
+  m <- world$measurements
+  m$raw$y <- simulate_truth(amiss::paper_box("M2"), world$values, world$data)
+  whole <- !is.na(m$block)
+  m$y <- as.numeric(rowsum(m$raw$y[whole], m$block[whole])) / m$per_step
+  world$misfit <- best_on_record(world$base, m, world$seed, starts = 1)$rms / world$noise
   world
 }

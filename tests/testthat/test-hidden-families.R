@@ -141,10 +141,9 @@ test_that("a wrong base leaves what its parameters cannot follow, whether an eff
   structure <- vapply(worlds, `[[`, "", "structure")
   expect_true(any(hidden) && any(!hidden))
   expect_setequal(structure, scope$wrong_structures)
-  zones <- worlds[structure == "one zone for two"]
-  misfit <- vapply(zones, `[[`, 0, "misfit")
+  misfit <- vapply(worlds, `[[`, 0, "misfit")
   expect_true(all(misfit > 0))
-  expect_gt(max(misfit), 1)
+  expect_gt(stats::median(misfit), 1.5)
   layers <- Filter(function(w) !length(w$kinds), worlds[structure == "one layer for three"])
   best <- function(world) scope$best_on_record(world$base, world$measurements, 1, starts = 1)$rms
   ratio <- vapply(layers[1:2], function(w) best(w) / drawn_noise(w), 0)
