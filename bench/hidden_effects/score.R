@@ -10,16 +10,46 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
   adopted <- vapply(upgrade$models[-1], `[[`, "", "mechanism")
   attributed <- attributed_condition(upgrade)
   verdict <- amiss:::diagnosis_verdict(upgrade)
-  row <- list(seed = world$seed, kind = world$kind, strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1,
-              days = world$days, true_boundary = as.character(unique(unlist(true_boundary[world$kinds], use.names = FALSE))),
-              true_mechanism = intersect(world$kinds, catalogue_kinds), condition = told_condition(upgrade, attributed),
+  rmse <- vapply(upgrade$models, function(m) m$scores$calibrate[["rmse"]], 0)
+  best <- best_rmse(world)
+  row <- list(seed = world$seed, family = world$family, structure = c(world$structure, NA)[1],
+              misfit = c(world$misfit, NA)[1], hidden = length(world$kinds) > 0, kind = world$kind,
+              strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1, days = world$days, true_boundary = world$true_boundary,
+              true_mechanism = intersect(world$kinds, names(world$catalogue)), condition = told_condition(upgrade, attributed),
               attributed_condition = attributed, mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
+              verdicts = mechanism_verdicts(upgrade, verdict$verdict), check_passed = check_passed(upgrade),
               verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
               log10_bf = if (length(adopted)) upgrade$named_cause$log10_bf else max(upgrade$candidates$log10_bf),
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
-              rmse = vapply(upgrade$models, function(m) m$scores$calibrate[["rmse"]], 0), wall_s = wall)
+              rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall)
   if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world), list(paper_condition = paper_condition(world, runs)))
   row
+}
+
+# What is said of each mechanism that was adopted, in turn; of all of them together where the package does not say it of
+# each.
+mechanism_verdicts <- function(upgrade, overall) {
+  vapply(upgrade$models[-1], function(m) {
+    own <- m[["verdict"]]
+    if (is.list(own)) own <- own[["verdict"]]
+    if (is.null(own)) overall else as.character(own)[1]
+  }, "")
+}
+
+# Did runs of the simulator at draws of the last model's posterior confirm its emulator? NA where nobody asked.
+check_passed <- function(upgrade) {
+  passed <- upgrade$models[[length(upgrade$models)]]$fit[["check"]][["passed"]]
+  if (is.null(passed)) NA else passed
+}
+
+# The RMSE in calibration that least squares reaches with what is really there; NA where no model of the catalogue is it,
+# or where the effort is not worth it (the box). The search starts from the truth as well.
+best_rmse <- function(world) {
+  if (!world$family %in% c("network", "runoff")) return(NA)
+  true <- Reduce(function(model, k) world$catalogue[[k]]$edit(model), world$kinds, world$base)
+  values <- c(world$values, unlist(lapply(unname(world$effects), function(e) e[names(e) != "size"])))
+  unit <- vapply(names(true$parameters), function(n) amiss:::prior_cdf(true$parameters[[n]]$prior, values[[n]]), 0)
+  best_on_record(true, world$measurements, fit_seed(world), starts = 3, known = list(unname(unit)))$rms
 }
 
 attributed_condition <- function(upgrade) {
@@ -82,13 +112,17 @@ rival_conditions <- function(fit, world, most = 400) {
                                  list(seed = 1, threads = 1))
   forest <- if (requireNamespace("ranger", quietly = TRUE)) {
     strongest(ranger::ranger(x = as.data.frame(unname(x)), y = r, importance = "permutation", num.trees = 300, seed = 1, num.threads = 1)$variable.importance)
-  } else NA
+  }  # not asked where the package is not there
   list(correlation_condition = strongest(abs(stats::cor(x, r))), forest_condition = forest,
        ard_condition = strongest(-ard$hyperparameters[1, -(1:3)]))
 }
 
+# TRUE, FALSE or, where a rule was not asked, NA; a rule that was asked and names nothing is not right.
 named_right <- function(row) !is.na(row$mechanism) && row$mechanism %in% row$true_mechanism
-condition_right <- function(row, what = "condition") !is.null(row[[what]]) && !is.na(row[[what]]) && row[[what]] %in% row$true_boundary
+condition_right <- function(row, what = "condition") {
+  if (is.null(row[[what]])) NA else !is.na(row[[what]]) && row[[what]] %in% row$true_boundary
+}
+named_mechanisms <- function(row) row$adopted[row$verdicts == "named"]
 
 rate <- function(flags) {
   flags <- flags[!is.na(flags)]
@@ -97,13 +131,14 @@ rate <- function(flags) {
   list(rate = mean(flags), n = length(flags), lower95 = interval[1], upper95 = interval[2])
 }
 
+# Rates of the worlds of one family; by_family() has those of each.
 score_rates <- function(rows) {
   pick <- function(f) Filter(f, rows)
   flags <- function(rows, f) vapply(rows, function(r) c(as.logical(f(r)), NA)[1], NA)  # NA where it was not scored
   strong <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95)
   one <- pick(function(r) length(r$true_mechanism) > 0 && abs(r$achieved - 1) <= 0.2)
   none <- pick(function(r) r$kind == "none")
-  outside <- pick(function(r) r$kind %in% outside_kinds)
+  outside <- pick(function(r) r$hidden && !length(r$true_mechanism))
   both <- pick(function(r) r$kind == "two effects" && r$achieved >= 1.95)
   weak <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved < 0.8)
   rivals <- c("condition", "attributed_condition", "paper_condition", "correlation_condition", "forest_condition", "ard_condition")
@@ -113,9 +148,20 @@ score_rates <- function(rows) {
          parameter_covered = rate(flags(strong, function(r) r$covered)),
          false_condition = rate(flags(none, function(r) !is.na(r$condition))), false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
          false_paper_condition = rate(flags(none, function(r) !is.na(r$paper_condition))),
+         false_named = rate(flags(rows, function(r) any(!named_mechanisms(r) %in% r$true_mechanism))),
+         hidden_among_adopted = rate(flags(strong, function(r) all(r$true_mechanism %in% r$adopted))),
+         rmse_ratio_ok = rate(flags(pick(function(r) r$hidden && named_right(r)), function(r) r$rmse_ratio <= 1.2)),
+         check_failed = rate(flags(rows, function(r) !r$check_passed)),
+         named_unchecked = rate(flags(pick(function(r) isFALSE(r$check_passed)),
+                                      function(r) length(named_mechanisms(r)) > 0)),
          outside_blamed = rate(flags(outside, function(r) r$verdict == "named")),
          outside_unexplained = rate(flags(Filter(function(r) r$achieved >= 1.95, outside), function(r) r$unexplained)),
          both_found = rate(flags(both, function(r) all(r$true_mechanism %in% r$adopted)))))
+}
+
+by_family <- function(rows, of) {
+  family <- vapply(rows, `[[`, "", "family")
+  lapply(stats::setNames(nm = unique(family)), function(f) of(rows[family == f]))
 }
 
 # Means, with their standard errors: held-out error removed, as a share of what knowing the truth would remove, and time.
@@ -126,5 +172,5 @@ score_means <- function(rows) {
     v <- v[is.finite(v)]
     list(mean = mean(v), standard_error = stats::sd(v) / sqrt(length(v)), median = stats::median(v), n = length(v))
   }
-  list(gain_share = of(strong, "gain_share"), wall_s = of(rows, "wall_s"))
+  list(gain_share = of(strong, "gain_share"), rmse_ratio = of(strong, "rmse_ratio"), wall_s = of(rows, "wall_s"))
 }

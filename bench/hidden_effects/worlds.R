@@ -138,6 +138,8 @@ draw_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
                                                    validate = !calibrate, name = kind, unit = "K"))
   # What the walls were before the record is unknown to whoever fits.
   fitted <- amiss::change_component(base, "zone", initial_wall_offset = amiss::free("initial_wall_offset", amiss::normal(0, 1, -3, 3), "K"))
-  list(seed = seed, kind = kind, kinds = kinds, strength = strength, achieved = achieved, noise = noise, ar1 = ar1, days = days, values = values, effects = effects,
-       clean = clean, data = data, measurements = measured, base = fitted, catalogue = amiss::box_catalogue(columns))
+  list(seed = seed, family = "box", kind = kind, kinds = kinds, strength = strength, achieved = achieved, noise = noise,
+       ar1 = ar1, days = days, values = values, effects = effects, clean = clean, data = data, measurements = measured,
+       base = fitted, catalogue = amiss::box_catalogue(columns),
+       true_boundary = as.character(unique(unlist(true_boundary[kinds], use.names = FALSE))))
 }
