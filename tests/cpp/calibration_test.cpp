@@ -253,6 +253,12 @@ TEST(ParameterModes, AreThoseOfAFineGrid) {
     exact.maxCoeff(&top);
     const double centre = p.dot(grid), sd = std::sqrt(p.dot(grid.cwiseAbs2()) - centre * centre);
     EXPECT_NEAR(modes.best[0], grid[top], 0.15 * sd) << noise_variance;
+    ModeOptions one;  // a single search from wherever the prior has it start
+    one.starts = one.searches = 1;
+    for (std::uint64_t item = 0; item < 10; ++item) {
+      Stream other(2, 2, item);
+      EXPECT_NEAR(parameter_modes(target, {point}, one, Context(), other).best[0], grid[top], 0.15 * sd);
+    }
   }
 }
 
