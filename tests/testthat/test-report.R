@@ -89,12 +89,15 @@ test_that("an upgrade prints each mechanism with its verdict, within fifteen lin
   lines <- cli::cli_fmt(print(upgrade))
   expect_lte(length(lines), 15)
   expect_match(lines, "named: .*sun.* \\(Gv\\), log10 Bayes factor [0-9.]+", all = FALSE)
-  # As if five had been adopted: four are printed.
+  # As if five had been adopted, and all doubted: four are printed.
+  upgrade$models[[2]][c("verdict", "doubts")] <- list("likely", c(
+    "other causes are possible", "the numbers behind it are not trusted", "the error in calibration rose with it",
+    "what drives it is still answered to", "its value lies at the edge of what was thought possible",
+    "a good part of the error remains", "a drifting sensor would explain the error as well"))
   sun <- upgrade$models[[2]]
   for (name in paste("mechanism", letters[1:4])) {
     parent <- upgrade$models[[length(upgrade$models)]]
-    step <- utils::modifyList(sun, list(name = paste(parent$name, "+", name), parent = parent$name, mechanism = name, verdict = "likely",
-                                        doubts = rep("a doubt of more than a few words", 8)))
+    step <- utils::modifyList(sun, list(name = paste(parent$name, "+", name), parent = parent$name, mechanism = name))
     row <- upgrade$candidates[1, ]
     row[c("from", "mechanism")] <- list(parent$name, name)
     upgrade$candidates <- rbind(upgrade$candidates, row)
