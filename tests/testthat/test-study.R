@@ -30,10 +30,12 @@ test_that("a study writes its files with the agreed fields", {
                     "trusted", "rmse_calibration", "rmse_validation", "coverage95_validation", "parameters", "attribution") %in% names(json$models[[1]])))
   expect_null(json$models[[1]]$parent)
   expect_named(json$models[[1]]$parameters[[1]], c("name", "unit", "median", "lower95", "upper95"))
-  expect_named(json$models[[1]]$attribution[[1]], c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group"))
+  expect_named(json$models[[1]]$attribution[[1]],
+               c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group"))
   expect_true(all(c("from", "mechanism", "log10_bf", "interval", "probability") %in% names(json$candidates[[1]])))
   adopted <- json$models[[2]]
-  expect_true(all(c("verdict", "doubts", "confounded_with", "held_out_gain", "emulator_error", "emulator_ratio", "emulator_checked", "refinements",
+  expect_true(all(c("verdict", "doubts", "confounded_with", "held_out_gain", "emulator_error", "emulator_ratio",
+                    "emulator_checked", "refinements",
                     "reach", "trust") %in% names(adopted)))
   own <- upgrade$models[[2]]
   expect_equal(adopted$verdict, own$verdict)

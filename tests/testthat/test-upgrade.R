@@ -28,7 +28,8 @@ test_that("a coarse candidate is compared with the coarse calibration of the cur
 
 test_that("the coarse calibration follows screening, whatever is asked of the full one", {
   upgrade <- small_upgrade()
-  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1, keep = function(name, value) value,
+  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1,
+                   keep = function(name, value) value,
                    control = modifyList(amiss:::upgrade_control, list(calibration = list(ais = list(precision = 0.01, pilot_chains = 24)))))
   coarse <- amiss:::screen_model(upgrade$models[[1]]$fit$emulator$simulator, "base", settings)
   expect_equal(coarse$fit$control$ais$precision, amiss:::upgrade_control$screening$precision)
@@ -77,13 +78,16 @@ test_that("every model is checked by runs of its simulator, the adopted one judg
     expect_true(model$fit$trust$trusted)
   }
   expect_identical(upgrade$models[[2]]$verdict, "named")
-  expect_true("Gv" %in% upgrade$models[[1]]$attribution$table$boundary[upgrade$models[[1]]$attribution$table$significant])
+  expect_identical(significant_conditions(upgrade$models[[1]]$attribution$table), "Gv")
 })
 
 test_that("coarse calibrations are corrected by a few runs", {
   upgrade <- small_upgrade()
-  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1, keep = function(name, value) value,
-                   control = modifyList(amiss:::upgrade_control, list(calibration = list(ais = list(pilot_chains = 24, importance_draws = 200)))))
+  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1,
+                   keep = function(name, value) value,
+                   control = modifyList(amiss:::upgrade_control,
+                                        list(calibration = list(ais = list(pilot_chains = 24,
+                                                                           importance_draws = 200)))))
   own <- function(check) {
     settings$control$calibration$check <- check
     amiss:::screen_model(upgrade$models[[1]]$fit$emulator$simulator, "base", settings)$fit
@@ -98,7 +102,8 @@ test_that("models with a poor design are refined where the check fails, as often
   m <- bent_measurements()
   loop <- function(rounds) {
     upgrade_model(bent_simulator(), m, catalogue(), runs = 6, seed = 1, quiet = TRUE,
-                  control = list(rounds = rounds, refine = 0, screening = NULL, calibration = quick_ais, attribution = list(surrogates = 19)))
+                  control = list(rounds = rounds, refine = 0, screening = NULL, calibration = quick_ais,
+                                 attribution = list(surrogates = 19)))
   }
   refined <- loop(2)
   expect_identical(refined$models[[1]]$fit$rounds, 1L)
