@@ -42,9 +42,12 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   own <- seq_along(conditions)
   attributed <- function(least) {
     asked <- c(control, list(least = least * log(10)))
-    result <- call_engine(attribute_(data, fit$priors, fit$emulator$processes, draws, asked, engine_context(seed, threads)))
+    result <- call_engine(attribute_(data, fit$priors, fit$emulator$processes, draws, asked,
+                                     engine_context(seed, threads)))
     matters <- result$sets$lost / log(10) >= control$least_log10_bf
-    c(result, list(significant = matters & result$adjusted <= control$level, hidden = (matters & result$adjusted > control$level)[own]))
+    c(result,
+      list(significant = matters & result$adjusted <= control$level,
+           hidden = (matters & result$adjusted > control$level)[own]))
   }
   result <- with_hidden_groups(attributed(control$least_log10_bf), attributed, own)
   log10_bf <- result$sets$lost / log(10)
@@ -71,8 +74,9 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
                  control = control, seed = seed), class = "amiss_attribution")
 }
 
-# Of two conditions that say the same, one may earn just enough to stay out of the search for groups, and yet no surrogate
-# misses it, as the other takes its place. Where a condition earns its evidence but no p-value, groups are sought once more with it.
+# Of two conditions that say the same, one may earn just enough to stay out of the search for groups, and yet no
+# surrogate misses it, as the other takes its place. Where a condition earns its evidence but no p-value, groups are
+# sought once more with it.
 with_hidden_groups <- function(first, attributed, own) {
   if (!any(first$hidden)) return(first)
   again <- attributed((max(first$sets$lost[own][first$hidden]) + 1e-6) / log(10))

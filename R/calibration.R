@@ -143,7 +143,9 @@ print.amiss_calibration <- function(x, ...) {
 # What the reach says of the model, in words.
 reach_words <- function(fit) {
   free <- sum(fit$reach[is.infinite(fit$control$reach)])
-  if (length(fit$reach) < 2) return(if (free > 0) "the discrepancy is free" else sprintf("the reach of the discrepancy is held at %s", names(fit$reach)))
+  if (length(fit$reach) < 2) {
+    return(if (free > 0) "the discrepancy is free" else paste("the discrepancy's reach is held at", names(fit$reach)))
+  }
   if (free >= 0.9) return(sprintf("the discrepancy reaches into what the parameters can do (probability %.2f): the model is wrong where its parameters could hide it", free))
   if (free <= 0.1) return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))
   sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)

@@ -21,8 +21,8 @@ checked_by_runs <- function(fit, threads) {
 # The runs of the check serve the exact evidence; where they cost milliseconds, more are made for it.
 default_exact <- function(fit) if (inherits(fit$emulator$simulator, "amiss_zone")) max(200, fit$control$check) else fit$control$check
 
-# Runs of the simulator at n draws spread evenly over the posterior: list(draws, times, runs, failed), failed ones left out.
-# A draw of more weight than one of n is run once, and counts as often as it was drawn.
+# Runs of the simulator at n draws spread evenly over the posterior: list(draws, times, runs, failed), failed ones left
+# out. A draw of more weight than one of n is run once, and counts as often as it was drawn.
 posterior_runs <- function(fit, n, threads) {
   # In the order of a coordinate, so that draws of equal weight cover the posterior evenly.
   order <- order(fit$values[, 1])

@@ -68,6 +68,7 @@ warn_absent_drivers <- function(catalogue, measurements) {
     absent <- setdiff(entry$boundary, measurements$conditions)
     if (!length(absent)) next
     warn_input(c("Mechanism {.val {entry$name}} is driven by {.val {absent}}, which {?is/are} not among the boundary conditions analysed ({.val {measurements$conditions}}).",
-                 i = "{cli::qty(absent)}Name {?it/them} in {.arg boundary} of {.fun measurements}, so that the discrepancy can answer to {?it/them}."))
+                 i = paste("{cli::qty(absent)}Name {?it/them} in {.arg boundary} of {.fun measurements},",
+                           "so that the discrepancy can answer to {?it/them}.")))
   }
 }

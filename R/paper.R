@@ -72,13 +72,15 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
                  weights = inside$weights, lambda = inside$lambda, hyperparameters = hyperparameters,
                  evidence = evidence, log_evidence = evidence$log_evidence[3], standard_error = evidence$standard_error[3],
                  interval = c(evidence$lower95[3], evidence$upper95[3]), log_jacobian = result$log_jacobian,
-                 trust = paper_trust(outside, inside), index = index_table(result$index, conditions), share = result$index$share,
+                 trust = paper_trust(outside, inside), index = index_table(result$index, conditions),
+                 share = result$index$share,
                  inside = inside, outside = outside), class = "amiss_paper_calibration")
 }
 
 # What a person should know before using it.
 paper_trust <- function(outside, inside) {
-  why <- c(if (!outside$trusted) paste("discrepancy:", outside$verdict), if (!inside$trusted) paste("parameters:", inside$verdict))
+  why <- c(if (!outside$trusted) paste("discrepancy:", outside$verdict),
+           if (!inside$trusted) paste("parameters:", inside$verdict))
   list(trusted = is.null(why), verdict = if (is.null(why)) inside$verdict else paste(why, collapse = "; "))
 }
 

@@ -21,7 +21,8 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
   seed <- pick_seed(seed)
   check_input(checkmate::check_flag(discrepancy), "discrepancy")
   if (discrepancy && !inherits(object, "amiss_calibration")) {
-    abort_input("{.arg discrepancy} needs a fit of {.fun calibrate}: that of the paper does not carry over to other rows.")
+    abort_input(paste("{.arg discrepancy} needs a fit of {.fun calibrate}:",
+                      "that of the paper does not carry over to other rows."))
   }
   m <- object$measurements
   simulator <- object$emulator$simulator
@@ -65,7 +66,9 @@ basis_at <- function(fit, use, threads) {
   values <- unit_to_values(emulator$processes$inputs, emulator$parameters)
   runs <- suppress_run_warnings(simulate_measured(emulator$simulator, values, fit$measurements, use, threads))
   made <- colSums(!is.finite(runs)) == 0
-  if (sum(made) < last) abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs when they were made again.")
+  if (sum(made) < last) {
+    abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
+  }
   own <- w[made, -last, drop = FALSE]
   cbind(sweep(runs[, made, drop = FALSE], 2, w[made, last]) %*% own %*% solve(crossprod(own)), 1)
 }

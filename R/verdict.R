@@ -39,7 +39,7 @@ held_out_gain <- function(parent, model) {
   n <- length(fall)
   measurements <- model$fit$measurements
   hours <- measurements$hours[used_rows(measurements, "validate")]
-  block <- floor((hours - hours[1]) / 24 + 1e-6)  # hours of clock times are rounded
+  block <- floor((hours - hours[1]) / 24)
   if (length(unique(block)) < 8) block <- floor(8 * (seq_len(n) - 1) / n)
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n

@@ -37,6 +37,13 @@ small_upgrade <- function() {
   upgrade_cache$upgrade
 }
 
+# The upgrade with its mechanisms judged anew, after a change by hand.
+rejudged <- function(upgrade) {
+  upgrade$models <- judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements,
+                                 upgrade$control)
+  upgrade
+}
+
 # The same upgrade as if nothing had been adopted, and as if nothing had been held out.
 base_only <- function(upgrade) {
   upgrade$models <- upgrade$models[1]

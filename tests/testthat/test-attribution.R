@@ -2,7 +2,10 @@
 fifteen <- function(strength) withr::with_seed(4, {
   data <- linear_data()
   hour <- data$hour
-  for (k in 1:13) data[[sprintf("X%02d", k)]] <- as.numeric(stats::filter(rnorm(240), 0.9, "recursive")) + sin(2 * pi * hour / (20 + k))
+  for (k in 1:13) {
+    walk <- as.numeric(stats::filter(rnorm(240), 0.9, "recursive"))
+    data[[sprintf("X%02d", k)]] <- walk + sin(2 * pi * hour / (20 + k))
+  }
   data$Ti <- data$Ti + strength * lagged(data$X05, 4)
   linear_measurements(data, boundary = setdiff(names(data), c("hour", "Ti")))
 })
@@ -61,7 +64,8 @@ test_that("a copy of the true driver does not hide it: both are named as one", {
   expect_identical(found$table$significant, members)
   expect_equal(found$table$log10_bf_dropped[members], rep(group$log10_bf_dropped, 2))
   expect_match(printed(found), "driven by Tn or Tc")
-  expect_match(printed(found), "Tn and Tc cannot be told apart in this record .correlation 1.000.: measure while the two differ")
+  expect_match(printed(found),
+               "Tn and Tc cannot be told apart in this record .correlation 1.000.: measure while the two differ")
 })
 
 test_that("nearly a copy is named with the driver, and what differs enough is told apart", {
@@ -79,8 +83,10 @@ test_that("nearly a copy is named with the driver, and what differs enough is to
 test_that("a condition that earns its evidence but no p-value is sought once more in groups", {
   own <- 1:3
   asked <- NULL
-  first <- list(sets = list(lost = c(1.4, 0.4, 0), conditions = list(0L, 1L, 2L)), significant = c(FALSE, FALSE, FALSE), hidden = c(TRUE, FALSE, FALSE))
-  grouped <- list(sets = list(lost = c(1.4, 0.4, 0, 40), conditions = list(0L, 1L, 2L, 0:1)), significant = c(FALSE, FALSE, FALSE, TRUE), hidden = rep(FALSE, 3))
+  first <- list(sets = list(lost = c(1.4, 0.4, 0), conditions = list(0L, 1L, 2L)),
+                significant = c(FALSE, FALSE, FALSE), hidden = c(TRUE, FALSE, FALSE))
+  grouped <- list(sets = list(lost = c(1.4, 0.4, 0, 40), conditions = list(0L, 1L, 2L, 0:1)),
+                  significant = c(FALSE, FALSE, FALSE, TRUE), hidden = rep(FALSE, 3))
   again <- function(least) {
     asked <<- c(asked, least)
     grouped
@@ -88,7 +94,8 @@ test_that("a condition that earns its evidence but no p-value is sought once mor
   expect_identical(amiss:::with_hidden_groups(first, again, own), grouped)
   expect_equal(asked, 1.4 / log(10), tolerance = 1e-5)
   expect_gt(asked, 1.4 / log(10))  # so that the condition itself can be of the group
-  # What was significant alone keeps its own name; nothing is sought where nothing is hidden, and nothing taken where nothing is found.
+  # What was significant alone keeps its own name; nothing is sought where nothing is hidden, and nothing taken where
+  # nothing is found.
   alone <- utils::modifyList(first, list(significant = c(FALSE, TRUE, FALSE)))
   expect_identical(amiss:::with_hidden_groups(alone, again, own), alone)
   quiet <- utils::modifyList(first, list(hidden = rep(FALSE, 3)))
@@ -101,7 +108,8 @@ test_that("shares are plain shares of the variance where conditions do not overl
   data$Ti <- data$Ti + 0.004 * data$Gv
   fit <- linear_fit(linear_measurements(data))
   table <- attribute_discrepancy(fit, list(surrogates = 19), seed = 1)$table
-  # The simulator's own directions are nearly free beside a noise of 0.1: all but the noise, over what is measured outside them.
+  # The simulator's own directions are nearly free beside a noise of 0.1: all but the noise, over what is measured
+  # outside them.
   outside <- function(v) stats::lm.fit(fit$emulator$basis$vectors, v)$residuals
   noise <- data$Ti - 20 - 0.4 * data$Te - 0.004 * data$Gv
   explained <- 1 - sum(outside(noise)^2) / sum(outside(data$Ti)^2)
@@ -129,11 +137,14 @@ test_that("evidence lost is the posterior over the prior odds of a condition tha
   table <- attribute_discrepancy(fit, list(surrogates = 19), seed = 1)$table
   off <- colSums(fit$weights * (fit$posterior$t == 0))
   expect_true(all(off > 0.02 & off < 0.99))
-  expect_equal(table$log10_bf_dropped[match(c("Te", "Gv"), table$boundary)], log10(1 - 0.2) - log10(off), tolerance = 1e-8)
+  expect_equal(table$log10_bf_dropped[match(c("Te", "Gv"), table$boundary)], log10(1 - 0.2) - log10(off),
+               tolerance = 1e-8)
   # Sampled again without the condition: the same within four standard errors of both.
-  again <- attribute_discrepancy(fit, list(surrogates = 19, ais = list(precision = 0.01, max_groups = 4)), seed = 1)$table
+  again <- attribute_discrepancy(fit, list(surrogates = 19, ais = list(precision = 0.01, max_groups = 4)),
+                                 seed = 1)$table
   again <- again[match(table$boundary, again$boundary), ]
   expect_true(all(again$log10_bf_dropped != table$log10_bf_dropped))
-  expect_true(all(abs(again$log10_bf_dropped - table$log10_bf_dropped) < 4 * sqrt(again$standard_error^2 + table$standard_error^2)))
+  error <- sqrt(again$standard_error^2 + table$standard_error^2)
+  expect_true(all(abs(again$log10_bf_dropped - table$log10_bf_dropped) < 4 * error))
   expect_gt(diff(range(table$log10_bf_dropped)), 0.1)  # the two conditions do differ
 })

@@ -10,10 +10,11 @@ test_that("the evidence does not hang on the number of basis vectors", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, runs = 40, seed = 2)
   fits <- lapply(c(3, 4, 6, 8), function(q) {
-    calibrate(train_emulator(runs, m, list(max_vectors = q, explained = 1, noise_fraction = 1e-6)), m, quick_ais, seed = 1)
+    calibrate(train_emulator(runs, m, list(max_vectors = q, explained = 1, noise_fraction = 1e-6)), m, quick_ais,
+              seed = 1)
   })
-  # The fourth and later vectors hold a fiftieth of the noise and less. What is left is the sampler's error, 0.02 decades;
-  # 0.3 is a third of what changes a word. A split of the record at these vectors moved it by decades.
+  # Three vectors leave out a sixth of the noise, four next to nothing. What is left is the sampler's error,
+  # 0.02 decades; 0.3 is a third of what changes a word. A split of the record at these vectors moved it by decades.
   own <- function(of) vapply(fits, of, 0) / log(10)
   expect_lt(diff(range(own(function(f) f$log_evidence))), 0.3)
   expect_lt(diff(range(own(function(f) f$posterior$log_evidence))), 0.3)
@@ -21,7 +22,8 @@ test_that("the evidence does not hang on the number of basis vectors", {
   # A linear simulator has two vectors; what the others hold is rounding.
   linear <- simulate_design(linear_simulator(), linear_measurements(), runs = 30, seed = 3)
   fits <- lapply(c(2, 8), function(q) {
-    emulator <- train_emulator(linear, linear_measurements(), list(max_vectors = q, explained = 1, noise_fraction = 1e-9))
+    emulator <- train_emulator(linear, linear_measurements(),
+                               list(max_vectors = q, explained = 1, noise_fraction = 1e-9))
     calibrate(emulator, linear_measurements(), quick_ais, seed = 3)
   })
   expect_lt(diff(range(own(function(f) f$log_evidence))), 0.3)
@@ -127,7 +129,8 @@ test_that("a record with no more rows than the basis has vectors is refused", {
   expect_identical(ncol(emulator$basis$vectors), 19L)  # never as many as rows
   emulator$basis$vectors <- cbind(emulator$basis$vectors, cos(1:20), sin(1:20))
   emulator$basis$discarded_sd[] <- 0
-  expect_error(calibrate(emulator, m, quick_ais, seed = 1), "20 rows, no more than the 21 basis vectors", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, quick_ais, seed = 1), "20 rows, no more than the 21 basis vectors",
+               class = "amiss_error_input")
 })
 
 test_that("a Bayes factor needs one record", {

@@ -69,7 +69,8 @@ test_that("the check can be left out", {
 })
 
 test_that("runs that fail at posterior draws are left out and told", {
-  for (failing in list(function(k, y) if (k %% 10 == 0) NaN * y else y, function(k, y) if (k %% 10 == 0) stop("no steady state") else y,
+  for (failing in list(function(k, y) if (k %% 10 == 0) NaN * y else y,
+                       function(k, y) if (k %% 10 == 0) stop("no steady state") else y,
                        function(k, y) if (k %% 10 == 0) replace(y, 7, Inf) else y)) {
     expect_no_warning(fit <- checked(failing))
     expect_equal(fit$check$failed, 4)

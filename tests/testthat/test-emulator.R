@@ -91,8 +91,9 @@ test_that("a prediction's sd is that of a run: emulator, nugget and what the bas
   emulator <- train_emulator(runs, 0.1)
   fresh <- box_runs("M4", unit = withr::with_seed(7, matrix(runif(200 * 6), 200)))
   predicted <- predict(emulator, fresh$values)
-  # 200 runs of 7 to 8 independent errors each: 0.6 % of binomial error about 95 %. The factors by which variances are widened
-  # come from 60 errors left out each: 18 % of a variance, 2 % of coverage. Without the discarded part it would be 45 %.
+  # 200 runs of 7 to 8 independent errors each: 0.6 % of binomial error about 95 %. The factors by which variances are
+  # widened come from 60 errors left out each: 18 % of a variance, 2 % of coverage. Without the discarded part it
+  # would be 45 %.
   coverage <- mean(abs(predicted$mean - fresh$outputs) < stats::qnorm(0.975) * predicted$sd)
   expect_gt(coverage, 0.92)
   expect_lt(coverage, 0.99)

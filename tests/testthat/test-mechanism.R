@@ -33,7 +33,8 @@ test_that("an edit that loses what was adopted before is refused", {
   sun <- free("sun", uniform(0, 1))
   model <- function(...) function_simulator(function(values, drivers) 20 + 0 * drivers[, "Te"], ..., boundary = "Te")
   anew <- mechanism("leak", function(m) model(gain, free("leak", uniform(0, 1))), "Te", "It leaks.")
-  expect_error(amiss:::extend(model(gain, sun), anew, adopted = "sun"), "\"leak\" drops the parameter \"sun\".*adopted before",
+  expect_error(amiss:::extend(model(gain, sun), anew, adopted = "sun"),
+               "\"leak\" drops the parameter \"sun\".*adopted before",
                class = "amiss_error_input")
   # What belongs to the base model may be replaced.
   expect_s3_class(amiss:::extend(model(gain, sun), anew), "amiss_function_simulator")
@@ -45,12 +46,18 @@ test_that("a loop whose second mechanism loses the first one stops with a reason
   data$Ti <- data$Ti + 0.01 * data$Gv
   m <- linear_measurements(data)
   offset <- free("offset", uniform(10, 30))
-  make <- function(name, column, scale) mechanism(name, boundary = column, sentence = "It acts.", edit = function(model) {
-    function_simulator(function(values, drivers) values[["offset"]] + 0.4 * drivers[, "Te"] + scale * values[[name]] * drivers[, column],
-                       offset, free(name, uniform(0, 1)), boundary = c("Te", column))
-  })
-  base <- function_simulator(function(values, drivers) values[["offset"]] + 0.4 * drivers[, "Te"], offset, boundary = "Te")
-  expect_error(upgrade_model(base, m, catalogue(make("sun", "Gv", 0.02), make("wall", "Te", 0.1)), runs = 20, seed = 1, quiet = TRUE,
+  make <- function(name, column, scale) {
+    run <- function(values, drivers) {
+      values[["offset"]] + 0.4 * drivers[, "Te"] + scale * values[[name]] * drivers[, column]
+    }
+    mechanism(name, boundary = column, sentence = "It acts.", edit = function(model) {
+      function_simulator(run, offset, free(name, uniform(0, 1)), boundary = c("Te", column))
+    })
+  }
+  base <- function_simulator(function(values, drivers) values[["offset"]] + 0.4 * drivers[, "Te"], offset,
+                             boundary = "Te")
+  expect_error(upgrade_model(base, m, catalogue(make("sun", "Gv", 0.02), make("wall", "Te", 0.1)), runs = 20,
+                             seed = 1, quiet = TRUE,
                              control = list(calibration = quick_ais, attribution = list(surrogates = 19))),
                "\"wall\" could not be tried|drops the parameter", class = "amiss_error_input")
 })
@@ -58,14 +65,18 @@ test_that("a loop whose second mechanism loses the first one stops with a reason
 test_that("a driver that is not among the conditions is told", {
   m <- linear_measurements(boundary = ~Te)
   make <- function(name, boundary) mechanism(name, function(model) model, boundary, "It acts.")
-  expect_warning(amiss:::warn_absent_drivers(catalogue(make("sun", c("Te", "Gv"))), m), "\"sun\" is driven by \"Gv\", which is not among",
+  expect_warning(amiss:::warn_absent_drivers(catalogue(make("sun", c("Te", "Gv"))), m),
+                 "\"sun\" is driven by \"Gv\", which is not among",
                  class = "amiss_warning_input")
-  expect_warning(amiss:::warn_absent_drivers(catalogue(make("both", c("Wd", "Gv"))), m), "\"Wd\" and \"Gv\", which are not among",
+  expect_warning(amiss:::warn_absent_drivers(catalogue(make("both", c("Wd", "Gv"))), m),
+                 "\"Wd\" and \"Gv\", which are not among",
                  class = "amiss_warning_input")
   expect_no_warning(amiss:::warn_absent_drivers(catalogue(make("film", "Te"), make("drift", character())), m))
   # As the loop begins; what follows is stopped by an edit.
   stopped <- mechanism("sun", function(model) stop("far enough"), "Gv", "Sun.")
-  expect_warning(expect_error(upgrade_model(linear_simulator(), m, catalogue(stopped), runs = 20, seed = 1, quiet = TRUE,
-                                            control = list(calibration = quick_ais, attribution = list(surrogates = 19))), "far enough"),
+  expect_warning(expect_error(upgrade_model(linear_simulator(), m, catalogue(stopped), runs = 20, seed = 1,
+                                            quiet = TRUE,
+                                            control = list(calibration = quick_ais,
+                                                           attribution = list(surrogates = 19))), "far enough"),
                  "driven by", class = "amiss_warning_input")
 })

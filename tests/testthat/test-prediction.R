@@ -4,7 +4,8 @@ lacking <- function(reach = c(13, 300, Inf), ...) {
   data <- linear_data(480)
   data$Tn <- hidden
   data$Ti <- data$Ti + 0.3 * lagged(hidden, 3)
-  m <- linear_measurements(data, boundary = c("Te", "Gv", "Tn"), calibrate = data$hour <= 320, validate = data$hour > 320)
+  m <- linear_measurements(data, boundary = c("Te", "Gv", "Tn"), calibrate = data$hour <= 320,
+                           validate = data$hour > 320)
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
   calibrate(emulator, m, c(quick_ais, list(reach = reach), ...), seed = 3)
 }
@@ -39,7 +40,8 @@ test_that("only held-out measurements' conditions are used, not their values", {
   spoilt <- fit
   held <- spoilt$measurements$use == "validate"
   spoilt$measurements$y[held] <- 1e3
-  expect_identical(predict(spoilt, "validate", discrepancy = TRUE)$mean, predict(fit, "validate", discrepancy = TRUE)$mean)
+  expect_identical(predict(spoilt, "validate", discrepancy = TRUE)$mean,
+                   predict(fit, "validate", discrepancy = TRUE)$mean)
 })
 
 test_that("the basis at other rows is that of the same runs", {
@@ -61,21 +63,25 @@ test_that("runs that fail at other rows are left out of the basis there", {
   expect_no_warning(own <- amiss:::basis_at(fragile, "validate", 1))
   expect_equal(own, amiss:::basis_at(fit, "validate", 1), tolerance = 1e-8)
   never <- fit
-  never$emulator$simulator <- function_simulator(function(values, drivers) NaN * drivers[, 1], free("offset", uniform(10, 30), "K"),
+  never$emulator$simulator <- function_simulator(function(values, drivers) NaN * drivers[, 1],
+                                                 free("offset", uniform(10, 30), "K"),
                                                  free("gain", uniform(0, 1)), boundary = "Te")
-  expect_error(amiss:::basis_at(never, "validate", 1), "failed at 30 of the ensemble's 30 runs", class = "amiss_error_numerical")
+  expect_error(amiss:::basis_at(never, "validate", 1), "failed at 30 of the ensemble's 30 runs",
+               class = "amiss_error_numerical")
 })
 
 test_that("the discrepancy is the whole response that the model lacks", {
   truth <- 0.3 * lagged(hidden, 3)[1:320]
   fit <- lacking(Inf)
   own <- discrepancy(fit)$series
-  # But for its level, which the simulator's offset takes; the filter bank's time constants are 2 and 4 h, the truth's 3 h.
+  # But for its level, which the simulator's offset takes. The filter bank's time constants are 2 and 4 h, that of
+  # the truth 3 h.
   expect_lt(sd(own$discrepancy - truth), 0.05 * sd(truth))
   expect_true(all(own$lower95 <= own$discrepancy & own$discrepancy <= own$upper95))
   for (reach in list(Inf, c(13, 300, Inf))) {
     own <- discrepancy(lacking(reach))$series
-    # Where it keeps out of the parameters' way they take a part; together they are what was made, to a third of the noise.
+    # Where it keeps out of the parameters' way they take a part. Both together are what was made, to a third of the
+    # noise.
     made <- 20 + 0.4 * linear_data(480)$Te[1:320] + truth
     expect_lt(sqrt(mean((own$simulated + own$discrepancy - made)^2)), 0.1 / 3)
     expect_equal(own$residual, own$observed - own$simulated)

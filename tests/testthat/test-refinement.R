@@ -1,5 +1,6 @@
 refined <- function(runs = 6, seed = 1, ..., m = bent_measurements()) {
-  calibrate_refined(simulate_design(bent_simulator(), m, runs, seed = seed), m, control = list(calibration = quick_ais), seed = 1, ...)
+  calibrate_refined(simulate_design(bent_simulator(), m, runs, seed = seed), m,
+                    control = list(calibration = quick_ais), seed = 1, ...)
 }
 
 test_that("a check that fails is mended by its own runs", {
@@ -32,14 +33,17 @@ test_that("no rounds: the check alone", {
 test_that("a good ensemble is calibrated as by calibrate()", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, 20, seed = 1)
-  fit <- calibrate_refined(runs, m, control = list(calibration = quick_ais, emulator = list(noise_fraction = 0.1)), seed = 3)
+  fit <- calibrate_refined(runs, m, control = list(calibration = quick_ais, emulator = list(noise_fraction = 0.1)),
+                           seed = 3)
   alone <- calibrate(train_emulator(runs, m, list(noise_fraction = 0.1)), m, quick_ais, seed = 3)
   expect_identical(fit$rounds, 0L)
-  expect_identical(fit[c("values", "weights", "log_evidence", "check")], alone[c("values", "weights", "log_evidence", "check")])
+  expect_identical(fit[c("values", "weights", "log_evidence", "check")],
+                   alone[c("values", "weights", "log_evidence", "check")])
 })
 
 test_that("the same seed gives the same bits, on one thread and on two", {
-  expect_identical(refined(threads = 2)[c("values", "log_evidence", "runs_made")], refined(threads = 1)[c("values", "log_evidence", "runs_made")])
+  expect_identical(refined(threads = 2)[c("values", "log_evidence", "runs_made")],
+                   refined(threads = 1)[c("values", "log_evidence", "runs_made")])
 })
 
 test_that("runs made elsewhere are calibrated and checked, not refined", {
@@ -61,7 +65,8 @@ test_that("runs that fail are counted, and do not join the ensemble", {
     if (count == 10) NaN * drivers[, "Te"] else bent_run(values, drivers)
   })
   m <- bent_measurements()
-  fit <- calibrate_refined(simulate_design(fragile, m, 6, seed = 1), m, control = list(calibration = quick_ais), seed = 1)
+  fit <- calibrate_refined(simulate_design(fragile, m, 6, seed = 1), m, control = list(calibration = quick_ais),
+                           seed = 1)
   expect_identical(fit$rounds, 1L)
   expect_true(all(is.finite(fit$emulator$basis$vectors)))
   expect_equal(fit$runs_made, count - 6)
@@ -81,6 +86,8 @@ test_that("bad arguments are refused", {
   runs <- simulate_design(bent_simulator(), m, 6, seed = 1)
   expect_error(calibrate_refined("runs", m), "ensemble", class = "amiss_error_input")
   expect_error(calibrate_refined(runs, m, rounds = -1), "rounds", class = "amiss_error_input")
-  expect_error(calibrate_refined(runs, m, control = list(check = 3)), "unknown option.*check", class = "amiss_error_input")
-  expect_error(calibrate_refined(runs, m, control = list(calibration = list(check = 1.5))), "control\\$check", class = "amiss_error_input")
+  expect_error(calibrate_refined(runs, m, control = list(check = 3)), "unknown option.*check",
+               class = "amiss_error_input")
+  expect_error(calibrate_refined(runs, m, control = list(calibration = list(check = 1.5))), "control\\$check",
+               class = "amiss_error_input")
 })

@@ -44,10 +44,12 @@ test_that("the clock is read from times that are text, without a warning", {
   }
   expect_identical(amiss:::clock_hour(format(stamp, "%Y-%m-%d %H:%M:%S")), amiss:::clock_hour(stamp))
   expect_equal(amiss:::clock_hour(c("23", "24.5", "49")), c(23, 0.5, 1))
-  expect_equal(amiss:::clock_hour(factor(c("2013-08-30 00:10:00", "2013-08-30 01:10:00"))), c(1, 7) / 6, tolerance = 1e-3)
+  expect_equal(amiss:::clock_hour(factor(c("2013-08-30 00:10:00", "2013-08-30 01:10:00"))), c(1, 7) / 6,
+               tolerance = 1e-3)
   expect_equal(amiss:::clock_hour("2013-08-30T02:10:00+02:00"), 1 / 6, tolerance = 1e-3)  # in UTC, as in the figures
   noise <- withr::with_seed(1, rnorm(600))
-  expect_no_warning(left <- model_of(noise + 20 * (abs(clock - 7.5) < 0.01), hours, time = format(stamp, "%Y-%m-%d %H:%M:%S")))
+  expect_no_warning(left <- model_of(noise + 20 * (abs(clock - 7.5) < 0.01), hours,
+                                     time = format(stamp, "%Y-%m-%d %H:%M:%S")))
   expect_match(left$pattern$what, "around 07:30")
 })
 
@@ -79,7 +81,8 @@ test_that("a discrepancy that reaches into what the parameters can do is told", 
   upgrade <- small_upgrade()
   expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "do not read their values")
   upgrade$models[[2]]$fit$reach[] <- c(0.01, 0.01, 0.98)
-  expect_match(summary(upgrade)$remains, "they may hide a part of it, so do not read their values as physical", all = FALSE)
+  expect_match(summary(upgrade)$remains, "they may hide a part of it, so do not read their values as physical",
+               all = FALSE)
 })
 
 test_that("a cause that leaves a good part of the error is only likely", {
@@ -103,7 +106,7 @@ test_that("a cause is only likely where a drift would explain the record as well
   upgrade$models[[1]]$prediction$observed <- p$mean + noise + 3 * (hours / max(hours))^2
   upgrade$models[[2]]$prediction$observed <- upgrade$models[[2]]$prediction$mean + 1.5 * noise
   expect_true(rivals(upgrade))
-  upgrade$models <- amiss:::judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements, upgrade$control)
+  upgrade <- rejudged(upgrade)
   expect_match(upgrade$models[[2]]$doubts, "a drifting sensor would explain the error as well", all = FALSE)
   expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a drifting sensor would explain the error as well")
 })

@@ -28,7 +28,8 @@ test_that("a coarse candidate is compared with the coarse calibration of the cur
 
 test_that("the coarse calibration follows screening, whatever is asked of the full one", {
   upgrade <- small_upgrade()
-  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1, keep = function(name, value) value,
+  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1,
+                   keep = function(name, value) value,
                    control = modifyList(amiss:::upgrade_control, list(calibration = list(ais = list(precision = 0.01, pilot_chains = 24)))))
   coarse <- amiss:::screen_model(upgrade$models[[1]]$fit$emulator$simulator, "base", settings)
   expect_equal(coarse$fit$control$ais$precision, amiss:::upgrade_control$screening$precision)
@@ -67,4 +68,48 @@ test_that("screening can be left out, and bad settings are refused before anythi
   with_runs <- function(runs) do.call(upgrade_model, utils::modifyList(arguments, list(runs = runs)))
   expect_error(with_runs("many"), "runs", class = "amiss_error_input")
   expect_error(with_runs(6), "Of the 6 runs.*4", class = "amiss_error_input")
+})
+
+test_that("every model is checked by runs of its simulator, the adopted one judged", {
+  upgrade <- small_upgrade()
+  for (model in upgrade$models) {
+    expect_true(model$fit$check$passed)
+    expect_identical(model$fit$rounds, 0L)
+    expect_true(model$fit$trust$trusted)
+  }
+  expect_identical(upgrade$models[[2]]$verdict, "named")
+  expect_identical(significant_conditions(upgrade$models[[1]]$attribution$table), "Gv")
+})
+
+test_that("coarse calibrations are corrected by a few runs", {
+  upgrade <- small_upgrade()
+  settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1,
+                   keep = function(name, value) value,
+                   control = modifyList(amiss:::upgrade_control,
+                                        list(calibration = list(ais = list(pilot_chains = 24,
+                                                                           importance_draws = 200)))))
+  own <- function(check) {
+    settings$control$calibration$check <- check
+    amiss:::screen_model(upgrade$models[[1]]$fit$emulator$simulator, "base", settings)$fit
+  }
+  expect_lte(own(NULL)$check$runs, 20)
+  expect_identical(own(NULL)$rounds, 0L)
+  expect_lte(own(8)$check$runs, 8)
+  expect_null(own(0)$check)
+})
+
+test_that("models with a poor design are refined where the check fails, as often as the control allows", {
+  m <- bent_measurements()
+  loop <- function(rounds) {
+    upgrade_model(bent_simulator(), m, catalogue(), runs = 6, seed = 1, quiet = TRUE,
+                  control = list(rounds = rounds, refine = 0, screening = NULL, calibration = quick_ais,
+                                 attribution = list(surrogates = 19)))
+  }
+  refined <- loop(2)
+  expect_identical(refined$models[[1]]$fit$rounds, 1L)
+  expect_true(refined$models[[1]]$fit$trust$trusted)
+  rough <- loop(0)
+  expect_false(rough$models[[1]]$fit$trust$trusted)
+  expect_match(summary(rough)$tag, "not trusted|Unexplained")
+  expect_error(loop(-1), "rounds", class = "amiss_error_input")
 })

@@ -3,7 +3,8 @@ models_of <- function(before, after, time = NULL) {
   n <- length(before)
   m <- list(use = rep("validate", n), y = rep(0, n), hours = 1e5 + seq_len(n), time = time)
   model <- function(error) {
-    list(fit = list(measurements = m), prediction = data.frame(use = "validate", observed = 0, mean = error, time = time %||% m$hours))
+    list(fit = list(measurements = m),
+         prediction = data.frame(use = "validate", observed = 0, mean = error, time = time %||% m$hours))
   }
   lapply(list(before, after), model)
 }
@@ -11,9 +12,7 @@ models_of <- function(before, after, time = NULL) {
 errors <- function(n = 240) withr::with_seed(3, list(before = rnorm(n, 0, 2), after = rnorm(n)))
 
 judged <- function(change = function(upgrade) upgrade) {
-  upgrade <- change(small_upgrade())
-  models <- amiss:::judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements, upgrade$control)
-  models[[2]][c("verdict", "doubts")]
+  rejudged(change(small_upgrade()))$models[[2]][c("verdict", "doubts")]
 }
 
 expect_doubt <- function(pattern, change, verdict = "likely") {
@@ -79,7 +78,7 @@ test_that("a mechanism by which data held out do not gain is a stand-in, whateve
   }
   expect_doubt("data held out do not gain by it", worse, "stand-in")
   upgrade <- worse(small_upgrade())
-  upgrade$models <- amiss:::judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements, upgrade$control)
+  upgrade <- rejudged(upgrade)
   told <- summary(upgrade)
   expect_identical(told$verdict, "unexplained")
   expect_match(told$headline, "take it as a stand-in for something else")
@@ -119,7 +118,7 @@ test_that("days are counted by the hours of the measurements, whatever their tim
   stamp <- as.POSIXct("2013-08-30 00:10:00", tz = "UTC") + 3600 * seq_len(240)
   expect_identical(gain(format(stamp, "%Y-%m-%d %H:%M:%S")), gain(NULL))
   expect_identical(gain(stamp), gain(NULL))
-  # Hours of clock times are not whole: a day of 10-minute steps stays one.
+  # A day of 10-minute steps stays one.
   models <- models_of(rep(e$before, 6), rep(e$after, 6))
   exact <- as.numeric(as.POSIXct("2013-08-30 00:10:00", tz = "UTC") + 600 * (seq_len(1440) - 1)) / 3600
   for (k in 1:2) models[[k]]$fit$measurements$hours <- exact
@@ -151,7 +150,8 @@ test_that("a record with times as text is judged without a warning", {
 
 test_that("what drives a mechanism is still answered to with more than half of its evidence", {
   model <- function(log10_bf, significant = TRUE) {
-    table <- data.frame(boundary = c("Gv", "Te"), log10_bf_dropped = c(log10_bf, 30), significant = c(significant, TRUE))
+    table <- data.frame(boundary = c("Gv", "Te"), log10_bf_dropped = c(log10_bf, 30),
+                        significant = c(significant, TRUE))
     list(attribution = list(table = table))
   }
   still <- function(...) amiss:::still_answers(..., boundary = "Gv")
@@ -167,7 +167,8 @@ test_that("parameters that are correlated with those of a mechanism beyond 0.4 a
     new <- runif(400)
     cbind(new, 0.5 * new + 0.5 * runif(400), runif(400), 0.1 * new + 0.9 * runif(400))
   })
-  fit <- list(values = `colnames<-`(unit, c("new", "close", "far", "loose")), weights = rep(1 / 400, 400), posterior = list(unit = unit))
+  fit <- list(values = `colnames<-`(unit, c("new", "close", "far", "loose")), weights = rep(1 / 400, 400),
+              posterior = list(unit = unit))
   expect_identical(amiss:::confounded_parameters(fit, "new"), "close")
   expect_identical(amiss:::confounded_parameters(fit, c("new", "close")), character())
   expect_identical(amiss:::confounded_parameters(fit, character()), character())
@@ -180,7 +181,8 @@ test_that("parameters that are correlated with those of a mechanism beyond 0.4 a
 })
 
 test_that("the edge of a prior is where the interval ends and the median lies", {
-  draws <- cbind(top = 1 - 0.02 * (1:500) / 500, bottom = 0.02 * (1:500) / 500, wide = (1:500) / 500, inside = 0.4 + 0.2 * (1:500) / 500)
+  draws <- cbind(top = 1 - 0.02 * (1:500) / 500, bottom = 0.02 * (1:500) / 500, wide = (1:500) / 500,
+                 inside = 0.4 + 0.2 * (1:500) / 500)
   fit <- list(values = draws, weights = rep(1 / 500, 500), posterior = list(unit = draws))
   expect_identical(amiss:::edge_of_prior(fit), c(top = TRUE, bottom = TRUE, wide = FALSE, inside = FALSE))
 })
