@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 2, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
+upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 6, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
@@ -20,7 +20,7 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 2,
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
-#'   none), `rounds` (of refinement where the check by runs fails; 2), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#'   none), `rounds` (of refinement where the check by runs fails; 6), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
@@ -120,7 +120,9 @@ screen_model <- function(simulator, name, settings) {
   if (is.null(calibration$check) || calibration$check > screening_runs) calibration$check <- calibration$exact <- screening_runs
   settings$keep(list("coarse", name, plain(simulator)), {
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
-    list(ensemble = ensemble, fit = fit_runs(ensemble, settings, calibration, rounds = 0))
+    if (!identical(settings$calibrate, calibrate)) return(list(ensemble = ensemble, fit = fit_runs(ensemble, settings, calibration)))
+    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
+    c(list(ensemble = ensemble), calibrate_with_runs(emulator, settings$measurements, calibration, settings$seed, settings$threads))
   })
 }
 
@@ -134,8 +136,12 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
   if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
   settings$keep(list("full", name, plain(simulator)), {
     first <- first %||% screen_model(simulator, name, settings)
-    ensemble <- if (more > 0) refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads) else first$ensemble
-    fit <- fit_runs(ensemble, settings)
+    fit <- if (isFALSE(first$fit$check$passed)) {
+      control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
+      refine_until_checked(first$ensemble, first, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads)
+    } else {
+      fit_runs(if (more > 0) refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads) else first$ensemble, settings)
+    }
     fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     fit
   })
