@@ -13,7 +13,7 @@
 #' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how many
 #'   runs of the simulator were made here, those of the checks included.
 #' @export
-calibrate_refined <- function(ensemble, measurements, rounds = 6, control = NULL, seed = NULL, threads = 1) {
+calibrate_refined <- function(ensemble, measurements, rounds = 3, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_count(rounds), "rounds")
   control <- merge_control(list(emulator = list(), calibration = list()), control)

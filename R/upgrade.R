@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 6, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
+upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 3, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
@@ -20,7 +20,7 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 6,
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
-#'   none), `rounds` (of refinement where the check by runs fails; 6), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#'   none), `rounds` (of refinement where the check by runs fails; 3), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.

@@ -44,8 +44,9 @@ DroppedSet dropped_by_draws(const HistoryModel& model, const Calibration& calibr
 }
 
 std::vector<std::vector<int>> find_groups(const HistoryModel& model, const Calibration& calibration,
-                                          double least) {
+                                          const std::vector<DroppedSet>& singles, double least) {
   const auto lost = [&](const std::vector<int>& set) {
+    if (set.size() == 1) return singles[static_cast<std::size_t>(set.front())].lost;
     return dropped_by_draws(model, calibration, set).lost;
   };
   std::vector<int> left;
@@ -77,21 +78,24 @@ Attribution attribute(const HistoryModel& model, const Emulator& emulator, const
                       const AttributionOptions& options, const Context& context) {
   Attribution out;
   const AisResult& posterior = calibration.posterior;
-  for (int s = 0; s < model.conditions(); ++s) out.sets.push_back(dropped_by_draws(model, calibration, {s}));
-  for (std::vector<int>& group : find_groups(model, calibration, options.least))
-    out.sets.push_back(dropped_by_draws(model, calibration, std::move(group)));
-
+  const auto drop = [&](std::vector<int> set) {
+    DroppedSet own = dropped_by_draws(model, calibration, std::move(set));
+    if (own.standard_error > options.ais.precision) {
+      const CalibrationTarget without(model, conditions_but(model, own.conditions), emulator);
+      const AisResult again =
+          sample_posterior(without, options.ais, context.fork(kWithout + out.sets.size()));
+      own.lost = posterior.log_evidence - again.log_evidence;
+      own.standard_error = std::hypot(posterior.standard_error, again.standard_error);
+      own.trusted = posterior.trusted && again.trusted;
+    }
+    out.sets.push_back(std::move(own));
+  };
+  for (int s = 0; s < model.conditions(); ++s) drop({s});
+  // By what the singles lose in truth: chains that stick may never drop one of two that say the same.
+  for (std::vector<int>& group : find_groups(model, calibration, out.sets, options.least))
+    drop(std::move(group));
   std::vector<std::vector<int>> sets;
-  for (std::size_t k = 0; k < out.sets.size(); ++k) {
-    DroppedSet& own = out.sets[k];
-    sets.push_back(own.conditions);
-    if (own.standard_error <= options.ais.precision) continue;
-    const CalibrationTarget without(model, conditions_but(model, own.conditions), emulator);
-    const AisResult again = sample_posterior(without, options.ais, context.fork(kWithout + k));
-    own.lost = posterior.log_evidence - again.log_evidence;
-    own.standard_error = std::hypot(posterior.standard_error, again.standard_error);
-    own.trusted = posterior.trusted && again.trusted;
-  }
+  for (const DroppedSet& own : out.sets) sets.push_back(own.conditions);
 
   Index best = 0;
   posterior.log_likelihood.maxCoeff(&best);

@@ -41,6 +41,6 @@ Attribution attribute(const HistoryModel& model, const Emulator& emulator, const
 /// The part of it that needs the draws alone.
 DroppedSet dropped_by_draws(const HistoryModel& model, const Calibration& calibration, std::vector<int> set);
 std::vector<std::vector<int>> find_groups(const HistoryModel& model, const Calibration& calibration,
-                                          double least);
+                                          const std::vector<DroppedSet>& singles, double least);
 
 }  // namespace amiss

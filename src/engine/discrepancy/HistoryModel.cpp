@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -214,6 +215,7 @@ struct HistoryModel::Factor {
   VectorXd root;                             // D^1/2
   Eigen::LLT<MatrixXd, Eigen::Lower> lower;  // L
   VectorXd half;                             // L^-1 b
+  double largest = 1.0;                      // on the diagonal of F
 };
 
 HistoryModel::Factor HistoryModel::factorise(const WhitenedData& whitened, double precision,
@@ -244,6 +246,7 @@ HistoryModel::Factor HistoryModel::factorise(const WhitenedData& whitened, doubl
       matrix(i, j) = precision * out.root[i] * out.root[j] * whitened.gram(out.kept[i], out.kept[j]);
     matrix(j, j) += 1.0;
   }
+  if (n > 0) out.largest = matrix.diagonal().maxCoeff();
   out.lower.compute(matrix);
   out.half = out.lower.matrixL().solve(b);
   return out;
@@ -260,11 +263,17 @@ VectorXd HistoryModel::shifted_cross(const WhitenedData& whitened, const VectorX
 
 namespace {
 
+// Beyond it the unit of I + ... is lost to rounding, and with it the factor: far out in the tail of an
+// amplitude.
+constexpr double kLargestPivot = 1e12;
+
 double log_density(const WhitenedData& whitened, double log_variance, double square, const MatrixXd& lower,
-                   const VectorXd& half) {
+                   const VectorXd& half, double largest) {
+  if (!(largest < kLargestPivot)) return -std::numeric_limits<double>::infinity();
   const double precision = std::exp(-log_variance);
   const double log_det = 2.0 * lower.diagonal().array().log().sum();
   const double quadratic = precision * (square - precision * half.squaredNorm());
+  if (!(quadratic >= 0)) return -std::numeric_limits<double>::infinity();
   const double n = static_cast<double>(whitened.size);
   return whitened.log_det - 0.5 * (n * (kLogTwoPi + log_variance) + log_det + quadratic);
 }
@@ -277,7 +286,8 @@ double HistoryModel::log_likelihood(const HistoryParameters& point, const Vector
   double square = 0.0;
   const VectorXd cross = shifted_cross(own, mean - reference_, square);
   const Factor factor = factorise(own, 1.0 / point.variance, point.t, variance.cwiseSqrt(), cross);
-  return log_density(own, std::log(point.variance), square, factor.lower.matrixLLT(), factor.half);
+  return log_density(own, std::log(point.variance), square, factor.lower.matrixLLT(), factor.half,
+                     factor.largest);
 }
 
 // With r = F^-1 b / sigma^2, d/d log t_s = 1/2 [r_s'r_s + tr(F^-1)_ss - p_s]; it holds at t_s = 0 too.
@@ -286,8 +296,8 @@ double HistoryModel::log_likelihood(const WhitenedData& whitened, double log_var
   const double precision = std::exp(-log_variance);
   const Index q = whitened.coefficients;
   const Factor factor = factorise(whitened, precision, t, VectorXd::Ones(q), whitened.cross);
-  const double value =
-      log_density(whitened, log_variance, whitened.square, factor.lower.matrixLLT(), factor.half);
+  const double value = log_density(whitened, log_variance, whitened.square, factor.lower.matrixLLT(),
+                                   factor.half, factor.largest);
   if (gradient == nullptr) return value;
   const Index n = factor.half.size();
   MatrixXd root_inverse = factor.lower.matrixL();
@@ -332,10 +342,10 @@ CoefficientLikelihood HistoryModel::given(const HistoryParameters& point) const 
     half.row(j) = factor.root[j] * own.gram.row(q + factor.kept[j]).head(q);
   factor.lower.matrixL().solveInPlace(half);
   const double squared = precision * precision;
-  return {
-      reference_, precision * own.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
-      precision * own.cross.head(q) - squared * (half.transpose() * factor.half),
-      log_density(responses, std::log(point.variance), own.square, factor.lower.matrixLLT(), factor.half)};
+  return {reference_, precision * own.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
+          precision * own.cross.head(q) - squared * (half.transpose() * factor.half),
+          log_density(responses, std::log(point.variance), own.square, factor.lower.matrixLLT(), factor.half,
+                      factor.largest)};
 }
 
 VectorXd HistoryModel::coefficients(const HistoryParameters& point, const VectorXd& mean,
