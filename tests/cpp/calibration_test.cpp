@@ -230,7 +230,9 @@ TEST(SamplePosterior, IsTheOneAnnealedFromThePriorForLess) {
 // than the prior.
 TEST(ParameterModes, AreThoseOfAFineGrid) {
   const Emulator emulator = make_emulator(1);
-  const HistoryModel model = make_model({});
+  HistoryData data = make_data();
+  data.y.array() += 1.2;  // else the prior's mode would be the record's
+  const HistoryModel model = make_model({}, data);
   const CalibrationTarget target(model, {}, emulator);
   const VectorXd grid = VectorXd::LinSpaced(4001, -4.0, 4.0);
   MatrixXd mean, variance;
@@ -246,8 +248,9 @@ TEST(ParameterModes, AreThoseOfAFineGrid) {
       fitted[i] = modes.mixture.log_density(grid.segment(i, 1));
     }
     const VectorXd p = normalised_exp(exact), q = normalised_exp(fitted);
-    // The weights p / q have a second moment of 1 / (effective share); the widened t gives up a few tenths.
-    EXPECT_LT((p.array().square() / q.array()).sum(), 1.6) << noise_variance;
+    // The weights p / q have a second moment of 1 / (effective share): a half at least, of which the widened
+    // t gives up some, and the skewness of the posterior some.
+    EXPECT_LT((p.array().square() / q.array()).sum(), 2.0) << noise_variance;
     // A search ends at a gain of 0.01 nats: 0.14 standard deviations from the top.
     Index top = 0;
     exact.maxCoeff(&top);
