@@ -122,7 +122,9 @@ screen_model <- function(simulator, name, settings) {
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
     if (!identical(settings$calibrate, calibrate)) return(list(ensemble = ensemble, fit = fit_runs(ensemble, settings, calibration)))
     emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
-    c(list(ensemble = ensemble), calibrate_with_runs(emulator, settings$measurements, calibration, settings$seed, settings$threads))
+    screened <- calibrate_with_runs(emulator, settings$measurements, calibration, settings$seed, settings$threads)
+    screened$fit$rounds <- 0L
+    c(list(ensemble = ensemble), screened)
   })
 }
 

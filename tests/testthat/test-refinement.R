@@ -8,12 +8,12 @@ test_that("a check that fails is mended by its own runs", {
   expect_identical(fit$rounds, 1L)
   expect_true(fit$check$passed)
   expect_true(fit$trust$trusted)
-  # 6 runs of the design and those of the first check, which was of 40 draws.
+  # 6 runs of the design, those of the first check and those of the coarse calibration after it, but not those of the last.
   inputs <- fit$emulator$processes$inputs
   first <- refined(rounds = 0)
-  expect_equal(nrow(inputs), 6 + first$check$runs)
+  expect_gt(fit$runs_made, first$check$runs + fit$check$runs)
+  expect_equal(nrow(inputs), 6 + fit$runs_made - fit$check$runs)
   expect_equal(inputs[1:6, ], first$emulator$processes$inputs)
-  expect_equal(fit$runs_made, first$check$runs + fit$check$runs)
   # Evidence as of an emulator of many runs, within four standard errors.
   many <- refined(runs = 40, seed = 2)
   expect_identical(many$rounds, 0L)
@@ -70,7 +70,7 @@ test_that("runs that fail are counted, and do not join the ensemble", {
   expect_identical(fit$rounds, 1L)
   expect_true(all(is.finite(fit$emulator$basis$vectors)))
   expect_equal(fit$runs_made, count - 6)
-  expect_equal(nrow(fit$emulator$processes$inputs), 6 + refined(rounds = 0)$check$runs - 1)
+  expect_equal(nrow(fit$emulator$processes$inputs), 6 + fit$runs_made - fit$check$runs - 1)
 })
 
 test_that("what joins is what the check asks for, however many runs the exact evidence takes", {
@@ -78,7 +78,19 @@ test_that("what joins is what the check asks for, however many runs the exact ev
   runs <- simulate_design(bent_simulator(), m, 6, seed = 1)
   control <- list(calibration = c(quick_ais, list(check = 10, exact = 30)))
   fit <- calibrate_refined(runs, m, rounds = 1, control = control, seed = 1)
-  expect_equal(nrow(fit$emulator$processes$inputs), 16)
+  expect_equal(nrow(fit$emulator$processes$inputs), 6 + 10 + 10)  # of the first check and of the coarse one
+})
+
+test_that("in a round the error that was seen widens the posterior", {
+  m <- bent_measurements()
+  emulator <- train_emulator(simulate_design(bent_simulator(), m, 20, seed = 1), m)
+  width <- function(sd) {
+    fit <- calibrate(emulator, m, c(quick_ais, list(check = 0, emulator_sd = sd)), seed = 1)
+    sqrt(stats::cov.wt(fit$values, fit$weights)$cov[1, 1])
+  }
+  # Ten times the noise: about ten times the width, until the prior ends it.
+  expect_gt(width(1) / width(0), 3)
+  expect_error(calibrate(emulator, m, list(emulator_sd = -1)), "emulator_sd", class = "amiss_error_input")
 })
 
 test_that("bad arguments are refused", {
