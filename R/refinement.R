@@ -17,10 +17,11 @@ calibrate_refined <- function(ensemble, measurements, rounds = 3, control = NULL
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_count(rounds), "rounds")
   control <- merge_control(list(emulator = list(), calibration = list()), control)
-  refine_until_checked(ensemble, NULL, measurements, rounds, control, pick_seed(seed), threads)
+  refine_until_checked(ensemble, NULL, measurements, rounds, control, pick_seed(seed), threads)$fit
 }
 
-# `result`: a calibration on the ensemble with its runs, if there is one already.
+# list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `result`: a calibration on
+# the ensemble with its runs, if there is one already.
 refine_until_checked <- function(ensemble, result, measurements, rounds, control, seed, threads) {
   runs_made <- 0
   calibrated <- function(calibration) {
@@ -43,10 +44,10 @@ refine_until_checked <- function(ensemble, result, measurements, rounds, control
     ensemble <- join_runs(ensemble, result$fit, result$made)
     result <- full <- calibrated(control$calibration)
   }
-  fit <- (full %||% result)$fit
-  fit$rounds <- round
-  fit$runs_made <- runs_made
-  fit
+  result <- full %||% result
+  result$fit$rounds <- round
+  result$fit$runs_made <- runs_made
+  c(list(ensemble = ensemble), result[c("fit", "made")])
 }
 
 refining_ais <- list(pilot_chains = 128, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, importance_draws = 300)

@@ -113,18 +113,15 @@ fit_runs <- function(ensemble, settings, calibration = settings$control$calibrat
 }
 
 # The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
-# draws tell how far its evidence is off, and correct it.
+# draws tell how far its evidence is off, correct it, and join them where it is too far.
 screen_model <- function(simulator, name, settings) {
   calibration <- as.list(settings$control$calibration)
   calibration$ais <- utils::modifyList(as.list(calibration$ais), as.list(settings$control$screening %||% upgrade_control$screening))
   if (is.null(calibration$check) || calibration$check > screening_runs) calibration$check <- calibration$exact <- screening_runs
   settings$keep(list("coarse", name, plain(simulator)), {
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
-    if (!identical(settings$calibrate, calibrate)) return(list(ensemble = ensemble, fit = fit_runs(ensemble, settings, calibration)))
-    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
-    screened <- calibrate_with_runs(emulator, settings$measurements, calibration, settings$seed, settings$threads)
-    screened$fit$rounds <- 0L
-    c(list(ensemble = ensemble), screened)
+    control <- list(emulator = settings$control$emulator, calibration = calibration)
+    refine_until_checked(ensemble, NULL, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads)
   })
 }
 
@@ -140,7 +137,7 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
     first <- first %||% screen_model(simulator, name, settings)
     fit <- if (isFALSE(first$fit$check$passed)) {
       control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
-      refine_until_checked(first$ensemble, first, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads)
+      refine_until_checked(first$ensemble, first, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads)$fit
     } else {
       fit_runs(if (more > 0) refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads) else first$ensemble, settings)
     }

@@ -22,7 +22,8 @@ test_that("what is hidden in 24 worlds is found", {
   worlds <- hidden_worlds(scope)
   expect_gte(nrow(worlds), 24)
   rows <- parallel::mclapply(seq_len(nrow(worlds)), function(i) {
-    scope$score_world(scope$draw_world(worlds$seed[i], worlds$kind[i], worlds$strength[i], worlds$days[i]), rivals = FALSE)
+    scope$score_world(scope$draw_world(worlds$seed[i], worlds$kind[i], worlds$strength[i], worlds$days[i]),
+                      control = list(max_steps = 1, calibration = list(ais = list(precision = 0.3))), rivals = FALSE)
   }, mc.cores = 2, mc.preschedule = FALSE)
   failed <- vapply(rows, inherits, NA, "try-error")
   expect_false(any(failed), info = paste(unlist(rows[failed]), collapse = "; "))

@@ -209,7 +209,8 @@ test_that("what is hidden in eight worlds of each family is found, and nothing e
     w <- worlds[i, ]
     fixed <- list(w$family, w$seed, kind = w$kind, strength = w$strength, days = w$days)
     if (!is.na(w$structure)) fixed$structure <- w$structure
-    scope$score_world(do.call(scope$family_world, fixed), runs = 80, rivals = FALSE)
+    control <- list(max_steps = 1, calibration = list(ais = list(precision = 0.3)))
+    scope$score_world(do.call(scope$family_world, fixed), control, runs = 80, rivals = FALSE)
   }, mc.cores = 2, mc.preschedule = FALSE)
   failed <- vapply(rows, inherits, NA, "try-error")
   expect_false(any(failed), info = paste(unlist(rows[failed]), collapse = "; "))
