@@ -272,7 +272,7 @@ figure_fit <- function(upgrade) {
 
 attribution_title <- function(attributions) {
   named <- lapply(attributions, function(a) significant_conditions(a$table))
-  if (length(named) < 2) return(paste("The error that no parameter can remove follows", listed(named[[1]], none = "no boundary condition")))
+  if (length(named) < 2) return(paste("The discrepancy of the model follows", listed(named[[1]], none = "no boundary condition")))
   if (!length(named[[1]]) && !length(named[[2]])) return("The remaining error follows no boundary condition, neither before nor after")
   sprintf("Before, the remaining error follows %s; after the change it follows %s", listed(named[[1]]), listed(named[[2]]))
 }
@@ -418,7 +418,7 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
     leading_layer(leading, table, panels) +
     ggplot2::facet_grid(panel ~ ., scales = "free_y", switch = "y") +
     stage_scales() +
-    figure_titles(discrepancy_title(table), paste0("Grey: measured - simulated. Coloured: the part that no parameter can reach and that answers to boundary conditions, with 95 % band.",
+    figure_titles(discrepancy_title(table), paste0("Grey: measured - simulated. Coloured: the discrepancy, which answers to boundary conditions, with 95 % band.",
                                                    if (!is.null(leading)) paste0(" Below: ", leading$name, ", which leads.")), x = time_label(table$time)) +
     time_axis(table$time) + figure_theme() + ggplot2::theme(legend.position = "none")
   with_height(figure, 1.8 + 1.9 * length(panels))

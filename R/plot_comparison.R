@@ -147,7 +147,7 @@ figure_discrepancies <- function(comparison) {
     transform(d$series, time = clock(d$series$time), part = d$segment)
   }), comparison)
   size <- vapply(split(table$discrepancy, table$model), function(d) sqrt(mean(d^2)), 0)
-  title <- sprintf("The error that no parameter can remove is least in %s: typically %s %s", names(size)[which.min(size)], short(min(size)), pretty_unit(m$unit))
+  title <- sprintf("The discrepancy is least in %s: typically %s %s", names(size)[which.min(size)], short(min(size)), pretty_unit(m$unit))
   labels <- stats::setNames(paste0(names(size), "\n", short(size), " ", pretty_unit(m$unit)), names(size))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, group = .data$part)) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
