@@ -122,7 +122,7 @@ sure_sentences <- function(upgrade) {
   trials <- first_trials(upgrade)
   best <- trials[1, ]
   needed <- sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no doubt who gains.", sub(" in favour", "", odds(upgrade$control$decisive)))
-  if (is.null(upgrade$named_cause)) {
+  if (!length(adopted_models(upgrade))) {
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed, trust_sentence(upgrade, best)))
   }
   later <- vapply(adopted_models(upgrade)[-1], function(m) {

@@ -268,11 +268,16 @@ stop_reason <- function(table, attribution, decisive) {
   if (length(significant)) paste0(tail, "; what answers to ", paste(significant, collapse = ", "), " remains unexplained") else paste0(tail, " and no boundary condition is significant")
 }
 
+# The first mechanism that is named or, if none is, likely; a stand-in is no cause.
 named_cause <- function(models, candidates, catalogue) {
-  if (length(models) < 2) return(NULL)
-  first <- models[[2]]$mechanism
-  own <- candidates[candidates$from == models[[1]]$name & candidates$mechanism == first, ]
-  list(mechanism = first, boundary = catalogue[[first]]$boundary, log10_bf = own$log10_bf, sentence = catalogue[[first]]$sentence)
+  adopted <- models[-1]
+  verdicts <- vapply(adopted, `[[`, "", "verdict")
+  first <- which(verdicts == if (any(verdicts == "named")) "named" else "likely")
+  if (!length(first)) return(NULL)
+  model <- adopted[[first[1]]]
+  own <- candidates[candidates$from == model$parent & candidates$mechanism == model$mechanism, ]
+  entry <- catalogue[[model$mechanism]]
+  list(mechanism = model$mechanism, boundary = entry$boundary, log10_bf = own$log10_bf, sentence = entry$sentence)
 }
 
 upgrade_gain <- function(models) {

@@ -19,7 +19,7 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
               attributed_condition = attributed, mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
               verdicts = mechanism_verdicts(upgrade, verdict$verdict), check_passed = check_passed(upgrade),
               verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
-              log10_bf = if (length(adopted)) upgrade$named_cause$log10_bf else max(upgrade$candidates$log10_bf),
+              log10_bf = max(upgrade$candidates$log10_bf[upgrade$candidates$from == upgrade$models[[1]]$name]),
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
               rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall)
   if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world), list(paper_condition = paper_condition(world, runs)))

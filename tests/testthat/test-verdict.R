@@ -186,3 +186,19 @@ test_that("the edge of a prior is where the interval ends and the median lies", 
   fit <- list(values = draws, weights = rep(1 / 500, 500), posterior = list(unit = draws))
   expect_identical(amiss:::edge_of_prior(fit), c(top = TRUE, bottom = TRUE, wide = FALSE, inside = FALSE))
 })
+
+test_that("a stand-in is no named cause, and what is named goes before what is likely", {
+  models <- function(...) {
+    adopted <- Map(function(name, verdict) list(parent = "base", mechanism = name, verdict = verdict),
+                   c("sun", "lag"), c(...))
+    c(list(list(name = "base")), unname(adopted))
+  }
+  candidates <- data.frame(from = "base", mechanism = c("sun", "lag"), log10_bf = c(5, 3))
+  entries <- list(sun = list(boundary = "Gv", sentence = "Sun."), lag = list(boundary = "P", sentence = "Lag."))
+  cause <- function(...) amiss:::named_cause(models(...), candidates, entries)
+  expect_null(cause("stand-in", "stand-in"))
+  expect_equal(cause("stand-in", "likely")[c("mechanism", "log10_bf")], list(mechanism = "lag", log10_bf = 3))
+  expect_equal(cause("likely", "named")$mechanism, "lag")
+  expect_equal(cause("named", "named")$boundary, "Gv")
+  expect_null(amiss:::named_cause(list(list(name = "base")), candidates, entries))
+})
