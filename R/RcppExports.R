@@ -17,8 +17,8 @@ train_emulator_ <- function(inputs, basis_list, control, context) {
     .Call(`_amiss_train_emulator_`, inputs, basis_list, control, context)
 }
 
-predict_emulator_ <- function(emulator, points) {
-    .Call(`_amiss_predict_emulator_`, emulator, points)
+predict_emulator_ <- function(emulator, normal) {
+    .Call(`_amiss_predict_emulator_`, emulator, normal)
 }
 
 filter_bank_ <- function(x, time_constants, time, new_segment) {
@@ -33,8 +33,12 @@ attribute_ <- function(data, priors, emulator_list, fit, control, context_list) 
     .Call(`_amiss_attribute_`, data, priors, emulator_list, fit, control, context_list)
 }
 
-run_likelihood_ <- function(data, priors, emulator_list, points, runs, context_list) {
-    .Call(`_amiss_run_likelihood_`, data, priors, emulator_list, points, runs, context_list)
+tangent_posterior_ <- function(data, priors, x0, run, slopes, draws, ais, context) {
+    .Call(`_amiss_tangent_posterior_`, data, priors, x0, run, slopes, draws, ais, context)
+}
+
+run_likelihood_ <- function(data, priors, points, runs, context_list) {
+    .Call(`_amiss_run_likelihood_`, data, priors, points, runs, context_list)
 }
 
 calibrate_paper_ <- function(data, priors, emulator_list, control, context_list) {

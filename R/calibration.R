@@ -115,7 +115,7 @@ filter_responses <- function(measurements, time_constants) {
 
 history_data <- function(emulator, measurements, rows, control) {
   responses <- filter_responses(measurements, control$time_constants)
-  list(y = measurements$y[rows], basis = emulator$basis$vectors, responses = responses[rows, , drop = FALSE],
+  list(y = measurements$y[rows], basis = emulator$basis$vectors, moves = simulator_moves(emulator), responses = responses[rows, , drop = FALSE],
        condition = rep(measurements$condition - 1L, each = length(control$time_constants)),
        time = measurements$hours[rows], new_segment = segment_starts(measurements, rows))
 }

@@ -15,17 +15,17 @@ discrepancy <- function(fit) {
   check_input(checkmate::check_multi_class(fit, c("amiss_calibration", "amiss_paper_calibration")), "fit")
   if (inherits(fit, "amiss_paper_calibration")) return(paper_discrepancy(fit))
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
-  draws <- lacking_response(fit, data$responses, data$basis)
+  draws <- lacking_response(fit, data$responses, data$moves)
   responses <- condition_responses(fit, data)
   colnames(responses) <- fit$measurements$conditions
   limits <- apply(draws, 1, stats::quantile, c(0.025, 0.975))
   new_discrepancy(fit, rowMeans(draws), limits[1, ], limits[2, ], responses)
 }
 
-# Response to the boundary conditions for each kept draw (rows x draws), given the filter bank and the basis at these rows.
-lacking_response <- function(fit, responses, basis) {
+# Response to the boundary conditions for each kept draw (rows x draws), given the filter bank and simulator_moves() at these rows.
+lacking_response <- function(fit, responses, moves) {
   phi <- sweep(sweep(responses, 2, fit$centre), 2, fit$scale, "/")
-  phi %*% fit$coefficients - basis %*% fit$withheld
+  phi %*% fit$coefficients - moves %*% fit$withheld
 }
 
 new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
@@ -74,7 +74,7 @@ conditional_variance <- function(x, basis, alpha, t2, lambda) {
 # Mean of the simulator's runs at posterior draws; by the emulator where there are none.
 simulated_mean <- function(fit) {
   if (!is.null(fit$check$mean)) return(fit$check$mean)
-  w <- predict_emulator_(fit$emulator$processes, posterior_unit(fit))$mean
+  w <- emulated_coefficients(fit$emulator, posterior_unit(fit))$mean
   as.numeric(fit$emulator$basis$vectors %*% crossprod(w, fit$weights))
 }
 

@@ -69,7 +69,7 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   threads <- check_threads(threads)
   basis <- call_engine(make_basis_(ensemble$outputs, c(control, noise_sd = noise_sd)))
   basis$discarded_sd <- discarded_sd(basis, ensemble$outputs)
-  trained <- call_engine(train_emulator_(ensemble$unit, basis, control, engine_context(1, threads)))
+  trained <- call_engine(train_emulator_(region_inputs(ensemble$region, ensemble$unit), basis, control, engine_context(1, threads)))
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   if (basis$discarded_rms > noise_sd && noise_sd > 0) {
     warn_result(c("The basis of {ncol(basis$vectors)} vectors leaves {signif(basis$discarded_rms, 3)} of the runs unexplained (RMS), more than the noise of {signif(noise_sd, 3)}.",
@@ -79,7 +79,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   selection$parameter <- names(ensemble$parameters)[selection$parameter]
   structure(list(format_version = format_version, parameters = ensemble$parameters, simulator = ensemble$simulator,
                  basis = basis[c("vectors", "singular_values", "explained", "discarded_rms", "discarded_ss", "discarded_sd")],
-                 processes = trained[c("inputs", "coefficients", "hyperparameters")],
+                 processes = c(trained[c("inputs", "coefficients", "hyperparameters")], list(region = ensemble$region)),
+                 unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
                  left_out = list(error = trained$coefficients - trained$loo_mean, variance = trained$loo_variance), selection = selection,
                  diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble), control = control,
                  noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
@@ -199,6 +200,24 @@ predict.amiss_emulator <- function(object, newdata, ...) {
     }
   }
   unit <- vapply(names(object$parameters), function(n) prior_cdf(object$parameters[[n]]$prior, newdata[, n]), numeric(nrow(newdata)))
-  w <- predict_emulator_(object$processes, matrix(unit, nrow(newdata)))
+  unit <- matrix(unit, nrow(newdata))
+  beyond <- which(!in_region(object$processes$region, unit))
+  if (length(beyond)) {
+    abort_input(c("Row {beyond[1]} of {.arg newdata} lies outside the region that the emulator was trained for.",
+                  i = "Use the emulator of the first ensemble, {.code $over_priors}, or run the simulator."))
+  }
+  w <- emulated_coefficients(object, unit)
   list(mean = tcrossprod(object$basis$vectors, w$mean), sd = sqrt(series_variance(object$basis, w$variance)))
+}
+
+# Mean and variance (points x Q) of the coefficients at points of the unit cube.
+emulated_coefficients <- function(emulator, unit) predict_emulator_(emulator$processes, to_normal(unit))
+
+# The emulator that knows how far the simulator can move under the priors: the first one, of a refined ensemble.
+emulator_over_priors <- function(emulator) emulator$over_priors %||% emulator
+
+# Root of the covariance that the output has under the priors (rows x r).
+simulator_moves <- function(emulator) {
+  wide <- emulator_over_priors(emulator)
+  wide$basis$vectors %*% wide$spread
 }

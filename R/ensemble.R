@@ -28,15 +28,18 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 
 #' More runs where they matter
 #'
-#' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say; in a corner of the
-#' priors the emulator can be off by more than it knows. This adds runs at draws from a first posterior, drawn apart by half
-#' about their mean so that they surround it.
+#' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an emulator
+#' of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior lies: the
+#' ellipsoid that holds it, in the coordinates in which the priors are standard normal. Its runs follow the
+#' axes of the ellipsoid, half as far again as the posterior spreads; runs of `ensemble` that lie inside join them. An emulator of them holds in the region
+#' alone, and there a few dozen runs do what hundreds spread over the priors cannot. Parameters outside count as
+#' impossible; if the posterior comes near the end of the region, the check of [calibrate()] says so.
 #'
-#' @param ensemble An ensemble made by [simulate_design()].
+#' @param ensemble An ensemble made by [simulate_design()], or by this.
 #' @param fit A calibration with the emulator trained on it ([calibrate()]).
 #' @param runs Number of runs to add.
 #' @inheritParams simulate_design
-#' @return The ensemble with the runs added. Train and calibrate anew.
+#' @return An ensemble with a `region`. Train and calibrate anew.
 #' @export
 refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
@@ -54,13 +57,31 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
     abort_input(c("{.arg fit} was made on {length(fit$rows)} rows, the runs of {.arg ensemble} have {nrow(ensemble$outputs)}.",
                   i = "Give the ensemble and the calibration of the same measurements."))
   }
-  drawn <- posterior_unit(fit)[systematic_draws(fit$weights, runs), , drop = FALSE]
-  centre <- colMeans(drawn)
-  unit <- pmin(pmax(sweep(1.5 * sweep(drawn, 2, centre), 2, centre, "+"), 0.001), 0.999)
+  regional_ensemble(ensemble, posterior_region(fit, if (isTRUE(fit$check$border > largest_border_share)) 1.5 else 1), fit, runs, threads)
+}
+
+# The ensemble of a region of the parameters' space; `fit` knows the emulator over the priors.
+regional_ensemble <- function(ensemble, region, fit, runs, threads) {
+  unit <- region_design(region, runs, ensemble$seed)
   values <- unit_to_values(unit, ensemble$parameters)
   outputs <- simulate_measured(ensemble$simulator, values, fit$measurements, "calibrate", threads)
+  # The last of the runs that lie inside: those of checks, where the posterior was seen last.
+  own <- utils::tail(which(in_region(region, ensemble$unit)), runs)
+  new_ensemble(ensemble$parameters, rbind(ensemble$unit[own, , drop = FALSE], unit), rbind(ensemble$values[own, , drop = FALSE], values),
+               cbind(ensemble$outputs[, own, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
+               without_simulator(emulator_over_priors(fit$emulator)))
+}
+
+# The ensemble with more runs, of its own region.
+join_runs <- function(ensemble, unit, values, outputs) {
   new_ensemble(ensemble$parameters, rbind(ensemble$unit, unit), rbind(ensemble$values, values), cbind(ensemble$outputs, outputs),
-               ensemble$simulator, ensemble$seed)
+               ensemble$simulator, ensemble$seed, ensemble$region, ensemble$over_priors)
+}
+
+# The simulator is kept once.
+without_simulator <- function(emulator) {
+  emulator["simulator"] <- list(NULL)
+  emulator
 }
 
 #' @rdname simulate_design
@@ -132,6 +153,7 @@ check_covered <- function(name, prior, values, unit, call = rlang::caller_env())
 # The parameters whose prior reaches further than the runs, or NULL. Of M points scattered over the prior, the range
 # holds a Beta(M - 1, 2) share of its mass: what happens to one design in a thousand, and leaves out a tenth, is told.
 uncovered_statement <- function(ensemble) {
+  if (!is.null(ensemble$region)) return(NULL)
   runs <- nrow(ensemble$unit)
   share <- apply(ensemble$unit, 2, function(u) diff(range(u)))
   little <- which(share < min(0.9, stats::qbeta(0.001, runs - 1, 2)))
@@ -156,7 +178,8 @@ unit_to_values <- function(unit, parameters) {
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
 }
 
-new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, call = rlang::caller_env()) {
+# `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do.
+new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL, over_priors = NULL, call = rlang::caller_env()) {
   failed <- which(colSums(!is.finite(outputs)) > 0)
   if (length(failed)) {
     left <- ncol(outputs) - length(failed)
@@ -172,12 +195,12 @@ new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, cal
     values <- values[-failed, , drop = FALSE]
   }
   structure(list(format_version = format_version, parameters = parameters, unit = unit, values = values, outputs = outputs,
-                 simulator = simulator, failed = length(failed), seed = seed), class = "amiss_ensemble")
+                 simulator = simulator, failed = length(failed), seed = seed, region = region, over_priors = over_priors), class = "amiss_ensemble")
 }
 
 #' @export
 print.amiss_ensemble <- function(x, ...) {
   cli::cli_text("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over {length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}")
-  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}", ">" = "next: {.fun train_emulator}"))
+  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}", if (!is.null(x$region)) c("*" = "in the region where a posterior lies"), ">" = "next: {.fun train_emulator}"))
   invisible(x)
 }

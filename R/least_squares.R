@@ -62,11 +62,11 @@ central_differences <- function(f, unit, lower, upper, step = 1e-3) {
 
 # The posterior draw or run of the design whose emulated error is least.
 start_of_search <- function(fit, lower, upper) {
-  unit <- rbind(posterior_unit(fit), fit$emulator$processes$inputs)
+  unit <- rbind(posterior_unit(fit), fit$emulator$unit)
   basis <- fit$emulator$basis$vectors
   norms <- colSums(basis^2)
   target <- as.numeric(crossprod(basis, fit$measurements$y[fit$rows])) / norms
-  distance <- sweep(predict_emulator_(fit$emulator$processes, unit)$mean, 2, target)^2 %*% norms
+  distance <- sweep(emulated_coefficients(fit$emulator, unit)$mean, 2, target)^2 %*% norms
   pmin(pmax(unit[which.min(distance), ], lower), upper)
 }
 

@@ -51,26 +51,27 @@ carried_response <- function(fit, use, threads) {
   m <- fit$measurements
   rows <- which(m$use %in% use & !is.na(m$y))
   responses <- filter_responses(m, fit$control$time_constants)
-  basis <- if (any(fit$withheld != 0)) basis_at(fit, use, threads) else matrix(0, length(rows), nrow(fit$withheld))
-  seen <- lacking_response(fit, responses[fit$rows, , drop = FALSE], fit$emulator$basis$vectors)
+  moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads) else matrix(0, length(rows), nrow(fit$withheld))
+  seen <- lacking_response(fit, responses[fit$rows, , drop = FALSE], simulator_moves(fit$emulator))
   left <- stats::residuals(fit) - rowMeans(seen)
-  list(response = lacking_response(fit, responses[rows, , drop = FALSE], basis),
+  list(response = lacking_response(fit, responses[rows, , drop = FALSE], moves),
        sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
 }
 
-# The basis vectors at other rows: the same combinations of the ensemble's runs, without those that fail there.
-basis_at <- function(fit, use, threads) {
-  emulator <- fit$emulator
+# simulator_moves() at other rows: the same combinations of the first ensemble's runs, without those that fail there.
+moves_at <- function(fit, use, threads) {
+  emulator <- emulator_over_priors(fit$emulator)
   w <- emulator$processes$coefficients
   last <- ncol(w)
-  values <- unit_to_values(emulator$processes$inputs, emulator$parameters)
-  runs <- suppress_run_warnings(simulate_measured(emulator$simulator, values, fit$measurements, use, threads))
+  values <- unit_to_values(emulator$unit, emulator$parameters)
+  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, fit$measurements, use, threads))
   made <- colSums(!is.finite(runs)) == 0
   if (sum(made) < last) {
     abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
   }
   own <- w[made, -last, drop = FALSE]
-  cbind(sweep(runs[, made, drop = FALSE], 2, w[made, last]) %*% own %*% solve(crossprod(own)), 1)
+  vectors <- cbind(sweep(runs[, made, drop = FALSE], 2, w[made, last]) %*% own %*% solve(crossprod(own)), 1)
+  vectors %*% emulator$spread
 }
 
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy

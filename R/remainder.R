@@ -72,14 +72,16 @@ calibration_residual <- function(model) {
   p$observed - p$mean
 }
 
-# Change of the simulated series with each parameter about the posterior mean, by central differences in the unit cube.
+# Change of the simulated series with each parameter about the posterior mean, by central differences in the unit cube,
+# within the posterior's own spread: the emulator may know no more.
 output_slopes <- function(fit, step = 0.02) {
   unit <- posterior_unit(fit)
+  step <- pmin(step, 0.5 / sqrt(diag(solve(stats::cov.wt(unit, fit$weights)$cov + diag(1e-10, ncol(unit))))))
   centre <- pmin(pmax(colSums(fit$weights * unit), step), 1 - step)
   steps <- diag(step, length(centre))
   series <- function(sign) {
-    w <- predict_emulator_(fit$emulator$processes, sweep(sign * steps, 2, centre, "+"))$mean
+    w <- emulated_coefficients(fit$emulator, sweep(sign * steps, 2, centre, "+"))$mean
     fit$emulator$basis$vectors %*% t(w)
   }
-  (series(1) - series(-1)) / (2 * step)
+  sweep(series(1) - series(-1), 2, 2 * step, "/")
 }

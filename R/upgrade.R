@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 3, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
+upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 4, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 500))
 
 #' The loop: show, name the cause, extend, measure
@@ -20,7 +20,7 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 3,
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
-#'   none), `rounds` (of refinement where the check by runs fails; 3), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#'   none), `rounds` (of refinement where the check by runs fails; 4), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
@@ -104,7 +104,8 @@ first_runs <- function(simulator, runs, settings) {
 # By calibrate() with refinements where its check by runs fails; calibrate_paper() has none.
 fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, rounds = settings$control$rounds) {
   if (identical(settings$calibrate, calibrate)) {
-    return(calibrate_refined(ensemble, settings$measurements, rounds %||% upgrade_control$rounds,
+    more <- refined_runs(settings)
+    return(calibrate_refined(ensemble, settings$measurements, rounds %||% upgrade_control$rounds, if (more > 0) more,
                              list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration)),
                              seed = settings$seed, threads = settings$threads))
   }
@@ -121,13 +122,14 @@ screen_model <- function(simulator, name, settings) {
   settings$keep(list("coarse", name, plain(simulator)), {
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
     control <- list(emulator = settings$control$emulator, calibration = calibration)
-    refine_until_checked(ensemble, NULL, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads)
+    refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
+                         runs = if (refined_runs(settings) > 0) refined_runs(settings))
   })
 }
 
 screening_runs <- 20
 
-refined_runs <- function(settings) round(settings$control$refine * settings$runs)
+refined_runs <- function(settings) round((settings$control$refine %||% upgrade_control$refine) * settings$runs)
 
 # The full calibration, with the remaining runs made where the coarse posterior lies. It keeps the coarse one's evidence.
 fit_fully <- function(simulator, name, settings, first = NULL) {
@@ -137,9 +139,10 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
     first <- first %||% screen_model(simulator, name, settings)
     fit <- if (isFALSE(first$fit$check$passed)) {
       control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
-      refine_until_checked(first$ensemble, first, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads)$fit
+      refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
+                           runs = if (more > 0) more, first = first)$fit
     } else {
-      fit_runs(if (more > 0) refine_ensemble(first$ensemble, first$fit, more, threads = settings$threads) else first$ensemble, settings)
+      fit_runs(if (more > 0) refine_ensemble(with_checked_runs(first), first$fit, more, threads = settings$threads) else first$ensemble, settings)
     }
     fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     fit

@@ -63,14 +63,14 @@ BEGIN_RCPP
 END_RCPP
 }
 // predict_emulator_
-Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& points);
-RcppExport SEXP _amiss_predict_emulator_(SEXP emulatorSEXP, SEXP pointsSEXP) {
+Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& normal);
+RcppExport SEXP _amiss_predict_emulator_(SEXP emulatorSEXP, SEXP normalSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator(emulatorSEXP);
-    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type points(pointsSEXP);
-    rcpp_result_gen = Rcpp::wrap(predict_emulator_(emulator, points));
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type normal(normalSEXP);
+    rcpp_result_gen = Rcpp::wrap(predict_emulator_(emulator, normal));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -119,19 +119,36 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
-// run_likelihood_
-Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& points, const Eigen::MatrixXd& runs, const Rcpp::List& context_list);
-RcppExport SEXP _amiss_run_likelihood_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP pointsSEXP, SEXP runsSEXP, SEXP context_listSEXP) {
+// tangent_posterior_
+Rcpp::List tangent_posterior_(const Rcpp::List& data, const Rcpp::List& priors, const Eigen::VectorXd& x0, const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes, int draws, const Rcpp::List& ais, const Rcpp::List& context);
+RcppExport SEXP _amiss_tangent_posterior_(SEXP dataSEXP, SEXP priorsSEXP, SEXP x0SEXP, SEXP runSEXP, SEXP slopesSEXP, SEXP drawsSEXP, SEXP aisSEXP, SEXP contextSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type x0(x0SEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type run(runSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type slopes(slopesSEXP);
+    Rcpp::traits::input_parameter< int >::type draws(drawsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type ais(aisSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
+    rcpp_result_gen = Rcpp::wrap(tangent_posterior_(data, priors, x0, run, slopes, draws, ais, context));
+    return rcpp_result_gen;
+END_RCPP
+}
+// run_likelihood_
+Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& points, const Eigen::MatrixXd& runs, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_run_likelihood_(SEXP dataSEXP, SEXP priorsSEXP, SEXP pointsSEXP, SEXP runsSEXP, SEXP context_listSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type points(pointsSEXP);
     Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type runs(runsSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
-    rcpp_result_gen = Rcpp::wrap(run_likelihood_(data, priors, emulator_list, points, runs, context_list));
+    rcpp_result_gen = Rcpp::wrap(run_likelihood_(data, priors, points, runs, context_list));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -216,7 +233,8 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 6},
-    {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 6},
+    {"_amiss_tangent_posterior_", (DL_FUNC) &_amiss_tangent_posterior_, 8},
+    {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
     {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},

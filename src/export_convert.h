@@ -33,9 +33,17 @@ inline AisOptions ais_options(const Rcpp::List& control) {
   return options;
 }
 
+// NULL: everywhere.
+inline Region region(const Rcpp::RObject& given) {
+  if (given.isNULL()) return Region();
+  const Rcpp::List list(given);
+  return Region(Rcpp::as<Eigen::VectorXd>(list["centre"]), Rcpp::as<Eigen::MatrixXd>(list["root"]),
+                Rcpp::as<double>(list["radius"]));
+}
+
 inline EmulatorState emulator_state(const Rcpp::List& emulator) {
   return {Rcpp::as<Eigen::MatrixXd>(emulator["inputs"]), Rcpp::as<Eigen::MatrixXd>(emulator["coefficients"]),
-          Rcpp::as<Eigen::MatrixXd>(emulator["hyperparameters"])};
+          Rcpp::as<Eigen::MatrixXd>(emulator["hyperparameters"]), region(emulator["region"])};
 }
 
 inline Rcpp::List ais_list(const AisResult& result) {

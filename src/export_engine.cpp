@@ -6,6 +6,7 @@
 #include "engine/attribution/Attribution.hpp"
 #include "engine/basis/Basis.hpp"
 #include "engine/calibration/Calibration.hpp"
+#include "engine/calibration/TangentPosterior.hpp"
 #include "engine/discrepancy/FilterBank.hpp"
 #include "engine/discrepancy/HistoryModel.hpp"
 #include "engine/emulator/Emulator.hpp"
@@ -23,6 +24,7 @@ HistoryData make_history_data(const Rcpp::List& data) {
   HistoryData history;
   history.y = Rcpp::as<VectorXd>(data["y"]);
   history.basis = Rcpp::as<MatrixXd>(data["basis"]);
+  history.moves = Rcpp::as<MatrixXd>(data["moves"]);
   history.responses = Rcpp::as<MatrixXd>(data["responses"]);
   history.condition = Rcpp::as<std::vector<int>>(data["condition"]);
   history.axis =
@@ -149,14 +151,15 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
   return Rcpp::List::create(_["inputs"] = state.inputs, _["coefficients"] = state.coefficients,
                             _["hyperparameters"] = state.parameters, _["loo_mean"] = mean,
                             _["loo_variance"] = variance, _["widened"] = emulator.widened(),
+                            _["spread"] = over_region(emulator).root,
                             _["evaluations"] = emulator.evaluations(),
                             _["selection"] = selection_table(emulator));
 }
 
 // [[Rcpp::export]]
-Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& points) {
+Rcpp::List predict_emulator_(const Rcpp::List& emulator, const Eigen::MatrixXd& normal) {
   MatrixXd mean, variance;
-  Emulator(convert::emulator_state(emulator)).predict(points, mean, variance);
+  Emulator(convert::emulator_state(emulator)).predict_at(normal.transpose(), mean, variance);
   return Rcpp::List::create(Rcpp::_["mean"] = mean, Rcpp::_["variance"] = variance);
 }
 
@@ -174,8 +177,7 @@ Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
                       const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
   const Emulator emulator(convert::emulator_state(emulator_list));
-  const HistoryModel model =
-      history_model(make_history_data(data), make_history_priors(priors), emulator, context);
+  const HistoryModel model(make_history_data(data), make_history_priors(priors), context);
   const CalibrationOptions options{convert::ais_options(control["ais"]),
                                    Rcpp::as<int>(control["error_draws"])};
   const Calibration result = calibrate(model, emulator, options, context);
@@ -196,8 +198,7 @@ Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
                       const Rcpp::List& fit, const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
   const Emulator emulator(convert::emulator_state(emulator_list));
-  const HistoryModel model =
-      history_model(make_history_data(data), make_history_priors(priors), emulator, context);
+  const HistoryModel model(make_history_data(data), make_history_priors(priors), context);
   const Rcpp::List posterior = fit["posterior"];
   Calibration calibration;
   calibration.posterior = convert::ais_summary(posterior);
@@ -216,15 +217,26 @@ Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
                             _["null_statistics"] = result.test.null_statistics, _["shares"] = result.shares);
 }
 
+// The posterior under the line that touches the simulator at x0.
+// [[Rcpp::export]]
+Rcpp::List tangent_posterior_(const Rcpp::List& data, const Rcpp::List& priors, const Eigen::VectorXd& x0,
+                              const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes, int draws,
+                              const Rcpp::List& ais, const Rcpp::List& context) {
+  const TangentPosterior result =
+      tangent_posterior(make_history_data(data), make_history_priors(priors), x0, run, slopes, draws,
+                        convert::ais_options(ais), convert::context(context));
+  Rcpp::List out = Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
+  const Eigen::Index conditions = result.history.front().t.size();
+  add_points(out, result.history, static_cast<int>(conditions));
+  return out;
+}
+
 // Log-likelihood of runs of the simulator itself (N x n), each at its point of the history posterior.
 // [[Rcpp::export]]
-Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors,
-                                const Rcpp::List& emulator_list, const Rcpp::List& points,
+Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& points,
                                 const Eigen::MatrixXd& runs, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const Emulator emulator(convert::emulator_state(emulator_list));
-  const std::vector<HistoryParameters> at = make_points(points);
-  return history_model(make_history_data(data), make_history_priors(priors), emulator, context,
-                       Rcpp::as<std::vector<int>>(points["setting"]))
-      .log_likelihood_of_runs(at, runs, context);
+  return HistoryModel(make_history_data(data), make_history_priors(priors), context,
+                      Rcpp::as<std::vector<int>>(points["setting"]))
+      .log_likelihood_of_runs(make_points(points), runs, context);
 }

@@ -87,13 +87,16 @@ AnnealedRun::Group AnnealedRun::run_group(Stream stream, const Context& context)
       group.log_evidence += log_mean_exp(group.chains.log_w);
       group.chains.resample(stream);
     }
-    double accepted = 0.0;
+    const std::vector<PartMove>& parts = levels_[k].parts;
+    VectorXd accepted = VectorXd::Zero(static_cast<Index>(parts.size()));
     for (int sweep = 0; sweep < levels_[k].sweeps; ++sweep) {
-      accepted += crank_nicolson_move(path_, group.chains, levels_[k], stream, context);
+      for (std::size_t p = 0; p < parts.size(); ++p)
+        accepted[static_cast<Index>(p)] +=
+            crank_nicolson_move(path_, group.chains, levels_[k].beta, parts[p], stream, context);
       if (hamiltonian(path_.target, options_))
         hamiltonian_move(path_, group.chains, levels_[k], stream, context);
     }
-    group.acceptance[k] = accepted / levels_[k].sweeps;
+    group.acceptance[k] = accepted.minCoeff() / levels_[k].sweeps;
   }
   group.log_evidence += log_mean_exp(group.chains.log_w);
   return group;
@@ -156,7 +159,7 @@ void AnnealedRun::gather(MatrixXd& x, VectorXd& ll, VectorXd& weights) const {
 std::vector<Temperature> AnnealedRun::ladder() const {
   std::vector<Temperature> ladder;
   for (std::size_t k = 0; k < levels_.size(); ++k) {
-    Temperature temperature{levels_[k].beta, levels_[k].step, levels_[k].sweeps, 0.0, 0.0};
+    Temperature temperature{levels_[k].beta, levels_[k].parts.back().step, levels_[k].sweeps, 0.0, 0.0};
     for (const Group& group : groups_) {
       temperature.acceptance += group.acceptance[static_cast<Index>(k)] / size();
       temperature.ess += group.ess[static_cast<Index>(k)] / size();

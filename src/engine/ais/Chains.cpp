@@ -51,25 +51,30 @@ void Chains::resample(Stream& stream) {
   log_w.setZero();
 }
 
-double crank_nicolson_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
-                           const Context& context) {
+double crank_nicolson_move(const AnnealingPath& path, Chains& chains, double beta, const PartMove& part,
+                           Stream& stream, const Context& context) {
   const Index n = chains.size();
-  MatrixXd proposed(chains.x.rows(), n);
-  for (Index i = 0; i < n; ++i) proposed.col(i) = level.proposal.step(chains.x.col(i), level.step, stream);
+  MatrixXd proposed = chains.x;
+  VectorXd back(n);  // log density of the proposal at the chain over that at the point proposed
+  for (Index i = 0; i < n; ++i) {
+    const VectorXd from = part.bend.straight(chains.x.col(i).segment(part.first, part.size));
+    const VectorXd to = part.proposal.step(from, part.step, stream);
+    proposed.col(i).segment(part.first, part.size) = part.bend.bent(to);
+    back[i] = part.proposal.log_density(from) - part.proposal.log_density(to);
+  }
   VectorXd at_chain(n), at_proposed(n), prior_over(n);
   const VectorXd ll = evaluate(path.target, proposed, context, [&](Index i) {
-    const VectorXd from = chains.x.col(i), to = proposed.col(i);
-    const double reference = path.reference.log_density(to);
-    prior_over[i] = StandardNormal::log_density_at(to) - reference;
-    at_chain[i] = path.reference.log_density(from) - level.proposal.log_density(from);
-    at_proposed[i] = reference - level.proposal.log_density(to);
+    const VectorXd to = proposed.col(i);
+    at_chain[i] = path.reference.log_density(chains.x.col(i));
+    at_proposed[i] = path.reference.log_density(to);
+    prior_over[i] = StandardNormal::log_density_at(to) - at_proposed[i];
   });
   int accepted = 0;
   for (Index i = 0; i < n; ++i) {
     const double log_u = std::log(stream.uniform());
     if (!std::isfinite(ll[i])) continue;
     const double rise = ll[i] + prior_over[i];
-    if (log_u < level.beta * (rise - chains.rise[i]) + at_proposed[i] - at_chain[i]) {
+    if (log_u < beta * (rise - chains.rise[i]) + at_proposed[i] - at_chain[i] + back[i]) {
       chains.x.col(i) = proposed.col(i);
       chains.ll[i] = ll[i];
       chains.rise[i] = rise;
@@ -86,7 +91,7 @@ bool hamiltonian(const Target& target, const AisOptions& options) {
 double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                         const Context& context) {
   const Index n = chains.size(), d = chains.x.rows();
-  const auto root = level.proposal.root().triangularView<Eigen::Lower>();
+  const auto root = level.metric.root().triangularView<Eigen::Lower>();
   MatrixXd x = chains.x, slope(d, n), momentum = stream.normals(d, n);
   VectorXd ll, prior_over(n), rise(n);
   const auto force = [&] {  // L' gradient of the log density at this temperature
@@ -124,7 +129,8 @@ double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& 
 }
 
 int sweep_cost(const Target& target, const AisOptions& options) {
-  return hamiltonian(target, options) ? 2 + kLeapfrogs : 1;
+  const int parts = static_cast<int>(target.parts().size());
+  return hamiltonian(target, options) ? parts + 1 + kLeapfrogs : parts;
 }
 
 }  // namespace amiss

@@ -2,6 +2,7 @@
 #include "engine/Context.hpp"
 #include "engine/ais/AisOptions.hpp"
 #include "engine/ais/AnnealingPath.hpp"
+#include "engine/ais/BentMap.hpp"
 #include "engine/ais/StudentT.hpp"
 
 namespace amiss {
@@ -24,29 +25,39 @@ struct Chains {
   void resample(Stream& stream);
 };
 
+/// How chains move in one part of the coordinates: by steps that leave a Student t invariant, in coordinates
+/// in which the part is straight.
+struct PartMove {
+  Eigen::Index first, size;
+  BentMap bend;
+  StudentT proposal;
+  double step;
+};
+
 /// One temperature of the ladder, and how chains move there.
 struct Level {
   double beta;  ///< inverse temperature
-  StudentT proposal;
-  double step;
+  std::vector<PartMove> parts;
+  StudentT metric;  ///< of Hamiltonian moves
   double hamiltonian_step;
-  int sweeps;  ///< moves of every chain
+  int sweeps;  ///< moves of every chain in every part
 };
 
-/// One Crank-Nicolson move of every chain, reversible in the level's proposal; returns the share accepted.
-double crank_nicolson_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
-                           const Context& context);
+/// One Crank-Nicolson move of every chain in one part, reversible in its proposal; returns the share
+/// accepted.
+double crank_nicolson_move(const AnnealingPath& path, Chains& chains, double beta, const PartMove& part,
+                           Stream& stream, const Context& context);
 
 /// Whether chains make Hamiltonian moves too.
 bool hamiltonian(const Target& target, const AisOptions& options);
 
-/// One Hamiltonian move of every chain: leapfrog steps in the coordinates in which the proposal's scale is
-/// the identity (Neal 2011); returns the share accepted.
+/// One Hamiltonian move of every chain: leapfrog steps in the coordinates in which the metric's scale is the
+/// identity (Neal 2011); returns the share accepted.
 double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                         const Context& context);
 
-/// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move and, where there is a gradient, a
-/// Hamiltonian one.
+/// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move in each part and, where there is a
+/// gradient, a Hamiltonian one.
 int sweep_cost(const Target& target, const AisOptions& options);
 
 }  // namespace amiss

@@ -11,6 +11,7 @@
 namespace amiss {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -53,6 +54,13 @@ VectorXd ranks(const VectorXd& values) {
   return rank / rank.norm();
 }
 
+PartMove part_move(const MatrixXd& x, const VectorXd& weights, Index first, double step) {
+  const BentMap bend = BentMap::fit(x, weights);
+  MatrixXd z(x.rows(), x.cols());
+  for (Index i = 0; i < x.cols(); ++i) z.col(i) = bend.straight(x.col(i));
+  return {first, x.rows(), bend, StudentT::fit(z, weights, kMoveDof), step};
+}
+
 // Moves the chains, tuning the step, until their likelihoods have forgotten where they began. The first sweep
 // is still far from the right step and is not counted.
 void tune(const AnnealingPath& path, const AisOptions& options, Chains& chains, Level& level, Stream& stream,
@@ -62,8 +70,10 @@ void tune(const AnnealingPath& path, const AisOptions& options, Chains& chains, 
     if (level.sweeps >= options.sweeps && before.dot(ranks(chains.ll)) < kMemory) return;
     const int repeats = level.sweeps == 0 ? 2 : 1;
     for (int i = 0; i < repeats; ++i) {
-      const double accepted = crank_nicolson_move(path, chains, level, stream, context);
-      level.step = std::min(1.0, std::max(0.003, level.step * std::exp(accepted - kAcceptance)));
+      for (PartMove& part : level.parts) {
+        const double accepted = crank_nicolson_move(path, chains, level.beta, part, stream, context);
+        part.step = std::min(1.0, std::max(0.003, part.step * std::exp(accepted - kAcceptance)));
+      }
       if (!hamiltonian(path.target, options)) continue;
       const double moved = hamiltonian_move(path, chains, level, stream, context);
       level.hamiltonian_step =
@@ -81,7 +91,9 @@ Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context
   evaluations = options.pilot_chains;
   if (!std::isfinite(chains.ll.maxCoeff()))
     throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
-  double beta = 0.0, step = 0.8, hamiltonian_step = 0.5;
+  double beta = 0.0, hamiltonian_step = 0.5;
+  const std::vector<Index> parts = path.target.parts();
+  std::vector<double> steps(parts.size(), 0.8);
   while (beta < 1.0) {
     if (context.poll) context.poll();
     if (static_cast<int>(levels.size()) >= options.max_temperatures)
@@ -89,12 +101,18 @@ Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context
     const double next = next_beta(chains, beta, options.ess_drop);
     chains.log_w += chains.rise * (next - beta);
     beta = next;
-    levels.push_back(
-        {beta, StudentT::fit(chains.x, normalised_exp(chains.log_w), kMoveDof), step, hamiltonian_step, 0});
+    const VectorXd weights = normalised_exp(chains.log_w);
+    Level level{beta, {}, StudentT::fit(chains.x, weights, kMoveDof), hamiltonian_step, 0};
+    Index first = 0;
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      level.parts.push_back(part_move(chains.x.middleRows(first, parts[k]), weights, first, steps[k]));
+      first += parts[k];
+    }
+    levels.push_back(std::move(level));
     chains.resample(stream);
     tune(path, options, chains, levels.back(), stream, context);
     evaluations += chains.size() * (levels.back().sweeps + 1) * sweep_cost(path.target, options);
-    step = levels.back().step;
+    for (std::size_t k = 0; k < parts.size(); ++k) steps[k] = levels.back().parts[k].step;
     hamiltonian_step = levels.back().hamiltonian_step;
   }
 }

@@ -58,8 +58,17 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
     return;
   }
   AnnealedRun bridged({target, mixture}, options, context, kBridged);
-  const bool shorter = bridged.price() < annealed.price();
+  bool shorter = bridged.price() < annealed.price();
   (shorter ? bridged : annealed).refine();
+  // An estimate above the one to be reported may have seen what that one missed, or be loose: it is made
+  // precise, and the higher one stands.
+  AnnealedRun& own = shorter ? bridged : annealed;
+  AnnealedRun& other = shorter ? annealed : bridged;
+  if (other.log_evidence() > own.log_evidence() + 2.0 * std::max(own.spread().se, options.precision)) {
+    other.refine();
+    if (other.log_evidence() > own.log_evidence() + 2.0 * std::hypot(own.spread().se, other.spread().se))
+      shorter = !shorter;
+  }
   result.evaluations += bridged.evaluations();
   result.second = bridged.log_evidence();
   result.second_se = bridged.spread().se;

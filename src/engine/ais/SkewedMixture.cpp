@@ -102,21 +102,31 @@ VectorXd SkewMap::slope(const VectorXd& x) const {
 
 SkewedMixture SkewedMixture::fit(const MatrixXd& x, const VectorXd& weights, int max_components, double dof,
                                  Stream& stream) {
+  BentMap bend;
   SkewMap map;
-  if (1.0 / weights.squaredNorm() >= kLeastPoints) map = SkewMap::fit(x, weights);
-  MatrixXd z(x.rows(), x.cols());
-  for (Index i = 0; i < x.cols(); ++i) z.col(i) = map.even(x.col(i));
-  return SkewedMixture(std::move(map), StudentTMixture::fit(z, weights, max_components, dof, stream));
+  MatrixXd z = x;
+  if (1.0 / weights.squaredNorm() >= kLeastPoints) {
+    bend = BentMap::fit(x, weights);
+    for (Index i = 0; i < x.cols(); ++i) z.col(i) = bend.straight(x.col(i));
+    map = SkewMap::fit(z, weights);
+    for (Index i = 0; i < x.cols(); ++i) z.col(i) = map.even(z.col(i));
+  }
+  return SkewedMixture(std::move(bend), std::move(map),
+                       StudentTMixture::fit(z, weights, max_components, dof, stream));
 }
 
 double SkewedMixture::log_density(const VectorXd& x) const {
-  return mixture_.log_density(map_.even(x)) + map_.slope(x).array().log().sum();
+  const VectorXd z = bend_.straight(x);
+  return mixture_.log_density(map_.even(z)) + map_.slope(z).array().log().sum();
 }
 
 VectorXd SkewedMixture::gradient(const VectorXd& x) const {
-  return map_.slope(x).cwiseProduct(mixture_.gradient(map_.even(x)));
+  const VectorXd z = bend_.straight(x);
+  return bend_.gradient(x, map_.slope(z).cwiseProduct(mixture_.gradient(map_.even(z))));
 }
 
-VectorXd SkewedMixture::draw(Stream& stream) const { return map_.skewed(mixture_.draw(stream)); }
+VectorXd SkewedMixture::draw(Stream& stream) const { 
+  return bend_.bent(map_.skewed(mixture_.draw(stream)));
+}
 
 }  // namespace amiss

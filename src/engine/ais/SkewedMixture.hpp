@@ -1,4 +1,5 @@
 #pragma once
+#include "engine/ais/BentMap.hpp"
 #include "engine/ais/StudentT.hpp"
 
 namespace amiss {
@@ -23,13 +24,15 @@ class SkewMap {
   Eigen::VectorXd even_knots_;
 };
 
-/// A mixture of Student t's in coordinates made even: for posteriors that a prior limits on one side, which
-/// no elliptic distribution comes close to.
+/// A mixture of Student t's in coordinates straightened and made even: for posteriors about a curved ridge,
+/// or that a prior limits on one side, which no elliptic distribution comes close to.
 class SkewedMixture : public Distribution {
  public:
   SkewedMixture(SkewMap map, StudentTMixture mixture) : map_(std::move(map)), mixture_(std::move(mixture)) {}
+  SkewedMixture(BentMap bend, SkewMap map, StudentTMixture mixture)
+      : bend_(std::move(bend)), map_(std::move(map)), mixture_(std::move(mixture)) {}
 
-  /// As StudentTMixture::fit(), after SkewMap::fit().
+  /// As StudentTMixture::fit(), after BentMap::fit() and SkewMap::fit().
   static SkewedMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components,
                            double dof, Stream& stream);
 
@@ -38,6 +41,7 @@ class SkewedMixture : public Distribution {
   Eigen::VectorXd draw(Stream& stream) const override;
 
  private:
+  BentMap bend_;
   SkewMap map_;
   StudentTMixture mixture_;
 };

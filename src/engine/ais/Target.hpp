@@ -1,4 +1,6 @@
 #pragma once
+#include <vector>
+
 #include "engine/linalg/Eigen.hpp"
 
 namespace amiss {
@@ -13,6 +15,10 @@ class Target {
   /// Log-likelihood of each column of x (dimension x n). Called from several threads at once. A value that is
   /// not finite counts as likelihood zero.
   virtual Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const = 0;
+
+  /// Sizes of the parts, one after the other, in which the coordinates are moved: those of a part together,
+  /// the parts in turn.
+  virtual std::vector<Eigen::Index> parts() const { return {dimension()}; }
 
   /// How many points are asked for at once, at most; several such blocks share the threads.
   virtual Eigen::Index block() const { return 16; }

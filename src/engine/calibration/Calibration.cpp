@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 namespace {
 
 enum Purpose : std::uint64_t { kFirstHistory, kSecondHistory, kPopulation, kPosterior };
-enum StreamPurpose : std::uint64_t { kPriorPoints = 61, kModes, kMixture, kCloser };
+enum StreamPurpose : std::uint64_t { kModes = 62, kMixture, kCloser };
 
 // How error and discrepancy are sampled under a Gaussian simulator, and at how many of the draws the modes of
 // the parameters are sought.
@@ -33,8 +33,7 @@ struct StartOptions {
 const StartOptions kRoughStart{64, 0.3, 3, 2, {128, 3}};
 const StartOptions kStart{96, 0.5, 5, 2, {64, 3}};  // for each reach
 constexpr double kReferenceDof = 8.0;
-constexpr Index kRoundDraws = 25;         // that bring the reference closer, each round, per coordinate
-constexpr std::uint64_t kPriorSeed = 20;  // the spread of the simulator is part of the model, not of a run
+constexpr Index kRoundDraws = 100;  // that bring the reference closer, each round, per coordinate
 
 // n draws of equal weight, evenly spread over weighted ones.
 std::vector<Index> spread_draws(const VectorXd& weights, int n) {
@@ -80,7 +79,7 @@ Start start_from(const CalibrationTarget& target, const GaussianSimulator& simul
 CloserReference closer_reference(const CalibrationTarget& target, const AisOptions& options,
                                  const Context& context, long& evaluations) {
   const Emulator& emulator = target.emulator();
-  const GaussianSimulator first = over_priors(emulator, Stream(kPriorSeed, kPriorPoints, 0));
+  const GaussianSimulator first = over_region(emulator);
   const Start rough = start_from(target, first, -1, kRoughStart, options, context.fork(kFirstHistory));
   evaluations += rough.modes.evaluations;
   const GaussianSimulator tangent = tangent_at(emulator, rough.modes.best);
@@ -100,12 +99,6 @@ CloserReference closer_reference(const CalibrationTarget& target, const AisOptio
 }
 
 }  // namespace
-
-HistoryModel history_model(HistoryData data, HistoryPriors priors, const Emulator& emulator,
-                           const Context& context, const std::vector<int>& only) {
-  data.spread = over_priors(emulator, Stream(kPriorSeed, kPriorPoints, 0)).root;
-  return HistoryModel(std::move(data), std::move(priors), context, only);
-}
 
 AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& options,
                            const Context& context) {
@@ -144,11 +137,12 @@ Calibration calibrate(const HistoryModel& model, const Emulator& emulator, const
   }
   out.kept = spread_draws(posterior.weights, options.kept);
   MatrixXd mean, variance;
-  MatrixXd points(options.kept, out.unit.cols());
-  for (int k = 0; k < options.kept; ++k) points.row(k) = out.unit.row(out.kept[static_cast<std::size_t>(k)]);
-  emulator.predict(points, mean, variance);
+  MatrixXd points(out.unit.cols(), options.kept);
+  for (int k = 0; k < options.kept; ++k)
+    points.col(k) = posterior.draws.col(out.kept[static_cast<std::size_t>(k)]).tail(points.rows());
+  emulator.predict_at(points, mean, variance);
   out.coefficients.resize(model.data().responses.cols(), options.kept);
-  out.withheld.resize(model.data().basis.cols(), options.kept);
+  out.withheld.resize(model.data().moves.cols(), options.kept);
   std::vector<MatrixXd> held(model.priors().reach.size());  // of each reach that is met
   for (int k = 0; k < options.kept; ++k) {
     const HistoryParameters& point =

@@ -17,16 +17,12 @@ struct Calibration {
   Eigen::MatrixXd unit;                    ///< draws x P: parameters in the unit cube
   std::vector<Eigen::Index> kept;          ///< draws of equal weight, spread over the posterior
   Eigen::MatrixXd coefficients;            ///< p x kept: posterior mean coefficients b of the filter columns
-  /// Q x kept: coefficients of what the reach takes out. The discrepancy of a kept draw is
-  /// Psi b = Phi b - K withheld.
+  /// r x kept: coefficients of what the reach takes out. The discrepancy of a kept draw is
+  /// Psi b = Phi b - E withheld.
   Eigen::MatrixXd withheld;
   Eigen::VectorXd reach;      ///< posterior probability of each reach of the grid
   GaussianSimulator tangent;  ///< the simulator as the line that touches it at the posterior's centre
 };
-
-/// The history model of a record with what the emulator says of how far its simulator can move.
-HistoryModel history_model(HistoryData data, HistoryPriors priors, const Emulator& emulator,
-                           const Context& context, const std::vector<int>& only = {});
 
 /// Samples the joint posterior. It is annealed from where error and discrepancy lie when the simulator is a
 /// Gaussian (first over the priors, then about the mode that this leads to), times the modes of the

@@ -1,5 +1,6 @@
 #include "engine/calibration/CalibrationTarget.hpp"
 
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -23,12 +24,15 @@ MatrixXd CalibrationTarget::unit(const MatrixXd& x) const {
 }
 
 VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {
+  const MatrixXd parameters = x.bottomRows(emulator_.n_inputs());
   MatrixXd mean, variance;
-  emulator_.predict(unit(x), mean, variance);
+  emulator_.predict_at(parameters, mean, variance);
   VectorXd values(x.cols());
-  for (Index i = 0; i < x.cols(); ++i)
-    values[i] =
-        model().log_likelihood(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose());
+  for (Index i = 0; i < x.cols(); ++i) {
+    values[i] = emulator_.region().contains(parameters.col(i))
+                    ? model().log_likelihood(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose())
+                    : -std::numeric_limits<double>::infinity();
+  }
   return values;
 }
 

@@ -7,7 +7,8 @@ namespace amiss {
 
 /// Joint posterior of error, discrepancy and parameters, given the record: y as HistoryModel has it, its
 /// coefficients those of the emulator, w ~ N(w'(z), S(z)). Coordinates: those of the history, then one for
-/// each parameter, u = Phi(x). The normalising constant is the evidence of the model, a density of y.
+/// each parameter, u = Phi(x). The normalising constant is the evidence of the model, a density of y. Outside
+/// the region of the emulator the record counts as impossible.
 class CalibrationTarget : public Target {
  public:
   /// @param active  conditions that may drive the discrepancy.
@@ -15,6 +16,8 @@ class CalibrationTarget : public Target {
 
   Eigen::Index dimension() const override { return history_.dimension() + emulator_.n_inputs(); }
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
+  /// Error and discrepancy; the parameters.
+  std::vector<Eigen::Index> parts() const override { return {history_.dimension(), emulator_.n_inputs()}; }
 
   HistoryParameters history(const Eigen::VectorXd& x) const {
     return history_.parameters(x.head(history_.dimension()));

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "engine/random/transform.hpp"
+#include "engine/random/Stream.hpp"
 
 namespace amiss {
 
@@ -13,6 +13,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr Index kPoints = 512;
+constexpr std::uint64_t kSeed = 20, kPurpose = 61;
 constexpr double kDifference = 3e-3;  // in standard deviations of the prior
 
 // A square root R R' = covariance. The coefficients differ by orders of magnitude: that of the correlation is
@@ -28,10 +29,10 @@ MatrixXd root_of(const MatrixXd& covariance) {
 
 }  // namespace
 
-GaussianSimulator over_priors(const Emulator& emulator, Stream stream) {
-  const MatrixXd x = stream.normals(emulator.n_inputs(), kPoints);
+GaussianSimulator over_region(const Emulator& emulator) {
+  Stream stream(kSeed, kPurpose, 0);
   MatrixXd mean, variance;
-  emulator.predict(x.transpose().unaryExpr(&normal_cdf), mean, variance);
+  emulator.predict_at(emulator.region().place(stream.normals(emulator.n_inputs(), kPoints)), mean, variance);
   GaussianSimulator simulator;
   simulator.mean = mean.colwise().mean().transpose();
   mean.rowwise() -= simulator.mean.transpose();
@@ -47,7 +48,7 @@ Expansion expand(const Emulator& emulator, const VectorXd& x0) {
   points.colwise() = x0;
   points.leftCols(d).diagonal().array() += kDifference;
   points.middleCols(d, d).diagonal().array() -= kDifference;
-  emulator.predict(points.transpose().unaryExpr(&normal_cdf), mean, variance);
+  emulator.predict_at(points, mean, variance);
   return {mean.row(2 * d).transpose(), variance.row(2 * d).transpose(),
           (mean.topRows(d) - mean.middleRows(d, d)).transpose() / (2.0 * kDifference)};
 }

@@ -60,7 +60,7 @@ MatrixXd PaperCalibrationTarget::lambda(const MatrixXd& x) const {
 
 VectorXd PaperCalibrationTarget::log_likelihood(const MatrixXd& x) const {
   MatrixXd mean, variance;
-  emulator_.predict(unit(x), mean, variance);
+  emulator_.predict_at(x.topRows(emulator_.n_inputs()), mean, variance);
   const MatrixXd precision = lambda(x);
   VectorXd values(x.cols());
   for (Index i = 0; i < x.cols(); ++i) {

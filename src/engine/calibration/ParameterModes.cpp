@@ -8,7 +8,6 @@
 #include "engine/calibration/Linearisation.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/parallel_for.hpp"
-#include "engine/random/transform.hpp"
 
 namespace amiss {
 
@@ -36,11 +35,14 @@ class Conditional {
 
   VectorXd log_density(const MatrixXd& x) const {
     MatrixXd mean, variance;
-    emulator_.predict(x.transpose().unaryExpr(&normal_cdf), mean, variance);
+    emulator_.predict_at(x, mean, variance);
     evaluations_ += x.cols();
     VectorXd values(x.cols());
-    for (Index i = 0; i < x.cols(); ++i)
-      values[i] = likelihood_.log_density(mean.row(i), variance.row(i)) - 0.5 * x.col(i).squaredNorm();
+    for (Index i = 0; i < x.cols(); ++i) {
+      values[i] = emulator_.region().contains(x.col(i))
+                      ? likelihood_.log_density(mean.row(i), variance.row(i)) - 0.5 * x.col(i).squaredNorm()
+                      : -std::numeric_limits<double>::infinity();
+    }
     return values;
   }
 
@@ -129,7 +131,8 @@ std::vector<Mode> find_modes(const CalibrationTarget& target, const HistoryParam
 
 ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
                                const ModeOptions& options, const Context& context, Stream& stream) {
-  const MatrixXd starts = stream.normals(target.emulator().n_inputs(), options.starts);
+  const Emulator& emulator = target.emulator();
+  const MatrixXd starts = emulator.region().place(stream.normals(emulator.n_inputs(), options.starts));
   std::vector<std::vector<Mode>> at_point(points.size());
   std::vector<long> spent(points.size(), 0);
   parallel_for(static_cast<int>(points.size()), context, [&](int i) {

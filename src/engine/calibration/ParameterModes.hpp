@@ -5,7 +5,7 @@
 namespace amiss {
 
 struct ModeOptions {
-  int starts = 192;         ///< draws from the prior
+  int starts = 192;         ///< points of the emulator's region
   int searches = 4;         ///< from the best of them, for each point of the history posterior
   int max_iterations = 30;  ///< of one search
   double inflation = 1.5;   ///< of the covariances

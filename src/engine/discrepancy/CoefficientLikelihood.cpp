@@ -31,6 +31,11 @@ double CoefficientLikelihood::log_density(const VectorXd& mean, const VectorXd& 
          0.5 * half.squaredNorm();
 }
 
+CoefficientLikelihood::Posterior CoefficientLikelihood::posterior() const {
+  const Eigen::LLT<MatrixXd> f = factor(VectorXd::Ones(score_.size()));
+  return {f.solve(score_ + information_ * reference_), f.solve(MatrixXd::Identity(score_.size(), score_.size()))};
+}
+
 // A - A S^1/2 F^-1 S^1/2 A.
 MatrixXd CoefficientLikelihood::information(const VectorXd& variance) const {
   const VectorXd root = variance.cwiseSqrt();

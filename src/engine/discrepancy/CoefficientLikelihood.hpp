@@ -18,6 +18,12 @@ class CoefficientLikelihood {
   double log_density(const Eigen::VectorXd& mean, const Eigen::VectorXd& variance) const;
   /// K' (V + K S K')^-1 K: how firmly the coefficients' mean is seen.
   Eigen::MatrixXd information(const Eigen::VectorXd& variance) const;
+  /// Of w given the record, if w ~ N(0, I) before: covariance (I + A)^-1, mean (I + A)^-1 (c + A w0).
+  struct Posterior {
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd covariance;
+  };
+  Posterior posterior() const;
 
  private:
   Eigen::LLT<Eigen::MatrixXd> factor(const Eigen::VectorXd& root) const;  // of F

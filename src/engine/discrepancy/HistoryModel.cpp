@@ -19,17 +19,19 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr Index kBlock = 2048;  // rows of a long record that are whitened at once
+constexpr Index kBlock = 2048;      // rows of a long record that are whitened at once
+constexpr double kFaintest = 1e-4;  // of kappa sigma_0^2: directions with less are withheld by 1e-8 of them
 
-// Gram matrix of W [K / norms, Phi, r] in blocks of rows.
+// Gram matrix of W [K / norms, Phi, directions, r] in blocks of rows.
 MatrixXd whitened_gram(const MatrixXd& basis, const VectorXd& norms, const MatrixXd& responses,
-                       const VectorXd& residual, const Whitener& whitener) {
-  const Index n = residual.size(), q = basis.cols(), p = responses.cols();
-  MatrixXd gram = MatrixXd::Zero(q + p + 1, q + p + 1), block, state;
+                       const MatrixXd& directions, const VectorXd& residual, const Whitener& whitener) {
+  const Index n = residual.size(), q = basis.cols(), columns = q + responses.cols() + directions.cols() + 1;
+  MatrixXd gram = MatrixXd::Zero(columns, columns), block, state;
   for (Index first = 0; first < n; first += kBlock) {
     const Index rows = std::min(kBlock, n - first);
-    block.resize(rows, q + p + 1);
-    block << basis.middleRows(first, rows), responses.middleRows(first, rows), residual.segment(first, rows);
+    block.resize(rows, columns);
+    block << basis.middleRows(first, rows), responses.middleRows(first, rows), directions.middleRows(first, rows),
+        residual.segment(first, rows);
     block.leftCols(q).array().rowwise() /= norms.transpose().array();
     block = whitener.rows(block, first, state);
     gram.selfadjointView<Eigen::Lower>().rankUpdate(block.transpose());
@@ -37,23 +39,31 @@ MatrixXd whitened_gram(const MatrixXd& basis, const VectorXd& norms, const Matri
   return gram.selfadjointView<Eigen::Lower>();
 }
 
-// Psi = Phi - K X in place of Phi.
-WhitenedData restrained(WhitenedData data, const MatrixXd& x) {
-  if (x.isZero(0.0)) return data;
-  const Index q = data.coefficients, p = data.cross.size() - q;
-  const MatrixXd basis = data.gram.topLeftCorner(q, q), mixed = data.gram.topRightCorner(q, p);
-  const MatrixXd left = mixed - basis * x;  // K' W'W Psi
-  MatrixXd own = data.gram.bottomRightCorner(p, p) - mixed.transpose() * x - x.transpose() * left;
-  data.gram.bottomRightCorner(p, p) = 0.5 * (own + own.transpose());
-  data.gram.topRightCorner(q, p) = left;
-  data.gram.bottomLeftCorner(p, q) = left.transpose();
-  data.cross.tail(p) -= x.transpose() * data.cross.head(q);
-  return data;
-}
-
 VectorXd column_norms(const MatrixXd& basis) { return basis.colwise().norm().transpose(); }
 
 }  // namespace
+
+// The setting without restraint, and the products of the directions with all of it.
+struct HistoryModel::FreeGram {
+  WhitenedData data;
+  MatrixXd directions;       // U' W'W U
+  MatrixXd mixed;            // [K, Phi]' W'W U
+  VectorXd cross;            // U' W'W r0
+
+  // Psi = Phi - U X in place of Phi.
+  WhitenedData restrained(const MatrixXd& x) const {
+    WhitenedData out = data;
+    if (x.isZero(0.0)) return out;
+    const Index q = data.coefficients, p = data.cross.size() - q;
+    const MatrixXd left = mixed.topRows(q) * x, half = mixed.bottomRows(p) * x;
+    const MatrixXd own = data.gram.bottomRightCorner(p, p) - half - half.transpose() + x.transpose() * directions * x;
+    out.gram.bottomRightCorner(p, p) = 0.5 * (own + own.transpose());
+    out.gram.topRightCorner(q, p) -= left;
+    out.gram.bottomLeftCorner(p, q) = out.gram.topRightCorner(q, p).transpose();
+    out.cross.tail(p) -= x.transpose() * cross;
+    return out;
+  }
+};
 
 int HistoryData::conditions() const {
   return condition.empty() ? 0 : 1 + *std::max_element(condition.begin(), condition.end());
@@ -73,8 +83,8 @@ void HistoryData::check() const {
                                 std::to_string(basis.cols()) + " basis vectors");
   if (basis.cols() > 0 && !(column_norms(basis).minCoeff() > 0))
     throw std::invalid_argument("history: a column of the basis is zero");
-  if (spread.size() > 0 && spread.rows() != basis.cols())
-    throw std::invalid_argument("history: the spread needs one row for each basis vector");
+  if (moves.size() > 0 && moves.rows() != n)
+    throw std::invalid_argument("history: the simulator's moves need one row for each of the record");
 }
 
 void HistoryPriors::check() const {
@@ -114,7 +124,8 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
     : data_(std::move(data)), priors_(std::move(priors)), conditions_(data_.conditions()) {
   data_.check();
   priors_.check();
-  if (data_.spread.size() == 0) data_.spread.resize(data_.basis.cols(), 0);
+  if (data_.moves.size() == 0) data_.moves.resize(data_.y.size(), 0);
+  find_directions();
   columns_ = VectorXd::Zero(conditions_);
   for (int s : data_.condition) columns_[s] += 1.0;
   centre_ = data_.responses.colwise().mean();
@@ -131,52 +142,73 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
   residual_ = data_.y - data_.basis * reference_;
   const int errors = error_settings(), reaches = static_cast<int>(priors_.reach.size());
   std::vector<MatrixXd> held;
-  for (double reach : priors_.reach) held.push_back(withheld(reach, data_.responses));
+  for (double reach : priors_.reach) held.push_back(along_directions(reach, data_.responses));
   settings_.resize(static_cast<std::size_t>(errors * reaches));
   std::vector<bool> wanted(static_cast<std::size_t>(errors), only.empty());
   for (int setting : only) wanted[static_cast<std::size_t>(error_of(setting))] = true;
   parallel_for(errors, context, [&](int g) {
     if (!wanted[static_cast<std::size_t>(g)]) return;
-    const WhitenedData free = whiten_freely(g, data_.responses);
+    const FreeGram free = whiten_freely(g, data_.responses);
     for (int k = 0; k < reaches; ++k)
-      settings_[static_cast<std::size_t>(k * errors + g)] =
-          restrained(free, held[static_cast<std::size_t>(k)]);
+      settings_[static_cast<std::size_t>(k * errors + g)] = free.restrained(held[static_cast<std::size_t>(k)]);
   });
 }
 
-WhitenedData HistoryModel::whiten_freely(int error, const MatrixXd& responses) const {
+// The directions in which the simulator moves enough that some reach of the grid withholds them.
+void HistoryModel::find_directions() {
+  const double least = *std::min_element(priors_.reach.begin(), priors_.reach.end());
+  const double c = least * priors_.noise_sd * priors_.noise_sd;
+  std::vector<Index> kept;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(data_.moves.transpose() * data_.moves);
+  for (Index j = data_.moves.cols() - 1; j >= 0 && std::isfinite(c); --j) {
+    if (eigen.eigenvalues()[j] > kFaintest * c) kept.push_back(j);
+  }
+  const Index r = static_cast<Index>(kept.size());
+  of_moves_.resize(data_.moves.cols(), r);
+  energy_.resize(r);
+  for (Index j = 0; j < r; ++j) {
+    energy_[j] = eigen.eigenvalues()[kept[static_cast<std::size_t>(j)]];
+    of_moves_.col(j) = eigen.eigenvectors().col(kept[static_cast<std::size_t>(j)]) / std::sqrt(energy_[j]);
+  }
+  directions_ = data_.moves * of_moves_;
+}
+
+// With the left singular vectors U of E and its squared singular values lambda,
+//     (I + (E E' / c)^2)^-1 = I - U diag(lambda^2 / (lambda^2 + c^2)) U',   c = kappa sigma_0^2.
+MatrixXd HistoryModel::along_directions(double reach, const MatrixXd& responses) const {
+  if (std::isinf(reach)) return MatrixXd::Zero(energy_.size(), responses.cols());
+  const double c = reach * priors_.noise_sd * priors_.noise_sd;
+  const VectorXd share = energy_.square() / (energy_.square() + c * c);
+  return share.asDiagonal() * (directions_.transpose() * responses);
+}
+
+MatrixXd HistoryModel::withheld(int setting) const {
+  return of_moves_ * along_directions(reach_of(setting), data_.responses);
+}
+
+HistoryModel::FreeGram HistoryModel::whiten_freely(int error, const MatrixXd& responses) const {
   const Whitener whitener(data_.axis, priors_.error.correlation_times, priors_.error.setting(error));
-  const Index q = data_.basis.cols(), p = responses.cols();
+  const Index q = data_.basis.cols(), p = responses.cols(), r = directions_.cols();
   // Columns of the basis scaled to unit norm first, so that their very different sizes do not cost accuracy.
-  MatrixXd gram = whitened_gram(data_.basis, norms_, responses, residual_, whitener);
+  MatrixXd gram = whitened_gram(data_.basis, norms_, responses, directions_, residual_, whitener);
   gram.topRows(q).array().colwise() *= norms_.array();
   gram.leftCols(q).array().rowwise() *= norms_.transpose().array();
-  WhitenedData out;
-  out.gram = gram.topLeftCorner(q + p, q + p);
-  out.cross = gram.col(q + p).head(q + p);
-  out.square = gram(q + p, q + p);
-  out.log_det = whitener.log_det();
-  out.size = data_.y.size();
-  out.coefficients = q;
+  FreeGram out;
+  out.data.gram = gram.topLeftCorner(q + p, q + p);
+  out.data.cross = gram.col(q + p + r).head(q + p);
+  out.data.square = gram(q + p + r, q + p + r);
+  out.data.log_det = whitener.log_det();
+  out.data.size = data_.y.size();
+  out.data.coefficients = q;
+  out.mixed = gram.block(0, q + p, q + p, r);
+  out.directions = gram.block(q + p, q + p, r, r);
+  out.cross = gram.col(q + p + r).segment(q + p, r);
   return out;
 }
 
-// With E'E = U Lambda U', the left singular vectors of E are E U Lambda^-1/2, so that
-//     (I + (E E' / c)^2)^-1 = I - E U diag(lambda / (lambda^2 + c^2)) U' E',   c = kappa sigma_0^2.
-MatrixXd HistoryModel::withheld(double reach, const MatrixXd& responses) const {
-  const Index q = data_.basis.cols(), r = data_.spread.cols();
-  if (r == 0 || std::isinf(reach)) return MatrixXd::Zero(q, responses.cols());
-  const MatrixXd moves = data_.basis * data_.spread;  // E
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(moves.transpose() * moves);
-  const double c = reach * priors_.noise_sd * priors_.noise_sd;
-  const Eigen::ArrayXd energy = eigen.eigenvalues().array().max(0.0);
-  const VectorXd share = energy / (energy.square() + c * c);
-  return data_.spread * (eigen.eigenvectors() * (share.asDiagonal() * (eigen.eigenvectors().transpose() *
-                                                                       (moves.transpose() * responses))));
-}
-
 WhitenedData HistoryModel::whiten(int setting, const MatrixXd& responses) const {
-  return restrained(whiten_freely(error_of(setting), responses), withheld(reach_of(setting), responses));
+  return whiten_freely(error_of(setting), responses)
+      .restrained(along_directions(reach_of(setting), responses));
 }
 
 // Runs of one setting share the whitened responses. With r = y - run in place of r0 and no coefficients.
@@ -192,7 +224,7 @@ VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameter
     const auto& [setting, own] = groups[static_cast<std::size_t>(k)];
     const Whitener whitener(data_.axis, priors_.error.correlation_times,
                             priors_.error.setting(error_of(setting)));
-    const MatrixXd responses = data_.responses - data_.basis * withheld(setting);
+    const MatrixXd responses = data_.responses - data_.moves * withheld(setting);
     const MatrixXd white = whitener(responses);
     WhitenedData seen;
     seen.gram = whitened(setting).gram.bottomRightCorner(p, p);

@@ -15,9 +15,9 @@ struct HistoryData {
   Eigen::MatrixXd responses;   ///< N x p: filter bank Phi; every column is centred and scaled here
   std::vector<int> condition;  ///< p: boundary condition of each column, 0 ... S-1
   TimeAxis axis;
-  /// Q x r: root L of the covariance L L' that the simulator's coefficients have under the priors of its
-  /// parameters: how far it can move. Only the reach of the discrepancy needs it.
-  Eigen::MatrixXd spread;
+  /// N x r: root E of the covariance E E' that the simulator's output has under the priors of its parameters:
+  /// how far it can move. Only the reach of the discrepancy needs it.
+  Eigen::MatrixXd moves;
 
   int conditions() const;
   void check() const;
@@ -64,8 +64,8 @@ struct HistoryParameters {
 ///     emulator,
 /// C the covariance of an error of ErrorModel's kind, Psi_s the p_s filtered responses to condition s.
 /// Nothing is split off: the discrepancy lives in all directions, those of the simulator included, and how
-/// far it reaches into them is learned: with the covariance K L L' K' of the runs,
-///     Psi = (I + (K L L' K' / (kappa sigma_0^2))^2)^-1 Phi,   sigma_0 the stated noise,
+/// far it reaches into them is learned: with the covariance E E' of the runs,
+///     Psi = (I + (E E' / (kappa sigma_0^2))^2)^-1 Phi,   sigma_0 the stated noise,
 /// which takes out of Phi the directions in which the simulator moves by more than sqrt(kappa) sigma_0 (a sum
 /// over the record), leaves those in which it moves less, and is Phi itself for kappa = infinity. The square
 /// keeps weak directions out of it, so that how many vectors the basis has does not matter. The density is
@@ -108,8 +108,8 @@ class HistoryModel {
   /// The setting's Gram matrices for other responses (N x p) in place of the model's.
   WhitenedData whiten(int setting, const Eigen::MatrixXd& responses) const;
 
-  /// X (Q x p) with Psi = Phi - K X: what the reach of a setting takes out of the responses.
-  Eigen::MatrixXd withheld(int setting) const { return withheld(reach_of(setting), data_.responses); }
+  /// X (r x p) with Psi = Phi - E X: what the reach of a setting takes out of the responses.
+  Eigen::MatrixXd withheld(int setting) const;
 
   const HistoryData& data() const { return data_; }
   const HistoryPriors& priors() const { return priors_; }
@@ -128,18 +128,23 @@ class HistoryModel {
 
  private:
   struct Factor;
+  struct FreeGram;
   Factor factorise(const WhitenedData& whitened, double precision, const Eigen::VectorXd& t,
                    const Eigen::VectorXd& root, const Eigen::VectorXd& cross) const;
   Eigen::VectorXd shifted_cross(const WhitenedData& whitened, const Eigen::VectorXd& shift,
                                 double& square) const;
-  WhitenedData whiten_freely(int error, const Eigen::MatrixXd& responses) const;
-  Eigen::MatrixXd withheld(double reach, const Eigen::MatrixXd& responses) const;
+  FreeGram whiten_freely(int error, const Eigen::MatrixXd& responses) const;
+  void find_directions();
+  Eigen::MatrixXd along_directions(double reach, const Eigen::MatrixXd& responses) const;
 
   HistoryData data_;
   HistoryPriors priors_;
   int conditions_;
   Eigen::VectorXd columns_, norms_, reference_, residual_;
   Eigen::RowVectorXd centre_, scale_;
+  Eigen::MatrixXd directions_;  // N x r': left singular vectors of E, those that the reach acts upon
+  Eigen::MatrixXd of_moves_;    // r x r': they are E of_moves_
+  Eigen::ArrayXd energy_;       // r': squared singular values
   std::vector<WhitenedData> settings_;  // reach by reach, and for each error by error
 };
 

@@ -1,17 +1,26 @@
 #include "engine/emulator/Emulator.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 
 #include "engine/parallel/parallel_for.hpp"
+#include "engine/random/Stream.hpp"
 
 namespace amiss {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+constexpr Index kPoints = 512;  // that stand for a region
+constexpr std::uint64_t kRegionSeed = 20, kRegionPoints = 63;
+
+}  // namespace
 
 Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients)
     : inputs_(inputs), coefficients_(coefficients), centre_(coefficients.colwise().mean()) {
@@ -29,6 +38,17 @@ Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.co
   for (Index q = 0; q < coefficients_.cols(); ++q) {
     processes_.emplace_back(inputs_, (coefficients_.col(q).array() - centre_[q]) / scale_[q],
                             GaussianProcessParameters::unpack(state.parameters.row(q).transpose()));
+  }
+  region_ = state.region;
+  if (region_.everywhere()) return;
+  MatrixXd mean, variance;
+  const MatrixXd normal = Stream(kRegionSeed, kRegionPoints, 0).normals(n_inputs(), kPoints);
+  predict(region_.inputs(region_.place(normal)), mean, variance);
+  variance_in_region_.resize(n_outputs());
+  for (Index q = 0; q < n_outputs(); ++q) {
+    double* const own = variance.col(q).data();
+    std::nth_element(own, own + kPoints / 2, own + kPoints);
+    variance_in_region_[q] = own[kPoints / 2];
   }
 }
 
@@ -57,14 +77,25 @@ Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const Emula
   return emulator;
 }
 
-void Emulator::predict(const MatrixXd& points, MatrixXd& mean, MatrixXd& variance) const {
-  mean.resize(points.rows(), n_outputs());
-  variance.resize(points.rows(), n_outputs());
+void Emulator::predict(const MatrixXd& inputs, MatrixXd& mean, MatrixXd& variance) const {
+  mean.resize(inputs.rows(), n_outputs());
+  variance.resize(inputs.rows(), n_outputs());
   for (Index q = 0; q < n_outputs(); ++q) {
-    processes_[q].predict(points, mean.col(q), variance.col(q));
+    processes_[q].predict(inputs, mean.col(q), variance.col(q));
     mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
     variance.col(q) = (variance.col(q).array() + processes_[q].noise()) * (scale_[q] * scale_[q]);
   }
+}
+
+void Emulator::predict_at(const MatrixXd& points, MatrixXd& mean, MatrixXd& variance) const {
+  const MatrixXd inputs = region_.inputs(points);
+  if (region_.everywhere()) return predict(inputs, mean, variance);
+  mean.resize(inputs.rows(), n_outputs());
+  for (Index q = 0; q < n_outputs(); ++q) {
+    processes_[static_cast<std::size_t>(q)].predict(inputs, mean.col(q));
+    mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
+  }
+  variance = variance_in_region_.replicate(inputs.rows(), 1);
 }
 
 void Emulator::leave_one_out(MatrixXd& mean, MatrixXd& variance) const {
@@ -83,7 +114,7 @@ void Emulator::leave_one_out(MatrixXd& mean, MatrixXd& variance) const {
 EmulatorState Emulator::state() const {
   MatrixXd parameters(n_outputs(), n_inputs() + 3);
   for (Index q = 0; q < n_outputs(); ++q) parameters.row(q) = processes_[q].parameters().pack().transpose();
-  return {inputs_, coefficients_, parameters};
+  return {inputs_, coefficients_, parameters, region_};
 }
 
 VectorXd Emulator::widened() const {

@@ -5,14 +5,16 @@
 #include "engine/Context.hpp"
 #include "engine/basis/Basis.hpp"
 #include "engine/emulator/GaussianProcess.hpp"
+#include "engine/emulator/Region.hpp"
 
 namespace amiss {
 
 /// What an emulator is made of; plain numbers, so that it can be stored and made again exactly.
 struct EmulatorState {
-  Eigen::MatrixXd inputs;        ///< M x P in the unit cube
+  Eigen::MatrixXd inputs;        ///< M x P, of the region, in the unit cube
   Eigen::MatrixXd coefficients;  ///< M x Q
   Eigen::MatrixXd parameters;    ///< Q rows of GaussianProcessParameters::pack()
+  Region region;                 ///< where it holds
 };
 
 struct EmulatorOptions {
@@ -38,15 +40,21 @@ class Emulator {
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context);
 
-  /// Mean and variance (n x Q) of the coefficients of runs at points (n x P): those that the projection of
+  /// Mean and variance (n x Q) of the coefficients of runs at inputs (n x P): those that the projection of
   /// such a run on the basis has. They vary about the smooth part of the process by the nugget and 1 /
   /// lambda, as those of the training runs do, so that both are in the variance.
-  void predict(const Eigen::MatrixXd& points, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
+  void predict(const Eigen::MatrixXd& inputs, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
+  /// The same at points (P x n) in the coordinates N(0, I) of the parameters, for a calibration. In a region
+  /// the variance is its median there: where it grows towards the end, a posterior would find the record
+  /// likely for no other reason than that nothing is known. Outside the region an emulator knows nothing, and
+  /// does not say so here: ask region().contains().
+  void predict_at(const Eigen::MatrixXd& points, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
   /// Leave-one-out mean and variance (M x Q), widened, by hyper-parameters that have not seen the run left
   /// out, in the coefficients' own scale. @throws std::logic_error if made of a state, not trained.
   void leave_one_out(Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
 
   EmulatorState state() const;
+  const Region& region() const { return region_; }
   Eigen::Index n_inputs() const { return inputs_.cols(); }
   Eigen::Index n_outputs() const { return coefficients_.cols(); }
   int evaluations() const;          ///< of the joint density, while training
@@ -59,6 +67,8 @@ class Emulator {
 
   Eigen::MatrixXd inputs_, coefficients_;
   Eigen::RowVectorXd centre_, scale_;
+  Region region_;
+  Eigen::RowVectorXd variance_in_region_;  // if it is not everywhere
   std::vector<GaussianProcess> processes_;
 };
 

@@ -216,6 +216,11 @@ void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
       (amplitude - squared * half.colwise().squaredNorm().array()).max(kJitter * amplitude).transpose();
 }
 
+void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean) const {
+  const MatrixXd scaled = points * decay_rates(parameters_.logit_beta).cwiseSqrt().asDiagonal();
+  mean.noalias() = std::exp(parameters_.log_amplitude) * (gaussian_kernel(scaled_inputs_, scaled).transpose() * weights_);
+}
+
 void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {
   variance = inverse_.diagonal().cwiseInverse();
   mean = values_ - weights_.cwiseProduct(variance);

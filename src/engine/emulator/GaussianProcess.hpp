@@ -89,6 +89,8 @@ class GaussianProcess {
   /// Mean and variance of the smooth part at points (n x P); a value seen there varies by noise() more.
   void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean,
                Eigen::Ref<Eigen::VectorXd> variance) const;
+  /// The mean alone, which costs a small part of it.
+  void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean) const;
 
   /// Leave-one-out prediction of each value, closed form (Rasmussen and Williams 2006, equation 5.12).
   void leave_one_out(Eigen::VectorXd& mean, Eigen::VectorXd& variance) const;

@@ -1,0 +1,69 @@
+# Where the parameters lie, by the simulator itself: a Gauss-Newton search whose every step is the posterior under the line that
+# touches the simulator there (tangent_posterior_), error and discrepancy as uncertain as the record leaves them. It needs no
+# emulator, and a few runs for each parameter and step.
+
+search_steps <- 40        # at most
+search_draws <- 8        # of error and discrepancy, by which a step is judged
+search_difference <- 0.02  # standard deviations of the prior, of slopes
+search_damping <- c(0, 1, 10, 100, 1000, 1e4)
+search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1, importance_draws = 300, ess_drop = 0.3)
+
+# The posterior's centre and covariance in normal coordinates, seen from the best of `starts` (unit cube, one a row), and the runs
+# made on the way: list(centre, covariance, value, unit, values, outputs).
+search_mode <- function(fit, start, threads) {
+  simulator <- fit$emulator$simulator
+  parameters <- fit$emulator$parameters
+  m <- fit$measurements
+  data <- history_data(fit$emulator, m, fit$rows, fit$control)
+  priors <- fit$priors
+  priors$discarded_variance <- 0
+  ais <- fill_ais_control(utils::modifyList(fit$control$ais, search_ais))
+  context <- engine_context(fit$seed, threads)
+  made <- list(unit = NULL, values = NULL, outputs = NULL)
+  run_at <- function(x) {
+    unit <- stats::pnorm(x)
+    values <- unit_to_values(unit, parameters)
+    outputs <- suppress_run_warnings(simulate_measured(simulator, values, m, "calibrate", threads))
+    made <<- list(unit = rbind(made$unit, unit), values = rbind(made$values, values), outputs = cbind(made$outputs, outputs))
+    outputs
+  }
+  # Log posterior density of points with their runs, error and discrepancy averaged over draws.
+  value_of <- function(x, outputs, tangent) {
+    draws <- length(tangent$setting)
+    fine <- which(colSums(!is.finite(outputs)) == 0)
+    values <- rep(-Inf, ncol(outputs))
+    if (!length(fine)) return(values)
+    each <- rep(seq_len(draws), length(fine))
+    points <- list(setting = tangent$setting[each], variance = tangent$variance[each], t = tangent$t[each, , drop = FALSE])
+    log_l <- call_engine(run_likelihood_(data, priors, points, outputs[, rep(fine, each = draws), drop = FALSE], context))
+    log_l <- matrix(log_l, draws)
+    top <- apply(log_l, 2, max)
+    values[fine] <- top + log(colMeans(exp(sweep(log_l, 2, top)))) - 0.5 * rowSums(x[fine, , drop = FALSE]^2)
+    values
+  }
+  x <- start
+  run <- run_at(matrix(x, 1))[, 1]
+  tangent <- NULL
+  for (step in seq_len(search_steps)) {
+    p <- length(x)
+    sides <- ifelse(x > 0, -search_difference, search_difference)  # towards the middle of the prior
+    around <- run_at(matrix(x, p, p, byrow = TRUE) + diag(sides, p))
+    slopes <- sweep(around - run, 2, sides, "/")
+    slopes[, colSums(!is.finite(slopes)) > 0] <- 0
+    tangent <- call_engine(tangent_posterior_(data, priors, x, run, slopes, search_draws, ais, context))
+    move <- tangent$mean - x
+    far <- sum(move * solve(tangent$covariance, move))
+    precision <- solve(tangent$covariance)
+    pulled <- precision %*% move
+    damped <- vapply(search_damping, function(mu) as.numeric(solve(precision + diag(mu, p), pulled)), numeric(p))
+    points <- rbind(x, t(x + damped))
+    outputs <- cbind(run, run_at(points[-1, , drop = FALSE]))
+    values <- value_of(points, outputs, tangent)
+    best <- which.max(values)
+    if (best == 1) break
+    x <- points[best, ]
+    run <- outputs[, best]
+    if (far < 0.5) break
+  }
+  c(list(centre = x, covariance = tangent$covariance, value = max(values), steps = step), made)
+}

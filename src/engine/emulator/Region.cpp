@@ -1,0 +1,47 @@
+#include "engine/emulator/Region.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "engine/random/transform.hpp"
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+Region::Region(VectorXd centre, MatrixXd root, double radius)
+    : centre_(std::move(centre)), root_(std::move(root)), radius_(radius) {
+  if (centre_.size() == 0 || root_.rows() != centre_.size() || root_.cols() != centre_.size())
+    throw std::invalid_argument("region: the root needs one row and column for each parameter");
+  if (!(radius > 0) || !std::isfinite(radius) || !centre_.allFinite() || !root_.allFinite())
+    throw std::invalid_argument("region: centre, root and radius must be finite, the radius positive");
+  factor_.compute(root_);
+  if (!(factor_.matrixLU().diagonal().cwiseAbs().minCoeff() > 0))
+    throw std::invalid_argument("region: the root is singular");
+}
+
+MatrixXd Region::standardised(const MatrixXd& x) const { return factor_.solve(x.colwise() - centre_); }
+
+bool Region::contains(const Eigen::Ref<const VectorXd>& x) const {
+  return everywhere() || standardised(x).norm() <= radius_;
+}
+
+MatrixXd Region::inputs(const MatrixXd& x) const {
+  if (everywhere()) return x.transpose().unaryExpr(&normal_cdf);
+  return (standardised(x).transpose().array() / (2.0 * radius_) + 0.5).matrix();
+}
+
+MatrixXd Region::place(const MatrixXd& normal) const {
+  if (everywhere()) return normal;
+  MatrixXd inside = normal;
+  for (Index i = 0; i < inside.cols(); ++i) {
+    const double length = inside.col(i).norm();
+    if (length > 0.99 * radius_) inside.col(i) *= 0.99 * radius_ / length;
+  }
+  return (root_ * inside).colwise() + centre_;
+}
+
+}  // namespace amiss
