@@ -43,20 +43,15 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
 
 # The calibration, and the runs of the simulator at its draws.
 calibrate_with_runs <- function(emulator, measurements, control, seed, threads, call = rlang::caller_env()) {
-  rows <- emulated_rows(emulator, measurements, call)
-  seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  control <- fill_calibration_control(control, measurements, length(rows), call)
-  data <- history_data(emulator, measurements, rows, control)
-  priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
-                 discarded_variance = mean(emulator$basis$discarded_sd^2) + control$emulator_sd^2, inclusion = control$inclusion, amplitude = control$amplitude,
-                 correlation_times = control$error_times, ratios = control$error_ratios, reach = control$reach)
-
-  result <- call_engine(calibrate_(data, priors, emulator$processes, control, engine_context(seed, threads)))
+  set <- calibration_setting(emulator, measurements, control, seed, call)
+  control <- set$control
+  data <- history_data(emulator, measurements, set$rows, control)
+  result <- call_engine(calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads)))
   posterior <- result$posterior
   fit <- structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
-                        seed = seed, rows = rows, values = unit_to_values(posterior$unit, emulator$parameters),
-                        weights = posterior$weights, posterior = posterior, kept = result$kept, priors = priors,
+                        seed = set$seed, rows = set$rows, values = unit_to_values(posterior$unit, emulator$parameters),
+                        weights = posterior$weights, posterior = posterior, kept = result$kept, priors = set$priors,
                         coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
                         centre = result$centre, scale = result$scale,
                         reach = stats::setNames(result$reach, format(control$reach, trim = TRUE)),
@@ -65,6 +60,16 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
   checked <- checked_by_runs(fit, threads)
   checked$fit$trust <- fit_trust(checked$fit)
   checked
+}
+
+# What a calibration is made of before it is made: list(emulator, measurements, rows, control, priors, seed).
+calibration_setting <- function(emulator, measurements, control, seed, call = rlang::caller_env()) {
+  rows <- emulated_rows(emulator, measurements, call)
+  control <- fill_calibration_control(control, measurements, length(rows), call)
+  priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
+                 discarded_variance = mean(emulator$basis$discarded_sd^2) + control$emulator_sd^2, inclusion = control$inclusion, amplitude = control$amplitude,
+                 correlation_times = control$error_times, ratios = control$error_ratios, reach = control$reach)
+  list(emulator = emulator, measurements = measurements, rows = rows, control = control, priors = priors, seed = pick_seed(seed))
 }
 
 # The calibration rows, which must be those that the emulator was trained on.

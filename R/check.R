@@ -2,6 +2,7 @@
 # of it or, for runs made elsewhere, by runs left out.
 
 largest_error_ratio <- 1 / 3  # of the noise: above it the emulator is not good enough
+least_effective <- 0.1        # share of the runs under their own likelihoods
 largest_failed_share <- 0.2   # of the runs at posterior draws
 largest_border_share <- 0.1   # of the posterior in the outer tenth of the emulator's region
 
@@ -66,8 +67,8 @@ check_by_left_out <- function(fit) {
 
 new_check <- function(fit, error, variance, failed, by, mean = NULL) {
   rms <- sqrt(mean(error^2))
-  noise <- min(fit$measurements$noise_sd, sqrt(sum(fit$weights * fit$posterior$variance)))
-  ratio <- rms / noise
+  ratio <- error_over_noise(fit, error)
+  noise <- if (ratio > 0) rms / ratio else fit$measurements$noise_sd
   border <- sum(fit$weights[region_distance(fit$emulator$processes$region, posterior_unit(fit)) > 0.9])
   passed <- ratio <= largest_error_ratio && border <= largest_border_share
   told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by, format(signif(ratio, 2)),
@@ -77,6 +78,38 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
              else told
   list(runs = ncol(error), failed = failed, error = rms, noise = noise, ratio = ratio, z2 = mean(error^2 / variance), effective = NA_real_,
        border = border, passed = passed, verdict = verdict, mean = mean)
+}
+
+# RMS of errors (rows x n) in units of the measurement error as the likelihood weighs it, autocorrelated as it was seen: with its
+# covariance V, the root of e' V^-1 e / N, by which a smooth error counts less where the measurement error is smooth. Where the error
+# seen is larger than the noise stated (it then holds more than noise), in units of that.
+error_over_noise <- function(fit, error) {
+  posterior <- fit$posterior
+  picked <- systematic_draws(fit$weights, 8)
+  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  data$y <- numeric(nrow(error))
+  priors <- fit$priors
+  priors$discarded_variance <- 0
+  each <- rep(picked, each = ncol(error) + 1)
+  points <- list(setting = posterior$setting[each], variance = posterior$variance[each],
+                 t = matrix(0, length(each), ncol(posterior$t)))
+  runs <- cbind(0, error)[, rep(seq_len(ncol(error) + 1), length(picked)), drop = FALSE]
+  log_l <- matrix(call_engine(run_likelihood_(data, priors, points, runs, engine_context(fit$seed, 1))), ncol(error) + 1)
+  squares <- 2 * sweep(-log_l[-1, , drop = FALSE], 2, log_l[1, ], "+")
+  seen <- sqrt(sum(fit$weights * posterior$variance * (1 + error_share(fit))))
+  sqrt(mean(squares) / nrow(error)) * max(1, seen / fit$measurements$noise_sd)
+}
+
+# Variance of the autocorrelated parts of the error over that of its white part, at each draw.
+error_share <- function(fit) {
+  ratios <- fit$control$error_ratios
+  left <- fit$posterior$setting
+  share <- 0
+  for (component in seq_along(fit$control$error_times)) {
+    share <- share + ratios[left %% length(ratios) + 1]
+    left <- left %/% length(ratios)
+  }
+  share
 }
 
 # Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior; with the simulator itself nothing is discarded.
@@ -93,6 +126,10 @@ exact_evidence <- function(fit, made, threads) {
   n <- length(ratio)
   effective <- 1 / (n * sum(weights^2))
   fit$check$effective <- effective
+  if (fit$check$passed && effective < least_effective) {
+    fit$check$passed <- FALSE
+    fit$check$verdict <- sprintf("%s, but few of these runs are as likely as it says (effective share %.2f)", fit$check$verdict, effective)
+  }
   correction <- max(log_ratio) + log(mean(ratio))
   # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the upper half it is that of
   # lognormal ratios; how far the two are apart is part of the error.

@@ -66,7 +66,7 @@ regional_ensemble <- function(ensemble, region, fit, runs, threads) {
   values <- unit_to_values(unit, ensemble$parameters)
   outputs <- simulate_measured(ensemble$simulator, values, fit$measurements, "calibrate", threads)
   # The last of the runs that lie inside: those of checks, where the posterior was seen last.
-  own <- utils::tail(which(in_region(region, ensemble$unit)), runs)
+  own <- utils::tail(which(in_region(region, ensemble$unit)), 40)
   new_ensemble(ensemble$parameters, rbind(ensemble$unit[own, , drop = FALSE], unit), rbind(ensemble$values[own, , drop = FALSE], values),
                cbind(ensemble$outputs[, own, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
                without_simulator(emulator_over_priors(fit$emulator)))

@@ -2,30 +2,26 @@
 # touches the simulator there (tangent_posterior_), error and discrepancy as uncertain as the record leaves them. It needs no
 # emulator, and a few runs for each parameter and step.
 
-search_steps <- 40        # at most
+search_steps <- 20        # at most
 search_draws <- 8        # of error and discrepancy, by which a step is judged
 search_difference <- 0.02  # standard deviations of the prior, of slopes
 search_damping <- c(0, 1, 10, 100, 1000, 1e4)
 search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1, importance_draws = 300, ess_drop = 0.3)
 
-# The posterior's centre and covariance in normal coordinates, seen from the best of `starts` (unit cube, one a row), and the runs
-# made on the way: list(centre, covariance, value, unit, values, outputs).
-search_mode <- function(fit, start, threads) {
-  simulator <- fit$emulator$simulator
-  parameters <- fit$emulator$parameters
-  m <- fit$measurements
-  data <- history_data(fit$emulator, m, fit$rows, fit$control)
-  priors <- fit$priors
+# The posterior's centre and covariance as the search from `start` sees them, in normal coordinates: list(centre, covariance,
+# value, runs). `set`: calibration_setting(), or a calibration.
+search_mode <- function(set, start, threads) {
+  m <- set$measurements
+  data <- history_data(set$emulator, m, set$rows, set$control)
+  priors <- set$priors
   priors$discarded_variance <- 0
-  ais <- fill_ais_control(utils::modifyList(fit$control$ais, search_ais))
-  context <- engine_context(fit$seed, threads)
-  made <- list(unit = NULL, values = NULL, outputs = NULL)
+  ais <- fill_ais_control(utils::modifyList(set$control$ais, search_ais))
+  context <- engine_context(set$seed, threads)
+  made <- 0
   run_at <- function(x) {
-    unit <- stats::pnorm(x)
-    values <- unit_to_values(unit, parameters)
-    outputs <- suppress_run_warnings(simulate_measured(simulator, values, m, "calibrate", threads))
-    made <<- list(unit = rbind(made$unit, unit), values = rbind(made$values, values), outputs = cbind(made$outputs, outputs))
-    outputs
+    made <<- made + nrow(x)
+    values <- unit_to_values(stats::pnorm(x), set$emulator$parameters)
+    suppress_run_warnings(simulate_measured(set$emulator$simulator, values, m, "calibrate", threads))
   }
   # Log posterior density of points with their runs, error and discrepancy averaged over draws.
   value_of <- function(x, outputs, tangent) {
@@ -65,5 +61,5 @@ search_mode <- function(fit, start, threads) {
     run <- outputs[, best]
     if (far < 0.5) break
   }
-  c(list(centre = x, covariance = tangent$covariance, value = max(values), steps = step), made)
+  list(centre = x, covariance = tangent$covariance, value = max(values), runs = made)
 }

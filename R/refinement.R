@@ -22,26 +22,47 @@ calibrate_refined <- function(ensemble, measurements, rounds = 4, runs = NULL, c
 }
 
 # list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`: such a
-# list for the ensemble, if there is one already.
-refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL) {
+# list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more is wanted of it.
+refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
+                                 hopeless = function(fit) FALSE) {
   runs <- max(runs, 40, 10 * length(ensemble$parameters))
   runs_made <- 0
-  calibrated <- function(ensemble, calibration) {
-    emulator <- train_emulator(ensemble, measurements, control$emulator, threads = threads)
+  trained <- function(ensemble) train_emulator(ensemble, measurements, control$emulator, threads = threads)
+  calibrated <- function(ensemble, calibration, emulator = trained(ensemble)) {
     own <- calibrate_with_runs(emulator, measurements, calibration, seed, threads)
     runs_made <<- runs_made + length(own$made$draws) + sum(own$made$failed)
     c(list(ensemble = ensemble), own)
   }
-  result <- first %||% calibrated(ensemble, control$calibration)
-  coarse <- FALSE
+  searched <- function(ensemble, set, centre = NULL) {
+    own <- searched_ensemble(ensemble, set, centre, runs, threads)
+    runs_made <<- runs_made + own$runs
+    calibrated(own$ensemble, coarsely(control$calibration))
+  }
   round <- 0L
+  coarse <- FALSE
+  result <- first
+  if (is.null(result)) {
+    emulator <- trained(ensemble)
+    if (rounds > 0 && !is.null(ensemble$simulator) && too_coarse(emulator, measurements)) {
+      round <- 1L
+      coarse <- TRUE
+      result <- searched(ensemble, calibration_setting(emulator, measurements, control$calibration, seed))
+    } else {
+      result <- calibrated(ensemble, control$calibration, emulator)
+    }
+  }
   repeat {
-    settled <- is.null(result$made) || isTRUE(result$fit$check$passed)
+    check <- result$fit$check
+    settled <- is.null(result$made) || isTRUE(check$passed)
     if (!settled && round < rounds) {
+      if (hopeless(result$fit)) break
       # A coarse sampler is enough to see where the posterior lies, until the check passes.
       round <- round + 1L
-      runs_made <- runs_made + runs
-      result <- calibrated(surrounding(result, runs, control$calibration, seed, threads), coarsely(control$calibration))
+      wider <- with_checked_runs(result)
+      result <- if (check$ratio > 1) searched(wider, result$fit, posterior_centre(result$fit)) else {
+        runs_made <- runs_made + runs
+        calibrated(refine_ensemble(wider, result$fit, runs, threads), coarsely(control$calibration))
+      }
       coarse <- TRUE
     } else if (coarse) {
       result <- calibrated(with_checked_runs(result), control$calibration)
@@ -53,6 +74,11 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   result
 }
 
+# By the runs left out, an emulator over the priors is too coarse to sample from: the search on the simulator is cheaper.
+too_coarse <- function(emulator, measurements) {
+  is.null(emulator$processes$region) && isTRUE(emulator$diagnostics$series_rmse > measurements$noise_sd)
+}
+
 refining_ais <- list(pilot_chains = 128, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, importance_draws = 300)
 
 coarsely <- function(calibration, ...) {
@@ -61,17 +87,20 @@ coarsely <- function(calibration, ...) {
   calibration
 }
 
-# The ensemble of the region where the posterior lies, the runs of its check among it.
-surrounding <- function(result, runs, calibration, seed, threads) {
-  ensemble <- with_checked_runs(result)
-  fit <- result$fit
-  if (fit$check$ratio <= 1) return(refine_ensemble(ensemble, fit, runs, threads))
-  z <- to_normal(posterior_unit(fit))
-  nearest <- which.min(colMeans((ensemble$outputs - fit$measurements$y[fit$rows])^2))
-  starts <- list(numeric(ncol(z)), colSums(fit$weights * z), to_normal(ensemble$unit[nearest, ]))
-  region <- region_of_modes(lapply(starts, function(start) search_mode(fit, start, threads)))
-  regional_ensemble(ensemble, region, fit, runs, threads)
+# list(ensemble, runs): the ensemble of the region to which searches on the simulator lead, and the runs that they and it took. They
+# start from `centre`, if there is one, and over the priors also from their middle and from the run nearest to the record.
+searched_ensemble <- function(ensemble, set, centre, runs, threads) {
+  starts <- list(centre)
+  if (is.null(ensemble$region)) {
+    nearest <- which.min(colMeans((ensemble$outputs - set$measurements$y[set$rows])^2))
+    starts <- list(centre, numeric(length(ensemble$parameters)), to_normal(ensemble$unit[nearest, ]))
+  }
+  modes <- lapply(Filter(Negate(is.null), starts), function(start) search_mode(set, start, threads))
+  list(ensemble = regional_ensemble(ensemble, region_of_modes(modes), set, runs, threads),
+       runs = runs + sum(vapply(modes, `[[`, 0, "runs")))
 }
+
+posterior_centre <- function(fit) colSums(fit$weights * to_normal(posterior_unit(fit)))
 
 # The ensemble with as many of the runs at posterior draws as the check asks for.
 with_checked_runs <- function(result) {

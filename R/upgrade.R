@@ -115,7 +115,7 @@ fit_runs <- function(ensemble, settings, calibration = settings$control$calibrat
 
 # The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
 # draws tell how far its evidence is off, correct it, and join them where it is too far.
-screen_model <- function(simulator, name, settings) {
+screen_model <- function(simulator, name, settings, hopeless = function(fit) FALSE) {
   calibration <- as.list(settings$control$calibration)
   calibration$ais <- utils::modifyList(as.list(calibration$ais), as.list(settings$control$screening %||% upgrade_control$screening))
   if (is.null(calibration$check) || calibration$check > screening_runs) calibration$check <- calibration$exact <- screening_runs
@@ -123,7 +123,7 @@ screen_model <- function(simulator, name, settings) {
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
     control <- list(emulator = settings$control$emulator, calibration = calibration)
     refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
-                         runs = if (refined_runs(settings) > 0) refined_runs(settings))
+                         runs = if (refined_runs(settings) > 0) refined_runs(settings), hopeless = hopeless)
   })
 }
 
@@ -207,8 +207,9 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   coarse <- as_coarse(current$fit)
   fits <- screens <- list()
   for (name in names(catalogue)) {
-    first <- if (screening) screen_model else fit_fully
-    made <- rlang::try_fetch(first(extend(current$fit$emulator$simulator, catalogue[[name]], settings$adopted), paste(current$name, "+", name), settings),
+    trial <- extend(current$fit$emulator$simulator, catalogue[[name]], settings$adopted)
+    made <- rlang::try_fetch(if (screening) screen_model(trial, paste(current$name, "+", name), settings, hopeless(fits, coarse, settings$control))
+                             else fit_fully(trial, paste(current$name, "+", name), settings),
                              amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
     if (screening) screens[[name]] <- made
     fits[[name]] <- if (screening) made$fit else made
@@ -220,6 +221,13 @@ try_mechanisms <- function(current, catalogue, settings, say) {
     report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
   }
   list(fits = fits, table = trial_table(fits, current, full))
+}
+
+# Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by more than
+# `far` decades, and three standard errors, behind the best before it or behind what adoption asks for.
+hopeless <- function(fits, reference, control, far = 3) {
+  needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
+  function(fit) fit$check$ratio <= 1 && fit$log_evidence + 3 * fit$standard_error + far * log(10) < needed
 }
 
 # The fit with the evidence of its coarse calibration, with which other coarse ones are compared.

@@ -88,7 +88,7 @@ inline HistoryData history_record(Index n, Index conditions = 7) {
   Stream stream(5, 1, 1);
   HistoryData data;
   data.basis = daily_basis(n);
-  data.spread = daily_simulator().root;
+  data.moves = data.basis * daily_simulator().root;
   data.responses = stream.normals(n, 7 * conditions);
   for (Index j = 0; j < 7 * conditions; ++j) {
     const double keep = 1.0 - 1.0 / static_cast<double>(1 + 3 * (j % 7));

@@ -241,7 +241,7 @@ TEST(SurrogateTest, PValuesCountTheSurrogates) {
 
 TEST(SurrogateTest, NullStatisticsAreThoseOfShiftedConditions) {
   HistoryData data = make_data(0.5, 4);
-  data.spread = make_simulator().root;
+  data.moves = data.basis * make_simulator().root;
   SurrogateOptions options = few_surrogates(1000);
   options.smallest_shift = 0.4;
   const SurrogateTest test = singles_test(make_model(data, {}, {20.0}), options);
@@ -375,16 +375,16 @@ std::vector<HistoryParameters> make_history_draws() {
 
 const std::vector<double> kReaches{30.0, kInfinity};
 
-HistoryData data_with_spread() {
+HistoryData data_with_moves() {
   HistoryData data = make_data(1.0, 3);
-  data.spread = make_simulator().root;
+  data.moves = data.basis * make_simulator().root;
   return data;
 }
 
 // 1 - r'V_A^-1 r / r'V_0^-1 r with N x N matrices, the conditions in the coalition only.
 double dense_explained(const HistoryData& data, const HistoryParameters& p, std::uint64_t coalition) {
   const GaussianSimulator simulator = make_simulator();
-  const MatrixXd moves = data.basis * simulator.root;  // the data's spread too
+  const MatrixXd& moves = data.moves;
   MatrixXd phi = data.responses.rowwise() - data.responses.colwise().mean();
   for (Index j = 0; j < phi.cols(); ++j) {
     const int s = data.condition[static_cast<std::size_t>(j)];
@@ -404,7 +404,7 @@ double dense_explained(const HistoryData& data, const HistoryParameters& p, std:
 }
 
 TEST(ShapleyShares, EqualTheDenseOnes) {
-  const HistoryData data = data_with_spread();
+  const HistoryData data = data_with_moves();
   const HistoryModel model = make_model(data, kTwoErrors, kReaches);
   const std::vector<HistoryParameters> draws = make_history_draws();
   const MatrixXd shares = shapley_shares(model, make_simulator(), draws, {}, Context());
@@ -465,7 +465,7 @@ TEST(ShapleyShares, TwoConditionsThatAreTheSameShareEvenly) {
 }
 
 TEST(ShapleyShares, NamesOfTheConditionsDoNotMatter) {
-  const HistoryData data = data_with_spread();
+  const HistoryData data = data_with_moves();
   HistoryData other = data;  // 0, 1, 2 become 2, 0, 1
   for (int& s : other.condition) s = (s + 2) % 3;
   const HistoryModel a = make_model(data, kTwoErrors, kReaches), b = make_model(other, kTwoErrors, kReaches);
@@ -630,7 +630,8 @@ struct Copied {
     priors.noise_sd = 0.5;
     priors.error = kTwoErrors;
     priors.reach = kReaches;
-    return history_model(data, priors, emulator, Context());
+    data.moves = data.basis * over_region(emulator).root;
+    return HistoryModel(data, priors, Context());
   }
 };
 

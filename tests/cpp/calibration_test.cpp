@@ -40,7 +40,7 @@ HistoryData make_data() {
   data.axis = uneven_axis(kN, {14});
   data.basis.resize(kN, 2);
   data.basis << 60.0 * normal_vector(kN, 82), VectorXd::Ones(kN);
-  data.spread = Eigen::Vector2d(0.006, 0.9).asDiagonal();
+  data.moves = data.basis * Eigen::Vector2d(0.006, 0.9).asDiagonal();
   data.responses = normal_matrix(kN, 3, 83);
   data.condition = {0, 0, 1};
   data.y = data.basis * Eigen::Vector2d(0.015, 21.4) + normal_vector(kN, 84);
@@ -77,8 +77,7 @@ double dense_density(const HistoryModel& model, const HistoryData& data, const H
     phi.col(j) *= std::sqrt(p.t[data.condition[static_cast<std::size_t>(j)]] / (j < 2 ? 2.0 : 1.0) * kN /
                             phi.col(j).squaredNorm());
   if (!std::isinf(reach)) {
-    const MatrixXd moves = data.basis * data.spread,
-                   a = moves * moves.transpose() / (reach * kNoise * kNoise);
+    const MatrixXd a = data.moves * data.moves.transpose() / (reach * kNoise * kNoise);
     phi = (MatrixXd::Identity(kN, kN) + a * a).ldlt().solve(phi);
   }
   VectorXd mean, variance;
@@ -140,7 +139,6 @@ TEST(CalibrationTarget, UnitsOfTheBasisDoNotMatter) {
   const Joint joint;
   HistoryData scaled = make_data();
   scaled.basis *= 100.0;
-  scaled.spread /= 100.0;
   EmulatorState state = joint.emulator.state();
   state.coefficients /= 100.0;
   const Emulator emulator(state);
@@ -154,7 +152,7 @@ TEST(CalibrationTarget, UnitsOfTheBasisDoNotMatter) {
 TEST(CalibrationTarget, RefusesAnEmulatorOfAnotherBasis) {
   HistoryData data = make_data();
   data.basis = normal_matrix(kN, 3, 1);
-  data.spread.resize(0, 0);
+  data.moves.resize(0, 0);
   const HistoryModel model = make_model({}, data);
   const Emulator emulator = make_emulator(1);
   EXPECT_THROW(CalibrationTarget(model, {}, emulator), std::invalid_argument);
@@ -304,7 +302,7 @@ TEST(ParameterModes, WithoutAModeThePriorStands) {
 // With a large nugget, so that the emulator's own variance is seen.
 TEST(Linearisation, OverThePriorsItHasTheEmulatorsMomentsThere) {
   const Emulator emulator = make_emulator(2, 0.0);
-  const GaussianSimulator simulator = over_priors(emulator, Stream(1, 2, 3));
+  const GaussianSimulator simulator = over_region(emulator);
   constexpr Index n = 150 * 150;  // midpoints of the unit square
   MatrixXd u(n, 2), mean, variance;
   for (Index i = 0; i < n; ++i)
@@ -417,22 +415,10 @@ struct Reaching {
     priors.noise_sd = 0.5;
     priors.error = kError;
     priors.reach = {2.0, kInfinity};
-    return history_model(own, priors, emulator, Context());
+    own.moves = own.basis * over_region(emulator).root;
+    return HistoryModel(own, priors, Context());
   }
 };
-
-TEST(HistoryModelOfAnEmulator, SpreadIsTheEmulatorsOverThePriorsWhateverTheSeed) {
-  const Emulator emulator = make_emulator(2);
-  Context other;
-  other.seed = 99;
-  const HistoryModel a = history_model(make_data(), make_priors(kError), emulator, Context()),
-                     b = history_model(make_data(), make_priors(kError), emulator, other);
-  EXPECT_EQ(a.data().spread, b.data().spread);
-  const MatrixXd first = a.data().spread, second = over_priors(emulator, Stream(7, 8, 9)).root;
-  // Four standard errors of variances from 512 points, twice.
-  for (Index q = 0; q < 2; ++q)
-    EXPECT_NEAR(first.row(q).squaredNorm() / second.row(q).squaredNorm(), 1.0, 4 * std::sqrt(4.0 / 512));
-}
 
 TEST(Calibrate, DiscrepancyWhereTheParametersCouldMoveIsFree) {
   const Reaching record;
@@ -442,7 +428,7 @@ TEST(Calibrate, DiscrepancyWhereTheParametersCouldMoveIsFree) {
   const Calibration c = calibrate(model, emulator, {}, Context());
   EXPECT_TRUE(c.posterior.trusted) << c.posterior.verdict;
   EXPECT_GT(c.reach[1], 0.99);
-  const MatrixXd seen = model.data().responses * c.coefficients - model.data().basis * c.withheld;
+  const MatrixXd seen = model.data().responses * c.coefficients - model.data().moves * c.withheld;
   // The simulator takes its share of what lies along it: a standard deviation of 0.6 of 4.
   for (Index k = 0; k < seen.cols(); ++k) EXPECT_LT((seen.col(k) - truth).norm(), 0.35 * truth.norm()) << k;
 }
@@ -455,7 +441,7 @@ TEST(Calibrate, DiscrepancyThatKeepsOutOfTheParametersWayDoesNotReachFar) {
   const Calibration c = calibrate(model, emulator, {}, Context());
   EXPECT_TRUE(c.posterior.trusted) << c.posterior.verdict;
   EXPECT_GT(c.reach[0], 0.99);
-  const MatrixXd seen = model.data().responses * c.coefficients - model.data().basis * c.withheld;
+  const MatrixXd seen = model.data().responses * c.coefficients - model.data().moves * c.withheld;
   // Noise of 0.5 leaves one coefficient of 60 values an error of a fortieth of 2.4.
   for (Index k = 0; k < seen.cols(); ++k) EXPECT_LT((seen.col(k) - truth).norm(), 0.2 * truth.norm()) << k;
 }

@@ -29,7 +29,7 @@ HistoryData make_data() {
   data.basis = normal_matrix(kN, kQ, 41);
   data.basis.col(0) *= 5000.0;
   data.basis.col(2).setOnes();
-  data.spread = Eigen::Vector3d(1e-3, 0.4, 2.0).asDiagonal() * normal_matrix(kQ, 2, 49);
+  data.moves = data.basis * (Eigen::Vector3d(1e-3, 0.4, 2.0).asDiagonal() * normal_matrix(kQ, 2, 49));
   data.responses = 3.0 * normal_matrix(kN, 5, 42);
   data.responses.col(1).array() += 10.0;
   data.condition = {0, 0, 1, 2, 2};
@@ -71,7 +71,7 @@ MatrixXd standardised(const HistoryData& data) {
 MatrixXd out_of_reach(const HistoryData& data, double reach, const MatrixXd& phi) {
   if (std::isinf(reach)) return phi;
   using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-  const LongMatrix moves = data.basis.cast<long double>() * data.spread.cast<long double>();
+  const LongMatrix moves = data.moves.cast<long double>();
   const LongMatrix a = moves * moves.transpose() / static_cast<long double>(reach * kNoise * kNoise);
   const LongMatrix inverted = LongMatrix::Identity(kN, kN) + a * a;
   return inverted.ldlt().solve(phi.cast<long double>()).cast<double>();
@@ -174,7 +174,6 @@ TEST(HistoryModel, NamesAndUnitsOfTheBasisDoNotMatter) {
   const Eigen::PermutationMatrix<3> order(Eigen::Vector3i(2, 0, 1));
   HistoryData other = data;
   other.basis = data.basis * scale.cwiseInverse().asDiagonal() * order;
-  other.spread = order.transpose() * MatrixXd(scale.asDiagonal() * data.spread);
   const VectorXd mean = order.transpose() * VectorXd(scale.cwiseProduct(kMean)),
                  variance = order.transpose() * VectorXd(scale.cwiseAbs2().cwiseProduct(kSpread));
   const HistoryModel a = make_model(data), b = make_model(other);
@@ -187,7 +186,6 @@ TEST(HistoryModel, AnotherBasisOfTheSameSpaceGivesTheSameDensity) {
   const MatrixXd r = MatrixXd(normal_matrix(3, 3, 50) * Eigen::Vector3d(5000.0, 1.0, 1.0).asDiagonal());
   HistoryData other = data;
   other.basis = data.basis * r.inverse();
-  other.spread = r * data.spread;
   const HistoryModel a = make_model(data), b = make_model(other);
   const GaussianSimulator simulator = make_simulator(), moved{r * simulator.mean, r * simulator.root};
   for (int g : {0, 7, 12, 26})
@@ -202,9 +200,8 @@ HistoryData with_another_vector(double sd) {
   HistoryData more = data;
   more.basis.resize(kN, 4);
   more.basis << data.basis, normal_vector(kN, 51);
-  more.spread = MatrixXd::Zero(4, 3);
-  more.spread.topLeftCorner(3, 2) = data.spread;
-  more.spread(3, 2) = sd;
+  more.moves.resize(kN, 3);
+  more.moves << data.moves, sd * more.basis.col(3);
   return more;
 }
 
@@ -333,11 +330,11 @@ TEST(HistoryModel, WithheldIsWhatTheReachTakesOutOfTheResponses) {
   const HistoryModel model = make_model(data);
   EXPECT_LT((model.data().responses - standardised(data)).cwiseAbs().maxCoeff(), 1e-13);
   for (int g : {0, 13, 26}) {
-    const MatrixXd psi = standardised(data) - data.basis * model.withheld(g);
+    const MatrixXd psi = standardised(data) - data.moves * model.withheld(g);
     EXPECT_LT((psi - dense_psi(data, g)).cwiseAbs().maxCoeff(), 1e-10) << g;
   }
   EXPECT_EQ(model.withheld(26).cwiseAbs().maxCoeff(), 0.0);  // free
-  EXPECT_GT((data.basis * model.withheld(13)).cwiseAbs().maxCoeff(), 0.05);
+  EXPECT_GT((data.moves * model.withheld(13)).cwiseAbs().maxCoeff(), 0.05);
 }
 
 TEST(HistoryModel, ReachRunsFromNothingOfTheSimulatorsSpaceToFree) {
@@ -345,18 +342,18 @@ TEST(HistoryModel, ReachRunsFromNothingOfTheSimulatorsSpaceToFree) {
   HistoryPriors priors = make_priors();
   priors.reach = {1e-6, 1e9, kInfinity};
   const HistoryModel model(data, priors, Context());
-  const MatrixXd phi = standardised(data), moves = data.basis * data.spread;
-  const MatrixXd o = moves.householderQr().householderQ() * MatrixXd::Identity(kN, 2);
-  const MatrixXd psi = phi - data.basis * model.withheld(0);
+  const MatrixXd phi = standardised(data);
+  const MatrixXd o = data.moves.householderQr().householderQ() * MatrixXd::Identity(kN, 2);
+  const MatrixXd psi = phi - data.moves * model.withheld(0);
   // What is left of a direction is (c / s^2)^2, s^2 at least 1 and c = 5e-7.
   EXPECT_LT((o.transpose() * psi).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_LT((psi - (phi - o * (o.transpose() * phi))).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_NEAR(log_likelihood(model, at(9)), log_likelihood(model, at(18)), kRounding);
 }
 
-TEST(HistoryModel, ReachWithoutASpreadIsFree) {
+TEST(HistoryModel, ReachIsFreeWhereTheSimulatorDoesNotMove) {
   HistoryData data = make_data();
-  data.spread.resize(0, 0);
+  data.moves.resize(0, 0);
   const HistoryModel model = make_model(data);
   EXPECT_EQ(log_likelihood(model, at(4)), log_likelihood(model, at(22)));
 }
@@ -475,7 +472,7 @@ TEST(HistoryModel, RefusesDataThatDoNotFit) {
   refuses([](HistoryData& data) { data.condition[2] = -1; });
   refuses([](HistoryData& data) { data.basis = normal_matrix(kN, kN, 1); });
   refuses([](HistoryData& data) { data.basis.col(1).setZero(); });
-  refuses([](HistoryData& data) { data.spread = MatrixXd::Ones(2, 2); });
+  refuses([](HistoryData& data) { data.moves = MatrixXd::Ones(2, 2); });
 }
 
 TEST(HistoryModel, RefusesPriorsWithoutMeaning) {

@@ -93,7 +93,7 @@ BentMap BentMap::fit(const MatrixXd& x, const VectorXd& weights) {
   const double effective = 1.0 / weights.squaredNorm();
   const MatrixXd s = map.axes_.transpose() * apart;
   const VectorXd root = weights.cwiseSqrt();
-  bool bends = false;
+  bool bent_at_all = false;
   for (int leading = 1; leading <= std::min<Index>(kLeading, d - 1); ++leading) {
     for (int degree = 2; degree <= 3; ++degree) {
       const Terms terms{leading, degree};
@@ -124,15 +124,15 @@ BentMap BentMap::fit(const MatrixXd& x, const VectorXd& weights) {
         if (!(after > 0) || !(gain(after, m) > best)) continue;
         map.terms_[k] = terms;
         map.coefficients_[k] = coefficients.col(j);
-        bends = true;
+        bent_at_all = true;
       }
     }
   }
-  return bends ? map : BentMap();
+  return bent_at_all ? map : BentMap();
 }
 
 VectorXd BentMap::straight(const VectorXd& x) const {
-  if (axes_.cols() == 0) return x;
+  if (!bends()) return x;
   const VectorXd s = axes_.transpose() * (x - centre_);
   VectorXd z = s;
   for (Index j = 0; j < z.size(); ++j) z[j] -= shift(j, s);
@@ -140,14 +140,14 @@ VectorXd BentMap::straight(const VectorXd& x) const {
 }
 
 VectorXd BentMap::bent(const VectorXd& z) const {
-  if (axes_.cols() == 0) return z;
+  if (!bends()) return z;
   VectorXd s = z;
   for (Index j = 0; j < s.size(); ++j) s[j] += shift(j, s);  // of coordinates before it alone
   return axes_ * s + centre_;
 }
 
 VectorXd BentMap::gradient(const VectorXd& x, const VectorXd& by_z) const {
-  if (axes_.cols() == 0) return by_z;
+  if (!bends()) return by_z;
   const VectorXd s = axes_.transpose() * (x - centre_);
   VectorXd by_s = by_z, inner;
   const VectorXd t = standard(s, &inner);

@@ -18,6 +18,7 @@ class BentMap {
   /// Least squares on weighted points (columns of x; weights sum to 1).
   static BentMap fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights);
 
+  bool bends() const { return axes_.cols() > 0; }
   Eigen::VectorXd straight(const Eigen::VectorXd& x) const;  ///< z of x
   Eigen::VectorXd bent(const Eigen::VectorXd& z) const;      ///< x of z
   /// Gradient by x of a function with gradient `by_z` at z(x).

@@ -102,17 +102,25 @@ VectorXd SkewMap::slope(const VectorXd& x) const {
 
 SkewedMixture SkewedMixture::fit(const MatrixXd& x, const VectorXd& weights, int max_components, double dof,
                                  Stream& stream) {
-  BentMap bend;
-  SkewMap map;
-  MatrixXd z = x;
-  if (1.0 / weights.squaredNorm() >= kLeastPoints) {
-    bend = BentMap::fit(x, weights);
+  if (1.0 / weights.squaredNorm() < kLeastPoints)
+    return SkewedMixture(SkewMap(), StudentTMixture::fit(x, weights, max_components, dof, stream));
+  const auto fitted = [&](BentMap bend) {
+    MatrixXd z(x.rows(), x.cols());
     for (Index i = 0; i < x.cols(); ++i) z.col(i) = bend.straight(x.col(i));
-    map = SkewMap::fit(z, weights);
+    SkewMap map = SkewMap::fit(z, weights);
     for (Index i = 0; i < x.cols(); ++i) z.col(i) = map.even(z.col(i));
-  }
-  return SkewedMixture(std::move(bend), std::move(map),
-                       StudentTMixture::fit(z, weights, max_components, dof, stream));
+    return SkewedMixture(std::move(bend), std::move(map),
+                         StudentTMixture::fit(z, weights, max_components, dof, stream));
+  };
+  SkewedMixture plain = fitted(BentMap());
+  BentMap bend = BentMap::fit(x, weights);
+  if (!bend.bends()) return plain;
+  // Bending turns the axes, in which each coordinate was made even: whichever comes closer to the points.
+  SkewedMixture bent = fitted(std::move(bend));
+  double gain = 0.0;
+  for (Index i = 0; i < x.cols(); ++i)
+    gain += weights[i] * (bent.log_density(x.col(i)) - plain.log_density(x.col(i)));
+  return gain > 0 ? bent : plain;
 }
 
 double SkewedMixture::log_density(const VectorXd& x) const {

@@ -159,9 +159,12 @@ void HistoryModel::find_directions() {
   const double least = *std::min_element(priors_.reach.begin(), priors_.reach.end());
   const double c = least * priors_.noise_sd * priors_.noise_sd;
   std::vector<Index> kept;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(data_.moves.transpose() * data_.moves);
-  for (Index j = data_.moves.cols() - 1; j >= 0 && std::isfinite(c); --j) {
-    if (eigen.eigenvalues()[j] > kFaintest * c) kept.push_back(j);
+  Eigen::SelfAdjointEigenSolver<MatrixXd> eigen;
+  if (data_.moves.cols() > 0 && std::isfinite(c)) {
+    eigen.compute(data_.moves.transpose() * data_.moves);
+    for (Index j = data_.moves.cols() - 1; j >= 0; --j) {
+      if (eigen.eigenvalues()[j] > kFaintest * c) kept.push_back(j);
+    }
   }
   const Index r = static_cast<Index>(kept.size());
   of_moves_.resize(data_.moves.cols(), r);
