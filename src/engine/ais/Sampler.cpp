@@ -16,6 +16,9 @@ using Eigen::MatrixXd;
 
 namespace {
 
+constexpr double kDoubt = 2.0;     // standard errors by which another estimate lies above
+constexpr double kThirdDof = 5.0;  // of the mixture that a third run starts from
+
 void report(AisResult& result, const std::string& name, double log_evidence, const Spread& spread) {
   result.estimator = name;
   result.log_evidence = log_evidence;
@@ -58,23 +61,34 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
     return;
   }
   AnnealedRun bridged({target, mixture}, options, context, kBridged);
-  bool shorter = bridged.price() < annealed.price();
+  const bool shorter = bridged.price() < annealed.price();
   (shorter ? bridged : annealed).refine();
-  // An estimate above the one to be reported may have seen what that one missed, or be loose: it is made
-  // precise, and the higher one stands.
-  AnnealedRun& own = shorter ? bridged : annealed;
-  AnnealedRun& other = shorter ? annealed : bridged;
-  if (other.log_evidence() > own.log_evidence() + 2.0 * std::max(own.spread().se, options.precision)) {
-    other.refine();
-    if (other.log_evidence() > own.log_evidence() + 2.0 * std::hypot(own.spread().se, other.spread().se))
-      shorter = !shorter;
-  }
   result.evaluations += bridged.evaluations();
   result.second = bridged.log_evidence();
   result.second_se = bridged.spread().se;
   report(result, "bridged", bridged);
   result.second_ess = result.ess;
   if (!shorter) report(result, "annealed", annealed);
+
+  // The estimate that is not reported lies above the other: it has seen what that one missed, or is loose. A
+  // third run, from a mixture fitted to the draws of both, decides.
+  const AnnealedRun& own = shorter ? bridged : annealed;
+  const AnnealedRun& other = shorter ? annealed : bridged;
+  if (!(other.log_evidence() > own.log_evidence() + kDoubt * std::max(own.spread().se, options.precision)))
+    return;
+  DrawPool both;
+  for (const AnnealedRun* run : {&annealed, &bridged}) {
+    MatrixXd x;
+    Eigen::VectorXd ll, weights;
+    run->gather(x, ll, weights);
+    both.add(x, weights);
+  }
+  const SkewedMixture joined = both.fit(options.max_components, kThirdDof, stream);
+  AnnealedRun third({target, joined}, options, context, kThird);
+  third.refine();
+  result.evaluations += third.evaluations();
+  report(result, "bridged", third);
+  result.second_ess = result.ess;
 }
 
 // Both estimates of Z are unbiased, so each is seldom too large (Markov: Z_hat > k Z with probability below 1

@@ -9,7 +9,8 @@ enum SamplingPurpose : std::uint64_t {
   kFrozen,
   kBootstrap,
   kImportance,
-  kBridged = 16,  ///< added to the others by the second annealed run
+  kBridged = 16,  ///< added to the others by the second annealed run,
+  kThird = 32,    ///< and by the third
 };
 
 }  // namespace amiss
