@@ -72,7 +72,7 @@ one_design <- function(case, runs, noise, seed) {
   values <- matrix((y - centre) / spread)
   basis <- list(vectors = matrix(1, 3, 1), coefficients = values, singular_values = 1, discarded_ss = 0)
   seconds <- system.time(e <- amiss:::train_emulator_(x, basis, amiss:::emulator_control, list(seed = 1, threads = 1)), gcFirst = FALSE)[["elapsed"]]
-  p <- amiss:::predict_emulator_(e, at)
+  p <- amiss:::predict_emulator_(e, stats::qnorm(at))
   error <- truth - centre - spread * p$mean[, 1]
   # At the mode: variances without what they were widened by, leave-one-out errors from the covariance.
   mode <- e$hyperparameters[1, ] + log(e$widened) * c(-1, -1, 1, rep(0, case$inputs))

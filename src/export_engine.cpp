@@ -148,12 +148,11 @@ Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basi
   emulator.leave_one_out(mean, variance);
   const EmulatorState state = emulator.state();
   using Rcpp::_;
-  return Rcpp::List::create(_["inputs"] = state.inputs, _["coefficients"] = state.coefficients,
-                            _["hyperparameters"] = state.parameters, _["loo_mean"] = mean,
-                            _["loo_variance"] = variance, _["widened"] = emulator.widened(),
-                            _["spread"] = over_region(emulator).root,
-                            _["evaluations"] = emulator.evaluations(),
-                            _["selection"] = selection_table(emulator));
+  return Rcpp::List::create(
+      _["inputs"] = state.inputs, _["coefficients"] = state.coefficients,
+      _["hyperparameters"] = state.parameters, _["loo_mean"] = mean, _["loo_variance"] = variance,
+      _["widened"] = emulator.widened(), _["spread"] = over_region(emulator).root,
+      _["evaluations"] = emulator.evaluations(), _["selection"] = selection_table(emulator));
 }
 
 // [[Rcpp::export]]
@@ -225,7 +224,8 @@ Rcpp::List tangent_posterior_(const Rcpp::List& data, const Rcpp::List& priors, 
   const TangentPosterior result =
       tangent_posterior(make_history_data(data), make_history_priors(priors), x0, run, slopes, draws,
                         convert::ais_options(ais), convert::context(context));
-  Rcpp::List out = Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
+  Rcpp::List out =
+      Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
   const Eigen::Index conditions = result.history.front().t.size();
   add_points(out, result.history, static_cast<int>(conditions));
   return out;

@@ -70,7 +70,7 @@ draw_history <- function(world, control) {
 # Covariance of the emulated coefficients over the priors, by many points: how far the simulator can move.
 simulator_spread <- function(emulator, points = 20000) {
   set.seed(1)
-  w <- amiss:::predict_emulator_(emulator$processes, matrix(stats::runif(points * length(emulator$parameters)), points))
+  w <- amiss:::emulated_coefficients(emulator, matrix(stats::runif(points * length(emulator$parameters)), points))
   stats::cov(w$mean) + diag(colMeans(w$variance), ncol(w$mean))
 }
 

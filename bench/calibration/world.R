@@ -26,6 +26,6 @@ observed <- function(measurements, y) {
 
 # Emulator's mean and variance of the coefficients at one point of the unit cube.
 coefficients_at <- function(emulator, unit) {
-  w <- amiss:::predict_emulator_(emulator$processes, matrix(unit, 1))
+  w <- amiss:::emulated_coefficients(emulator, matrix(unit, 1))
   list(mean = w$mean[1, ], variance = w$variance[1, ])
 }

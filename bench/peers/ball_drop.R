@@ -55,7 +55,7 @@ higdon_likelihood <- function(emulator, field, heights, scale) {
   }
   function(z) {
     points <- expand.grid(R = to_unit("R", radii), C = to_unit("C", z[, "C"]))
-    w <- amiss:::predict_emulator_(emulator$processes, as.matrix(points))
+    w <- amiss:::emulated_coefficients(emulator, as.matrix(points))
     precision <- matrix(stats::qexp(z[, c("v", "o")], 0.001) / scale^2, ncol = 2)
     vapply(seq_len(nrow(z)), function(i) {
       own <- length(radii) * (i - 1) + seq_along(radii)

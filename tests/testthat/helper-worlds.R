@@ -36,6 +36,7 @@ linear_fit <- function(measurements = linear_measurements(), seed = 3, threads =
 rescaled <- function(emulator, factor) {
   emulator$basis$vectors <- emulator$basis$vectors * factor
   emulator$processes$coefficients <- emulator$processes$coefficients / factor
+  emulator$spread <- emulator$spread / factor
   emulator
 }
 

@@ -52,13 +52,25 @@ test_that("a model that is wrong where its parameters could hide it has a free d
   expect_match(printed(fit), "reaches into what the parameters can do .probability (0.9[5-9]|1.00).")
 })
 
-test_that("where what lacks is nothing that the parameters could do, the discrepancy keeps out of their way", {
+test_that("the reach has the probabilities that separate calibrations give it", {
   data <- linear_data()
   data$Tn <- withr::with_seed(6, as.numeric(stats::filter(rnorm(240), 0.9, "recursive")))
-  data$Ti <- data$Ti + 0.3 * lagged(data$Tn, 3)
-  fit <- linear_fit(linear_measurements(data, boundary = c("Te", "Gv", "Tn")))
-  expect_lt(fit$reach[["Inf"]], 0.1)
-  expect_match(printed(fit), "keeps out of what the parameters can do")
+  data$Ti <- data$Ti + 0.3 * lagged(data$Tn, 3) + 0.3 * data$Te
+  m <- linear_measurements(data, boundary = c("Te", "Gv", "Tn"))
+  fit <- linear_fit(m)
+  alone <- lapply(fit$control$reach, function(reach) calibrate(fit$emulator, m, c(quick_ais, list(reach = reach)), seed = 3))
+  of_each <- vapply(alone, `[[`, 0, "log_evidence")
+  se <- vapply(alone, `[[`, 0, "standard_error")
+  expected <- exp(of_each - max(of_each)) / sum(exp(of_each - max(of_each)))
+  # Four standard errors of the evidences, and of shares of the effective draws.
+  error <- sqrt(expected * (1 - expected) / fit$posterior$ess + (2 * expected * (1 - expected) * max(se))^2)
+  expect_true(all(abs(fit$reach - expected) < 4 * error + 1e-3))
+})
+
+test_that("what the reach says is put into words", {
+  fit <- linear_fit()
+  fit$reach[] <- c(0.9, 0.08, 0.02)
+  expect_match(printed(fit), "keeps out of what the parameters can do .probability 0.98.")
 })
 
 test_that("same seed, one or two threads: same bits", {
@@ -128,6 +140,7 @@ test_that("a record with no more rows than the basis has vectors is refused", {
   emulator <- suppressWarnings(train_emulator(noisy, m, list(explained = 1, noise_fraction = 1e-9)))
   expect_identical(ncol(emulator$basis$vectors), 19L)  # never as many as rows
   emulator$basis$vectors <- cbind(emulator$basis$vectors, cos(1:20), sin(1:20))
+  emulator$spread <- rbind(emulator$spread, 0, 0)
   emulator$basis$discarded_sd[] <- 0
   expect_error(calibrate(emulator, m, quick_ais, seed = 1), "20 rows, no more than the 21 basis vectors",
                class = "amiss_error_input")

@@ -34,8 +34,28 @@ test_that("the error of the check is that of runs at the record's rows", {
   }
   # Both are differences of numbers near 25: rounding, of 1e-4.
   expect_equal(fit$check$error, sqrt(mean(vapply(seq_along(made$draws), own, numeric(240))^2)), tolerance = 1e-6)
-  expect_lte(fit$check$noise, 0.1)
   expect_equal(fit$check$ratio, fit$check$error / fit$check$noise)
+  # White error of 0.1, as stated: the noise that it is measured by lies within what 240 values tell of it.
+  white <- calibrate(fit$emulator, fit$measurements, c(quick_ais, list(error_times = numeric())), seed = 3)
+  expect_lt(abs(white$check$noise - 0.1), 0.1 * 4 / sqrt(2 * 240))
+})
+
+test_that("a smooth error counts less where the measurement error is smooth", {
+  fit <- linear_fit()
+  smooth <- matrix(0.05 * sin(2 * pi * seq_len(240) / 120))
+  rough <- matrix(0.05 * rep(c(-1, 1), 120) / sqrt(2))  # as large
+  ratio <- function(digit, error) {
+    fit$posterior$setting[] <- digit
+    fit$posterior$variance[] <- 0.01
+    amiss:::error_over_noise(fit, error)
+  }
+  white <- ratio(0L, smooth)
+  expect_equal(white, sqrt(mean(smooth^2)) / 0.1, tolerance = 1e-8)
+  expect_equal(ratio(0L, rough), sqrt(mean(rough^2)) / 0.1, tolerance = 1e-8)
+  # Setting 5: an Ornstein-Uhlenbeck part of 30 times the white variance over two steps. Its spectrum over its variance is 4.1 for
+  # slow errors and 0.25 for those that alternate; both count over the larger noise seen, by the root of 31.
+  expect_equal(ratio(5L, smooth) / white, sqrt(31 / (1 + 30 * 4.1)), tolerance = 0.1)
+  expect_equal(ratio(5L, rough) / white, sqrt(31 / (1 + 30 * 0.25)), tolerance = 0.1)
 })
 
 test_that("spoiled coefficients fail the check, and the calibration says why it is not trusted", {

@@ -75,12 +75,19 @@ test_that("runs are added where the posterior lies, and the emulator is better t
   first <- simulate_design(bent, m, runs = 12, seed = 2)
   fit <- calibrate(train_emulator(first, m), m, quick_ais, seed = 1)
   more <- refine_ensemble(first, fit, runs = 8)
-  expect_identical(dim(more$values), c(20L, 2L))
-  expect_identical(more$outputs[, 1:12], first$outputs)
+  # Runs of the first that lie in the region, then the new ones.
+  region <- more$region
+  inside <- amiss:::in_region(region, first$unit)
+  n <- nrow(more$values)
+  expect_equal(n, sum(inside) + 8)
+  expect_true(all(amiss:::in_region(region, more$unit)))
   expect_true(all(more$unit > 0 & more$unit < 1))
-  added <- more$values[13:20, "a"]
-  expect_lt(abs(mean(added) - sum(fit$weights * fit$values[, "a"])), 0.2)
-  expect_equal(more$outputs[, 20], bent$f(more$values[20, ], as.matrix(data["Te"])))
+  expect_lt(abs(mean(more$values[n - 7:0, "a"]) - sum(fit$weights * fit$values[, "a"])), 0.2)
+  expect_equal(more$outputs[, n], bent$f(more$values[n, ], as.matrix(data["Te"])))
+  # The posterior lies inside, and what the emulator says holds there alone.
+  far <- amiss:::region_distance(region, amiss:::posterior_unit(fit))
+  expect_gt(sum(fit$weights[far < 1]), 0.99)
+  expect_error(stats::predict(train_emulator(more, m), cbind(a = 1.9, b = -0.9)), "outside the region", class = "amiss_error_input")
   truth <- bent$f(c(a = 0.12, b = 0.2), as.matrix(data["Te"]))
   off <- function(ensemble) max(abs(stats::predict(train_emulator(ensemble, m), cbind(a = 0.12, b = 0.2))$mean - truth))
   expect_lt(off(more), off(first))

@@ -44,29 +44,30 @@ test_that("only held-out measurements' conditions are used, not their values", {
                    predict(fit, "validate", discrepancy = TRUE)$mean)
 })
 
-test_that("the basis at other rows is that of the same runs", {
+test_that("how the simulator moves at other rows is told by the same runs", {
   fit <- lacking()
-  expect_equal(amiss:::basis_at(fit, "calibrate", 1), unname(fit$emulator$basis$vectors), tolerance = 1e-10)
-  both <- amiss:::basis_at(fit, c("calibrate", "validate"), 1)
-  expect_equal(both[1:320, ], unname(fit$emulator$basis$vectors), tolerance = 1e-10)
+  moves <- unname(amiss:::simulator_moves(fit$emulator))
+  expect_equal(amiss:::moves_at(fit, "calibrate", 1), moves, tolerance = 1e-10)
+  both <- amiss:::moves_at(fit, c("calibrate", "validate"), 1)
+  expect_equal(both[1:320, ], moves, tolerance = 1e-10)
   # The space of offset and gain: the vectors of all rows lie in it as well.
   expect_lt(max(abs(stats::lm.fit(cbind(1, linear_data(480)$Te), both)$residuals)), 1e-8 * max(abs(both)))
 })
 
-test_that("runs that fail at other rows are left out of the basis there", {
+test_that("runs that fail at other rows are left out of its moves there", {
   fit <- lacking()
   fragile <- fit
   fragile$emulator$simulator <- function_simulator(function(values, drivers) {
     if (values[["gain"]] > 0.9 && nrow(drivers) > 320) stop("too hot")
     values[["offset"]] + values[["gain"]] * drivers[, "Te"]
   }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
-  expect_no_warning(own <- amiss:::basis_at(fragile, "validate", 1))
-  expect_equal(own, amiss:::basis_at(fit, "validate", 1), tolerance = 1e-8)
+  expect_no_warning(own <- amiss:::moves_at(fragile, "validate", 1))
+  expect_equal(own, amiss:::moves_at(fit, "validate", 1), tolerance = 1e-8)
   never <- fit
   never$emulator$simulator <- function_simulator(function(values, drivers) NaN * drivers[, 1],
                                                  free("offset", uniform(10, 30), "K"),
                                                  free("gain", uniform(0, 1)), boundary = "Te")
-  expect_error(amiss:::basis_at(never, "validate", 1), "failed at 30 of the ensemble's 30 runs",
+  expect_error(amiss:::moves_at(never, "validate", 1), "failed at 30 of the ensemble's 30 runs",
                class = "amiss_error_numerical")
 })
 

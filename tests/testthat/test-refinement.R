@@ -8,12 +8,12 @@ test_that("a check that fails is mended by its own runs", {
   expect_identical(fit$rounds, 1L)
   expect_true(fit$check$passed)
   expect_true(fit$trust$trusted)
-  # 6 runs of the design, those of the first check and those of the coarse calibration after it, but not those of the last.
-  inputs <- fit$emulator$processes$inputs
-  first <- refined(rounds = 0)
-  expect_gt(fit$runs_made, first$check$runs + fit$check$runs)
-  expect_equal(nrow(inputs), 6 + fit$runs_made - fit$check$runs)
-  expect_equal(inputs[1:6, ], first$emulator$processes$inputs)
+  # In a region of its own, of 40 runs and those of the checks; the emulator over the priors says how far the simulator moves.
+  expect_false(is.null(fit$emulator$processes$region))
+  expect_gte(nrow(fit$emulator$unit), 40)
+  expect_gte(fit$runs_made, 40 + fit$check$runs)
+  expect_equal(nrow(fit$emulator$over_priors$unit), 6)
+  expect_null(fit$emulator$over_priors$simulator)
   # Evidence as of an emulator of many runs, within four standard errors.
   many <- refined(runs = 40, seed = 2)
   expect_identical(many$rounds, 0L)
@@ -26,7 +26,7 @@ test_that("no rounds: the check alone", {
   expect_identical(fit$rounds, 0L)
   expect_false(fit$check$passed)
   expect_false(fit$trust$trusted)
-  expect_equal(nrow(fit$emulator$processes$inputs), 6)
+  expect_equal(nrow(fit$emulator$unit), 6)
   expect_equal(fit$runs_made, fit$check$runs)
 })
 
@@ -55,7 +55,7 @@ test_that("runs made elsewhere are calibrated and checked, not refined", {
   expect_equal(fit$runs_made, 0)
   expect_false(fit$check$passed)
   expect_false(fit$trust$trusted)
-  expect_equal(nrow(fit$emulator$processes$inputs), 6)
+  expect_equal(nrow(fit$emulator$unit), 6)
 })
 
 test_that("runs that fail are counted, and do not join the ensemble", {
@@ -70,15 +70,17 @@ test_that("runs that fail are counted, and do not join the ensemble", {
   expect_identical(fit$rounds, 1L)
   expect_true(all(is.finite(fit$emulator$basis$vectors)))
   expect_equal(fit$runs_made, count - 6)
-  expect_equal(nrow(fit$emulator$processes$inputs), 6 + fit$runs_made - fit$check$runs - 1)
 })
 
 test_that("what joins is what the check asks for, however many runs the exact evidence takes", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, 6, seed = 1)
   control <- list(calibration = c(quick_ais, list(check = 10, exact = 30)))
-  fit <- calibrate_refined(runs, m, rounds = 1, control = control, seed = 1)
-  expect_equal(nrow(fit$emulator$processes$inputs), 6 + 10 + 10)  # of the first check and of the coarse one
+  count <- function(exact) {
+    control$calibration$exact <- exact
+    nrow(calibrate_refined(runs, m, rounds = 1, control = control, seed = 1)$emulator$unit)
+  }
+  expect_equal(count(30), count(10))
 })
 
 test_that("in a round the error that was seen widens the posterior", {

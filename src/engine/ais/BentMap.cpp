@@ -11,9 +11,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kLeading = 4;              // axes that others may bend along
-constexpr double kPointsPerTerm = 5.0;   // effective, at least
-constexpr double kFarthest = 3.5;        // standard deviations beyond which a sheet goes on level
+constexpr int kLeading = 4;             // axes that others may bend along
+constexpr double kPointsPerTerm = 5.0;  // effective, at least
+constexpr double kFarthest = 3.5;       // standard deviations beyond which a sheet goes on level
 
 }  // namespace
 
@@ -109,7 +109,8 @@ BentMap BentMap::fit(const MatrixXd& x, const VectorXd& weights) {
         const double before = map.sd_[j] * map.sd_[j];
         const double after = (weights.array() * left.col(j).array().square()).sum();
         const auto gain = [&](double variance, Index terms_used) {
-          return effective * std::log(before / variance) - static_cast<double>(terms_used) * std::log(effective);
+          return effective * std::log(before / variance) -
+                 static_cast<double>(terms_used) * std::log(effective);
         };
         double best = 0.0;
         if (map.terms_[k].degree > 0) {

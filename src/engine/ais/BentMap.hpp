@@ -35,9 +35,9 @@ class BentMap {
   double shift(Eigen::Index j, const Eigen::VectorXd& s) const;
 
   Eigen::VectorXd centre_;
-  Eigen::MatrixXd axes_;            // columns, widest first; none: the identity
-  Eigen::VectorXd sd_;              // of the points along each
-  std::vector<Terms> terms_;        // of each coordinate
+  Eigen::MatrixXd axes_;                       // columns, widest first; none: the identity
+  Eigen::VectorXd sd_;                         // of the points along each
+  std::vector<Terms> terms_;                   // of each coordinate
   std::vector<Eigen::VectorXd> coefficients_;  // intercept, then those of the terms
 };
 

@@ -56,8 +56,8 @@ bool hamiltonian(const Target& target, const AisOptions& options);
 double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                         const Context& context);
 
-/// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move in each part and, where there is a
-/// gradient, a Hamiltonian one.
+/// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move in each part and, where there is
+/// a gradient, a Hamiltonian one.
 int sweep_cost(const Target& target, const AisOptions& options);
 
 }  // namespace amiss

@@ -133,8 +133,6 @@ VectorXd SkewedMixture::gradient(const VectorXd& x) const {
   return bend_.gradient(x, map_.slope(z).cwiseProduct(mixture_.gradient(map_.even(z))));
 }
 
-VectorXd SkewedMixture::draw(Stream& stream) const { 
-  return bend_.bent(map_.skewed(mixture_.draw(stream)));
-}
+VectorXd SkewedMixture::draw(Stream& stream) const { return bend_.bent(map_.skewed(mixture_.draw(stream))); }
 
 }  // namespace amiss

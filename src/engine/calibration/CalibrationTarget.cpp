@@ -29,9 +29,10 @@ VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {
   emulator_.predict_at(parameters, mean, variance);
   VectorXd values(x.cols());
   for (Index i = 0; i < x.cols(); ++i) {
-    values[i] = emulator_.region().contains(parameters.col(i))
-                    ? model().log_likelihood(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose())
-                    : -std::numeric_limits<double>::infinity();
+    values[i] =
+        emulator_.region().contains(parameters.col(i))
+            ? model().log_likelihood(history(x.col(i)), mean.row(i).transpose(), variance.row(i).transpose())
+            : -std::numeric_limits<double>::infinity();
   }
   return values;
 }

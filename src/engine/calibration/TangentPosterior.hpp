@@ -7,14 +7,14 @@ namespace amiss {
 /// What the record says if the simulator is the straight line that touches it at x0, in the coordinates
 /// N(0, I) of its parameters.
 struct TangentPosterior {
-  Eigen::VectorXd mean;                   ///< P: of the parameters
-  Eigen::MatrixXd covariance;             ///< P x P
-  std::vector<HistoryParameters> history; ///< draws of equal weight of error and discrepancy
+  Eigen::VectorXd mean;                    ///< P: of the parameters
+  Eigen::MatrixXd covariance;              ///< P x P
+  std::vector<HistoryParameters> history;  ///< draws of equal weight of error and discrepancy
 };
 
 /// With f0 the run at x0 and J its slopes, y - f0 + J x0 = J x + discrepancy + error, x ~ N(0, I): closed in
-/// the parameters, so that only error and discrepancy are sampled. One step of a Gauss-Newton search, with the
-/// covariance of the record as uncertain as it is.
+/// the parameters, so that only error and discrepancy are sampled. One step of a Gauss-Newton search, with
+/// the covariance of the record as uncertain as it is.
 /// @param data    of the record, y included; its basis is not used.
 /// @param slopes  J, N x P.
 /// @param draws   of error and discrepancy.

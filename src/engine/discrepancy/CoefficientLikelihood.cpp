@@ -33,7 +33,8 @@ double CoefficientLikelihood::log_density(const VectorXd& mean, const VectorXd& 
 
 CoefficientLikelihood::Posterior CoefficientLikelihood::posterior() const {
   const Eigen::LLT<MatrixXd> f = factor(VectorXd::Ones(score_.size()));
-  return {f.solve(score_ + information_ * reference_), f.solve(MatrixXd::Identity(score_.size(), score_.size()))};
+  return {f.solve(score_ + information_ * reference_),
+          f.solve(MatrixXd::Identity(score_.size(), score_.size()))};
 }
 
 // A - A S^1/2 F^-1 S^1/2 A.

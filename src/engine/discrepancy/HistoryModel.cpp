@@ -30,8 +30,8 @@ MatrixXd whitened_gram(const MatrixXd& basis, const VectorXd& norms, const Matri
   for (Index first = 0; first < n; first += kBlock) {
     const Index rows = std::min(kBlock, n - first);
     block.resize(rows, columns);
-    block << basis.middleRows(first, rows), responses.middleRows(first, rows), directions.middleRows(first, rows),
-        residual.segment(first, rows);
+    block << basis.middleRows(first, rows), responses.middleRows(first, rows),
+        directions.middleRows(first, rows), residual.segment(first, rows);
     block.leftCols(q).array().rowwise() /= norms.transpose().array();
     block = whitener.rows(block, first, state);
     gram.selfadjointView<Eigen::Lower>().rankUpdate(block.transpose());
@@ -46,9 +46,9 @@ VectorXd column_norms(const MatrixXd& basis) { return basis.colwise().norm().tra
 // The setting without restraint, and the products of the directions with all of it.
 struct HistoryModel::FreeGram {
   WhitenedData data;
-  MatrixXd directions;       // U' W'W U
-  MatrixXd mixed;            // [K, Phi]' W'W U
-  VectorXd cross;            // U' W'W r0
+  MatrixXd directions;  // U' W'W U
+  MatrixXd mixed;       // [K, Phi]' W'W U
+  VectorXd cross;       // U' W'W r0
 
   // Psi = Phi - U X in place of Phi.
   WhitenedData restrained(const MatrixXd& x) const {
@@ -56,7 +56,8 @@ struct HistoryModel::FreeGram {
     if (x.isZero(0.0)) return out;
     const Index q = data.coefficients, p = data.cross.size() - q;
     const MatrixXd left = mixed.topRows(q) * x, half = mixed.bottomRows(p) * x;
-    const MatrixXd own = data.gram.bottomRightCorner(p, p) - half - half.transpose() + x.transpose() * directions * x;
+    const MatrixXd own =
+        data.gram.bottomRightCorner(p, p) - half - half.transpose() + x.transpose() * directions * x;
     out.gram.bottomRightCorner(p, p) = 0.5 * (own + own.transpose());
     out.gram.topRightCorner(q, p) -= left;
     out.gram.bottomLeftCorner(p, q) = out.gram.topRightCorner(q, p).transpose();
@@ -150,7 +151,8 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
     if (!wanted[static_cast<std::size_t>(g)]) return;
     const FreeGram free = whiten_freely(g, data_.responses);
     for (int k = 0; k < reaches; ++k)
-      settings_[static_cast<std::size_t>(k * errors + g)] = free.restrained(held[static_cast<std::size_t>(k)]);
+      settings_[static_cast<std::size_t>(k * errors + g)] =
+          free.restrained(held[static_cast<std::size_t>(k)]);
   });
 }
 

@@ -142,9 +142,9 @@ class HistoryModel {
   int conditions_;
   Eigen::VectorXd columns_, norms_, reference_, residual_;
   Eigen::RowVectorXd centre_, scale_;
-  Eigen::MatrixXd directions_;  // N x r': left singular vectors of E, those that the reach acts upon
-  Eigen::MatrixXd of_moves_;    // r x r': they are E of_moves_
-  Eigen::ArrayXd energy_;       // r': squared singular values
+  Eigen::MatrixXd directions_;          // N x r': left singular vectors of E, those that the reach acts upon
+  Eigen::MatrixXd of_moves_;            // r x r': they are E of_moves_
+  Eigen::ArrayXd energy_;               // r': squared singular values
   std::vector<WhitenedData> settings_;  // reach by reach, and for each error by error
 };
 

@@ -218,7 +218,8 @@ void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
 
 void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean) const {
   const MatrixXd scaled = points * decay_rates(parameters_.logit_beta).cwiseSqrt().asDiagonal();
-  mean.noalias() = std::exp(parameters_.log_amplitude) * (gaussian_kernel(scaled_inputs_, scaled).transpose() * weights_);
+  mean.noalias() =
+      std::exp(parameters_.log_amplitude) * (gaussian_kernel(scaled_inputs_, scaled).transpose() * weights_);
 }
 
 void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {

@@ -4,8 +4,8 @@
 namespace amiss {
 
 /// Where in the space of the parameters an emulator holds, and what the inputs of its processes are there.
-/// Points are in the coordinates in which the prior of the parameters is N(0, I): x = Phi^-1(z), z in the unit
-/// cube.
+/// Points are in the coordinates in which the prior of the parameters is N(0, I): x = Phi^-1(z), z in the
+/// unit cube.
 ///
 /// Everywhere, the inputs are z. In an ellipsoid |R^-1 (x - c)| <= rho, the inputs are
 /// 1/2 + R^-1 (x - c) / (2 rho): its axes are those of the posterior that it was drawn about, so that the
