@@ -132,7 +132,7 @@ test_that("one boundary condition is enough", {
 
 test_that("evidence lost is the posterior over the prior odds of a condition that does not act", {
   data <- linear_data()
-  data$Ti <- data$Ti + 0.00037 * data$Gv  # too weak to be certain: a part of the draws leaves it out
+  data$Ti <- data$Ti + 0.00031 * data$Gv  # too weak to be certain: a part of the draws leaves it out
   fit <- linear_fit(linear_measurements(data))
   table <- attribute_discrepancy(fit, list(surrogates = 19), seed = 1)$table
   off <- colSums(fit$weights * (fit$posterior$t == 0))

@@ -6,14 +6,15 @@ test_that("candidates that come near the best are calibrated in full, the others
   expect_equal(upgrade$named_cause$mechanism, "sun")
 })
 
-test_that("a third of the runs of a full calibration lies where the coarse posterior does", {
+test_that("a full calibration has an emulator of its own, of runs where the coarse posterior lies", {
   upgrade <- small_upgrade()
-  fit <- upgrade$models[[1]]$fit
-  design <- simulate_design(fit$emulator$simulator, upgrade$measurements, runs = 20, seed = 1)
-  expect_identical(dim(fit$emulator$processes$inputs), c(30L, 2L))
-  expect_identical(unname(fit$emulator$processes$inputs[1:20, ]), unname(design$unit))
-  spread <- function(rows) apply(fit$emulator$processes$inputs[rows, ], 2, sd)
-  expect_true(all(spread(21:30) < 0.5 * spread(1:20)))
+  emulator <- upgrade$models[[1]]$fit$emulator
+  design <- simulate_design(emulator$simulator, upgrade$measurements, runs = 20, seed = 1)
+  expect_identical(unname(emulator$over_priors$unit), unname(design$unit))
+  # A third of the 30 runs, those of the coarse check, and those of the first 20 that lie there.
+  expect_gte(nrow(emulator$unit), 10 + 10)
+  expect_true(all(amiss:::in_region(emulator$processes$region, emulator$unit)))
+  expect_true(all(apply(emulator$unit, 2, sd) < 0.5 * apply(design$unit, 2, sd)))
 })
 
 test_that("a coarse candidate is compared with the coarse calibration of the current model", {
