@@ -28,8 +28,17 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   runs <- max(runs, 40, 10 * length(ensemble$parameters))
   runs_made <- 0
   trained <- function(ensemble) train_emulator(ensemble, measurements, control$emulator, threads = threads)
+  round <- 0L
   calibrated <- function(ensemble, calibration, emulator = trained(ensemble)) {
-    own <- calibrate_with_runs(emulator, measurements, calibration, seed, threads)
+    own <- tryCatch(calibrate_with_runs(emulator, measurements, calibration, seed, threads), amiss_error_numerical = function(e) {
+      if (is.null(ensemble$region) || round >= rounds) rlang::cnd_signal(e)
+    })
+    if (is.null(own)) {  # the posterior lies at the very end of the region
+      round <<- round + 1L
+      runs_made <<- runs_made + runs
+      set <- list(emulator = emulator, measurements = measurements)
+      return(calibrated(regional_ensemble(ensemble, wider_region(ensemble$region), set, runs, threads), calibration))
+    }
     runs_made <<- runs_made + length(own$made$draws) + sum(own$made$failed)
     c(list(ensemble = ensemble), own)
   }
@@ -38,7 +47,6 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
     runs_made <<- runs_made + own$runs
     calibrated(own$ensemble, coarsely(control$calibration))
   }
-  round <- 0L
   coarse <- FALSE
   result <- first
   if (is.null(result)) {
@@ -88,14 +96,17 @@ coarsely <- function(calibration, ...) {
 }
 
 # list(ensemble, runs): the ensemble of the region to which searches on the simulator lead, and the runs that they and it took. They
-# start from `centre`, if there is one, and over the priors also from their middle and from the run nearest to the record.
+# start from `centre`, if there is one, and over the priors also from their middle and from the run nearest to the record. Where
+# none gets anywhere, as error and discrepancy could not be sampled so far from the record, the ensemble as it was.
 searched_ensemble <- function(ensemble, set, centre, runs, threads) {
   starts <- list(centre)
   if (is.null(ensemble$region)) {
     nearest <- which.min(colMeans((ensemble$outputs - set$measurements$y[set$rows])^2))
     starts <- list(centre, numeric(length(ensemble$parameters)), to_normal(ensemble$unit[nearest, ]))
   }
-  modes <- lapply(Filter(Negate(is.null), starts), function(start) search_mode(set, start, threads))
+  search <- function(start) tryCatch(search_mode(set, start, threads), amiss_error_numerical = function(e) NULL)
+  modes <- Filter(Negate(is.null), lapply(Filter(Negate(is.null), starts), search))
+  if (!length(modes)) return(list(ensemble = ensemble, runs = 0))
   list(ensemble = regional_ensemble(ensemble, region_of_modes(modes), set, runs, threads),
        runs = runs + sum(vapply(modes, `[[`, 0, "runs")))
 }

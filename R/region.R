@@ -19,6 +19,11 @@ posterior_region <- function(fit, growth = 1) {
   list(centre = centre, root = root, radius = 1.1 * max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999)))
 }
 
+wider_region <- function(region) {
+  region$root <- 1.5 * region$root
+  region
+}
+
 # The ellipsoid that holds what search_mode() found from several starts: modes as good as the best, or places along a ridge.
 region_of_modes <- function(modes) {
   value <- vapply(modes, `[[`, 0, "value")

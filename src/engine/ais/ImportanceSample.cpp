@@ -24,7 +24,7 @@ SkewedMixture refit(const ImportanceSample& sample, DrawPool& pool, const AisOpt
                     Stream& stream) {
   if (!options.skewed)
     return SkewedMixture(SkewMap(), fit_elliptic(sample.x, sample.weights, options, stream));
-  pool.add(sample.x, sample.weights);
+  if (sample.ess > 0) pool.add(sample.x, sample.weights);  // else the record is impossible at every draw
   return pool.fit(options.max_components, kImportanceDof, stream);
 }
 

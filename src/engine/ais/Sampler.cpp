@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <stdexcept>
 #include <utility>
 
 #include "engine/ais/AnnealedRun.hpp"
@@ -17,7 +19,7 @@ using Eigen::MatrixXd;
 namespace {
 
 constexpr double kDoubt = 2.0;     // standard errors by which another estimate lies above
-constexpr double kThirdDof = 5.0;  // of the mixture that a third run starts from
+constexpr double kBridgeDof = 8.0, kThirdDof = 5.0;  // of the mixtures that further runs start from
 
 void report(AisResult& result, const std::string& name, double log_evidence, const Spread& spread) {
   result.estimator = name;
@@ -51,6 +53,8 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   const StudentTMixture mixture = fit_elliptic(result.draws, result.weights, options, stream);
   DrawPool pool;
   pool.add(result.draws, result.weights);
+  const SkewedMixture close = options.skewed ? pool.fit(options.max_components, kBridgeDof, stream)
+                                             : SkewedMixture(SkewMap(), mixture);
   ImportanceSample sample =
       importance_sample(target, mixture, std::move(pool), options, context, stream, result.evaluations);
   if (sample.ess > 0) {
@@ -60,7 +64,16 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
     report(result, std::move(sample));
     return;
   }
-  AnnealedRun bridged({target, mixture}, options, context, kBridged);
+  std::unique_ptr<AnnealedRun> from_close;
+  try {
+    from_close = std::make_unique<AnnealedRun>(AnnealingPath{target, close}, options, context, kBridged);
+  } catch (const std::runtime_error&) {  // the record is impossible wherever the mixture has its mass
+    annealed.refine();
+    report(result, "annealed", annealed);
+    result.second = -std::numeric_limits<double>::infinity();
+    return;
+  }
+  AnnealedRun& bridged = *from_close;
   const bool shorter = bridged.price() < annealed.price();
   (shorter ? bridged : annealed).refine();
   result.evaluations += bridged.evaluations();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "engine/ais/CloserReference.hpp"
@@ -110,7 +111,13 @@ AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& op
       closer_mixture(target, population, kRoundDraws * target.dimension(), context, stream, spent);
   AisOptions own = options;
   own.skewed = true;
-  AisResult result = sample_ais(target, mixture, own, context.fork(kPosterior));
+  const Context last = context.fork(kPosterior);
+  AisResult result;
+  try {
+    result = sample_ais(target, mixture, own, last);
+  } catch (const std::runtime_error&) {  // the mixture has lost the posterior: from where it came
+    result = sample_ais(target, reference, own, last);
+  }
   result.evaluations += spent;
   return result;
 }

@@ -18,6 +18,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kSettled = 1e-2;  // gain in nats at which a search ends
+constexpr double kRegionShare = 0.1;  // of the mixture
 constexpr double kSame = 1.0;      // distance between modes, in standard deviations, that counts as none
 
 struct Mode {
@@ -173,6 +174,13 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
   const auto highest = std::max_element(modes.begin(), modes.end(),
                                         [](const Mode& a, const Mode& b) { return a.log_mass < b.log_mass; });
   if (highest != modes.end()) best = highest->location;
+  const Region& region = emulator.region();
+  if (!region.everywhere()) {  // which holds the posterior, whatever the searches found of it
+    for (double& weight : weights) weight *= 1.0 - kRegionShare;
+    components.emplace_back(region.centre(), region.root(), options.dof);
+    weights.push_back(weights.empty() ? 1.0 : kRegionShare);
+    if (highest == modes.end()) best = region.centre();
+  }
   if (components.empty()) {  // nowhere is the record possible: the prior stands
     components.emplace_back(VectorXd::Zero(starts.rows()), MatrixXd::Identity(starts.rows(), starts.rows()),
                             options.dof);
