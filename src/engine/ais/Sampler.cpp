@@ -115,10 +115,12 @@ bool consistent(const AisResult& result) {
 void judge(AisResult& result, const AisOptions& options) {
   double least = 1.0;
   for (const auto& level : result.ladder) least = std::min(least, level.acceptance);
+  const bool few = !(result.ess >= 0.02 * static_cast<double>(result.draws.cols()));
   result.trusted = false;
+  result.stuck = few || !(least >= 0.02);
   if (!(least >= 0.02)) {
     result.verdict = "not trusted: the chains hardly move at some temperature";
-  } else if (!(result.ess >= 0.02 * static_cast<double>(result.draws.cols()))) {
+  } else if (few) {
     result.verdict = "not trusted: a few chains carry all the weight";
   } else if (!(result.standard_error <= 1.0)) {
     result.verdict = "not trusted: the standard error exceeds one nat";

@@ -28,6 +28,7 @@ struct AisResult {
   Eigen::VectorXd log_likelihood;  ///< of the draws
   std::vector<Temperature> ladder;
   long evaluations = 0;  ///< of the likelihood, all stages
+  bool stuck = false;    ///< chains hardly moved, or few carry all the weight: the draws say little
   bool trusted = false;
   std::string verdict;  ///< why it can or cannot be trusted, one sentence
 };

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-enum Purpose : std::uint64_t { kFirstHistory, kSecondHistory, kPopulation, kPosterior };
+enum Purpose : std::uint64_t { kFirstHistory, kSecondHistory, kPopulation, kPosterior, kAgain };
 enum StreamPurpose : std::uint64_t { kModes = 62, kMixture, kCloser };
 
 // How error and discrepancy are sampled under a Gaussian simulator, and at how many of the draws the modes of
@@ -101,8 +101,9 @@ CloserReference closer_reference(const CalibrationTarget& target, const AisOptio
 
 }  // namespace
 
-AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& options,
-                           const Context& context) {
+namespace {
+
+AisResult sample_once(const CalibrationTarget& target, const AisOptions& options, const Context& context) {
   long spent = 0;
   const CloserReference reference = closer_reference(target, options, context, spent);
   const MatrixXd population = sample_population(target, reference, options, context.fork(kPopulation), spent);
@@ -119,6 +120,20 @@ AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& op
     result = sample_ais(target, reference, own, last);
   }
   result.evaluations += spent;
+  return result;
+}
+
+}  // namespace
+
+// Where the chains got stuck, once more by other random numbers; of two such the one that found more.
+AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& options,
+                           const Context& context) {
+  AisResult result = sample_once(target, options, context);
+  if (!result.stuck) return result;
+  AisResult again = sample_once(target, options, context.fork(kAgain));
+  const long evaluations = result.evaluations + again.evaluations;
+  if (!again.stuck || again.log_evidence > result.log_evidence) result = std::move(again);
+  result.evaluations = evaluations;
   return result;
 }
 
