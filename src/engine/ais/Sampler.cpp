@@ -18,7 +18,7 @@ using Eigen::MatrixXd;
 
 namespace {
 
-constexpr double kDoubt = 2.0;     // standard errors by which another estimate lies above
+constexpr double kDoubt = 2.0;                       // standard errors by which another estimate lies above
 constexpr double kBridgeDof = 8.0, kThirdDof = 5.0;  // of the mixtures that further runs start from
 
 void report(AisResult& result, const std::string& name, double log_evidence, const Spread& spread) {

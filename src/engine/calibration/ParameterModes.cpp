@@ -17,9 +17,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kSettled = 1e-2;  // gain in nats at which a search ends
+constexpr double kSettled = 1e-2;     // gain in nats at which a search ends
 constexpr double kRegionShare = 0.1;  // of the mixture
-constexpr double kSame = 1.0;      // distance between modes, in standard deviations, that counts as none
+constexpr double kSame = 1.0;         // distance between modes, in standard deviations, that counts as none
 
 struct Mode {
   VectorXd location;

@@ -16,8 +16,8 @@ struct ModeOptions {
 ///     log p(y | z, history) + log N(x; 0, I),  z = Phi(x),
 /// by the Levenberg-Marquardt method, each with the Gauss-Newton covariance (W'A W + I)^-1, W = dw'/dx, A
 /// what the record tells about the coefficients. A Student-t mixture with one component for each distinct
-/// mode; weights half from the Laplace approximation of its mass, half equal. Where the emulator has a region,
-/// a tenth of the mixture is spread over it.
+/// mode; weights half from the Laplace approximation of its mass, half equal. Where the emulator has a
+/// region, a tenth of the mixture is spread over it.
 struct ParameterModes {
   StudentTMixture mixture;
   Eigen::VectorXd best;  ///< the highest mode, P coordinates N(0, I)
