@@ -2,9 +2,9 @@
 # touches the simulator there (tangent_posterior_), error and discrepancy as uncertain as the record leaves them. It needs no
 # emulator, and a few runs for each parameter and step.
 
-search_steps <- 20        # at most
-search_draws <- 8        # of error and discrepancy, by which a step is judged
-search_difference <- 0.02  # standard deviations of the prior, of slopes
+search_steps <- 20         # at most
+search_draws <- 8          # of error and discrepancy, by which a step is judged
+search_difference <- 0.02  # of slopes, in standard deviations of the prior
 search_damping <- c(0, 1, 10, 100, 1000, 1e4)
 search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1, importance_draws = 300, ess_drop = 0.3)
 
@@ -38,12 +38,12 @@ search_mode <- function(set, start, threads) {
     values
   }
   x <- start
+  p <- length(x)
   run <- run_at(matrix(x, 1))[, 1]
-  tangent <- NULL
+  if (!all(is.finite(run))) abort_numerical("The simulator failed where a search begins.")
   for (step in seq_len(search_steps)) {
-    p <- length(x)
     sides <- ifelse(x > 0, -search_difference, search_difference)  # towards the middle of the prior
-    around <- run_at(matrix(x, p, p, byrow = TRUE) + diag(sides, p))
+    around <- run_at(matrix(x, p, p, byrow = TRUE) + diag(sides, p, p))
     slopes <- sweep(around - run, 2, sides, "/")
     slopes[, colSums(!is.finite(slopes)) > 0] <- 0
     tangent <- call_engine(tangent_posterior_(data, priors, x, run, slopes, search_draws, ais, context))
@@ -51,8 +51,8 @@ search_mode <- function(set, start, threads) {
     far <- sum(move * solve(tangent$covariance, move))
     precision <- solve(tangent$covariance)
     pulled <- precision %*% move
-    damped <- vapply(search_damping, function(mu) as.numeric(solve(precision + diag(mu, p), pulled)), numeric(p))
-    points <- rbind(x, t(x + damped))
+    damped <- lapply(search_damping, function(mu) x + as.numeric(solve(precision + diag(mu, p), pulled)))
+    points <- do.call(rbind, c(list(x), damped))
     outputs <- cbind(run, run_at(points[-1, , drop = FALSE]))
     values <- value_of(points, outputs, tangent)
     best <- which.max(values)
