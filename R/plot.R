@@ -326,7 +326,7 @@ figure_candidates <- function(upgrade) {
   table$row <- paste(formatC(rank(table$log10_bf), width = 4, flag = "0"), table$mechanism)
   table$state <- factor(ifelse(table$adopted, "adopted", ifelse(table$trusted, "tried", "tried, estimate rough")), c("adopted", "tried", "tried, estimate rough"))
   grey <- "grey45"
-  axis <- signed_log_axis("evidence for it (log10 Bayes factor against the model without it)", unlist(table[c("lower95", "upper95")]), decisive)
+  axis <- signed_log_axis("evidence for it (log10 Bayes factor)", unlist(table[c("lower95", "upper95")]), decisive)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$log10_bf, .data$row, colour = .data$state, shape = .data$state)) +
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
     ggplot2::geom_vline(xintercept = decisive, linetype = "dashed", colour = "grey20") +
