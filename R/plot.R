@@ -135,7 +135,7 @@ figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {
   wrap <- function(text, width) {  # a number stays beside its "%"
     if (!is.null(text)) gsub("\001", " ", paste(strwrap(gsub("([0-9]) %", "\\1\001%", text), width), collapse = "\n"), fixed = TRUE)
   }
-  ggplot2::labs(title = wrap(title, 72), subtitle = wrap(subtitle, 92), x = x, y = y)
+  ggplot2::labs(title = wrap(title, 64), subtitle = wrap(subtitle, 92), x = x, y = y)
 }
 
 stage_scales <- function() ggplot2::scale_colour_manual(values = stage_colours, aesthetics = c("colour", "fill"))
