@@ -1,6 +1,6 @@
 calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf), time_constants = NULL,
                             error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, check = 40,
-                            exact = NULL, emulator_sd = 0, ais = list(pilot_chains = 192, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.2))
+                            exact = NULL, ais = list(pilot_chains = 192, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.2))
 
 #' Calibrate a simulator on measurements
 #'
@@ -29,7 +29,7 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   (see *Model*), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
 #'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept
 #'   for the discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (runs
-#'   that correct the evidence; default those of the check, 200 for a [zone()]; 0 for none), `emulator_sd` (error of the emulator beyond what it states, added to the noise: 0), and `ais`, a list for the sampler (`pilot_chains`,
+#'   that correct the evidence; default those of the check, 200 for a [zone()]; 0 for none), and `ais`, a list for the sampler (`pilot_chains`,
 #'   `groups`, `chains`, `sweeps`, `ess_drop`, `resample`, `importance_draws`, `max_components`).
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
@@ -69,7 +69,7 @@ calibration_setting <- function(emulator, measurements, control, seed, call = rl
   rows <- emulated_rows(emulator, measurements, call)
   control <- fill_calibration_control(control, measurements, length(rows), call)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
-                 discarded_variance = mean(emulator$basis$discarded_sd^2) + control$emulator_sd^2, inclusion = control$inclusion, amplitude = control$amplitude,
+                 discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion, amplitude = control$amplitude,
                  correlation_times = control$error_times, ratios = control$error_ratios, reach = control$reach)
   list(emulator = emulator, measurements = measurements, rows = rows, control = control, priors = priors, seed = pick_seed(seed))
 }
@@ -106,7 +106,6 @@ fill_calibration_control <- function(control, measurements, n, call = rlang::cal
   check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), "control$error_ratios", call = call)
   check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1, any.missing = FALSE, unique = TRUE), "control$reach",
               "Give numbers above 0; {.code Inf} is a free discrepancy.", call = call)
-  check_input(checkmate::check_number(control$emulator_sd, lower = 0, finite = TRUE), "control$emulator_sd", call = call)
   for (name in c("error_draws", "check", "exact")) {
     if (is.null(control[[name]])) next
     check_input(checkmate::check_count(control[[name]], positive = name == "error_draws"), paste0("control$", name), call = call)
@@ -134,7 +133,8 @@ systematic_draws <- function(weights, n) {
 
 # What a person should know before using it.
 fit_trust <- function(fit) {
-  why <- c(if (!fit$posterior$trusted) fit$posterior$verdict, if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict))
+  why <- c(if (!fit$posterior$trusted) fit$posterior$verdict, if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
+           if (fit$posterior$trusted && fit$standard_error > 1) "not trusted: corrected by the runs, the evidence has a standard error of more than one nat")
   list(trusted = is.null(why), verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }
 

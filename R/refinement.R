@@ -7,7 +7,7 @@
 #'
 #' @param ensemble An ensemble: [simulate_design()], [refine_ensemble()], [ensemble()] (which can be checked, but not refined).
 #' @param rounds Greatest number of refinements; 0 for the check alone.
-#' @param runs Runs made in each round; by default 40 or, if more, five for each parameter.
+#' @param runs Runs made in each round, beside those of searches and checks; by default 40 or, if more, ten for each parameter.
 #' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and [calibrate()] take them.
 #' @inheritParams calibrate
 #' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how many
@@ -25,7 +25,7 @@ calibrate_refined <- function(ensemble, measurements, rounds = 4, runs = NULL, c
 # list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more is wanted of it.
 refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
                                  hopeless = function(fit) FALSE) {
-  runs <- max(runs, 40, 10 * length(ensemble$parameters))
+  runs <- runs %||% regional_runs(ensemble$parameters)
   runs_made <- 0
   trained <- function(ensemble) train_emulator(ensemble, measurements, control$emulator, threads = threads)
   round <- 0L
@@ -87,10 +87,12 @@ too_coarse <- function(emulator, measurements) {
   is.null(emulator$processes$region) && isTRUE(emulator$diagnostics$series_rmse > measurements$noise_sd)
 }
 
+regional_runs <- function(parameters, least = 0) max(least, 40, 10 * length(parameters))
+
 refining_ais <- list(pilot_chains = 128, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, importance_draws = 300)
 
-coarsely <- function(calibration, ...) {
-  calibration <- utils::modifyList(as.list(calibration), list(exact = 0, ...))
+coarsely <- function(calibration) {
+  calibration <- utils::modifyList(as.list(calibration), list(exact = 0))
   calibration$ais <- utils::modifyList(as.list(calibration$ais), refining_ais)
   calibration
 }

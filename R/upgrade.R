@@ -105,7 +105,8 @@ first_runs <- function(simulator, runs, settings) {
 fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, rounds = settings$control$rounds) {
   if (identical(settings$calibrate, calibrate)) {
     more <- refined_runs(settings)
-    return(calibrate_refined(ensemble, settings$measurements, rounds %||% upgrade_control$rounds, if (more > 0) more,
+    return(calibrate_refined(ensemble, settings$measurements, rounds %||% upgrade_control$rounds,
+                             regional_runs(ensemble$parameters, more),
                              list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration)),
                              seed = settings$seed, threads = settings$threads))
   }
@@ -123,7 +124,7 @@ screen_model <- function(simulator, name, settings, hopeless = function(fit) FAL
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
     control <- list(emulator = settings$control$emulator, calibration = calibration)
     refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
-                         runs = if (refined_runs(settings) > 0) refined_runs(settings), hopeless = hopeless)
+                         runs = regional_runs(ensemble$parameters, refined_runs(settings)), hopeless = hopeless)
   })
 }
 
@@ -140,7 +141,7 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
     fit <- if (isFALSE(first$fit$check$passed)) {
       control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
       refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
-                           runs = if (more > 0) more, first = first)$fit
+                           runs = regional_runs(first$ensemble$parameters, more), first = first)$fit
     } else {
       fit_runs(if (more > 0) refine_ensemble(with_checked_runs(first), first$fit, more, threads = settings$threads) else first$ensemble, settings)
     }

@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "engine/ais/AnnealingPath.hpp"
-#include "engine/ais/BentMap.hpp"
 #include "engine/ais/CloserReference.hpp"
 #include "engine/ais/ImportanceSample.hpp"
 #include "engine/ais/Sampler.hpp"
@@ -1014,70 +1013,6 @@ TEST(LogSumExp, IsSafeForLargeSmallAndInfiniteValues) {
   const VectorXd share = normalised_exp(Eigen::Vector2d(-800.0, -800.0 + std::log(3.0)));
   EXPECT_NEAR(share[0], 0.25, 1e-12);
   EXPECT_NEAR(share[1], 0.75, 1e-12);
-}
-
-// A thin sheet about a parabola, turned.
-MatrixXd bent_cloud(Index n, double thickness) {
-  MatrixXd x = normal_matrix(3, n, 301);
-  x.row(2) = 0.4 * x.row(0).array().square() + 0.3 * x.row(0).array() * x.row(1).array() +
-             thickness * x.row(2).array();
-  const MatrixXd turn = Eigen::HouseholderQR<MatrixXd>(normal_matrix(3, 3, 302)).householderQ();
-  return turn * x;
-}
-
-TEST(BentMap, StraightensACurvedSheet) {
-  const Index n = 600;
-  const double thickness = 0.02;
-  const MatrixXd x = bent_cloud(n, thickness);
-  const BentMap map = BentMap::fit(x, VectorXd::Constant(n, 1.0 / n));
-  ASSERT_TRUE(map.bends());
-  MatrixXd z(3, n);
-  for (Index i = 0; i < n; ++i) {
-    z.col(i) = map.straight(x.col(i));
-    EXPECT_LT((map.bent(z.col(i)) - x.col(i)).norm(), 1e-12);
-  }
-  // The axes of the cloud are not quite those of the sheet: cubic terms leave a tenth of what quadratic ones
-  // did.
-  const auto thinnest = [](const MatrixXd& points) {
-    const MatrixXd apart = points.colwise() - points.rowwise().mean();
-    return std::sqrt(Eigen::SelfAdjointEigenSolver<MatrixXd>(apart * apart.transpose()).eigenvalues()[0] / n);
-  };
-  EXPECT_GT(thinnest(x), 10 * thickness);
-  EXPECT_LT(thinnest(z), 0.4 * thinnest(x));
-}
-
-TEST(BentMap, KeepsVolumesAndItsGradientIsTheDerivative) {
-  const Index n = 600;
-  const MatrixXd x = bent_cloud(n, 0.02);
-  const BentMap map = BentMap::fit(x, VectorXd::Constant(n, 1.0 / n));
-  const VectorXd direction = Eigen::Vector3d(0.3, -1.2, 0.7);
-  for (Index i = 0; i < 5; ++i) {
-    MatrixXd slope(3, 3);  // dz / dx by central differences
-    for (Index j = 0; j < 3; ++j) {
-      const VectorXd step = 1e-5 * VectorXd::Unit(3, j);
-      slope.col(j) = (map.straight(x.col(i) + step) - map.straight(x.col(i) - step)) / 2e-5;
-    }
-    EXPECT_NEAR(std::abs(slope.determinant()), 1.0, 1e-6);
-    EXPECT_LT((map.gradient(x.col(i), direction) - slope.transpose() * direction).norm(), 1e-6);
-  }
-}
-
-TEST(BentMap, LeavesAnEllipticCloudAsItIs) {
-  const Index n = 800;
-  const MatrixXd x = normal_matrix(4, 4, 303) * normal_matrix(4, n, 304);
-  EXPECT_FALSE(BentMap::fit(x, VectorXd::Constant(n, 1.0 / n)).bends());
-}
-
-TEST(SkewedMixture, ComesCloserToACurvedSheetThanAnEllipticMixture) {
-  const Index n = 2000;
-  const MatrixXd x = bent_cloud(n, 0.02);
-  const VectorXd weights = VectorXd::Constant(n, 1.0 / n);
-  Stream stream(1, 2, 3), other(1, 2, 3);
-  const SkewedMixture bent = SkewedMixture::fit(x, weights, 3, 8.0, stream);
-  const StudentTMixture elliptic = StudentTMixture::fit(x, weights, 3, 8.0, other);
-  double gain = 0.0;
-  for (Index i = 0; i < n; ++i) gain += (bent.log_density(x.col(i)) - elliptic.log_density(x.col(i))) / n;
-  EXPECT_GT(gain, 0.3);
 }
 
 }  // namespace

@@ -168,3 +168,11 @@ test_that("a draw of much weight is run once and counts as often as it was drawn
   twice <- list(draws = made$draws[each], times = rep(1, 40), runs = made$runs[, each], failed = 0)
   expect_equal(amiss:::exact_evidence(fit, made, 1)$log_evidence, amiss:::exact_evidence(fit, twice, 1)$log_evidence)
 })
+
+test_that("an evidence that its correction leaves open by more than a nat is not trusted", {
+  fit <- linear_fit()
+  expect_true(amiss:::fit_trust(fit)$trusted)
+  fit$standard_error <- 1.5
+  expect_false(amiss:::fit_trust(fit)$trusted)
+  expect_match(amiss:::fit_trust(fit)$verdict, "standard error of more than one nat")
+})

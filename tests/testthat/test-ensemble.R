@@ -77,16 +77,19 @@ test_that("runs are added where the posterior lies, and the emulator is better t
   more <- refine_ensemble(first, fit, runs = 8)
   # Runs of the first that lie in the region, then the new ones.
   region <- more$region
-  inside <- amiss:::in_region(region, first$unit)
+  inside <- amiss:::region_distance(region, first$unit) <= 1
   n <- nrow(more$values)
   expect_equal(n, sum(inside) + 8)
-  expect_true(all(amiss:::in_region(region, more$unit)))
+  expect_lte(max(amiss:::region_distance(region, more$unit)), 1)
   expect_true(all(more$unit > 0 & more$unit < 1))
   expect_lt(abs(mean(more$values[n - 7:0, "a"]) - sum(fit$weights * fit$values[, "a"])), 0.2)
   expect_equal(more$outputs[, n], bent$f(more$values[n, ], as.matrix(data["Te"])))
   # The posterior lies inside, and what the emulator says holds there alone.
   far <- amiss:::region_distance(region, amiss:::posterior_unit(fit))
   expect_gt(sum(fit$weights[far < 1]), 0.99)
+  beyond <- amiss:::region_design(within(region, radius <- 1.5 * radius), 50, 1)
+  expect_identical(amiss:::in_region(region, beyond), amiss:::region_distance(region, beyond) <= 1)
+  expect_true(any(!amiss:::in_region(region, beyond)))
   expect_error(stats::predict(train_emulator(more, m), cbind(a = 1.9, b = -0.9)), "outside the region", class = "amiss_error_input")
   truth <- bent$f(c(a = 0.12, b = 0.2), as.matrix(data["Te"]))
   off <- function(ensemble) max(abs(stats::predict(train_emulator(ensemble, m), cbind(a = 0.12, b = 0.2))$mean - truth))
