@@ -3,6 +3,7 @@
 # emulator, and a few runs for each parameter and step.
 
 search_steps <- 20         # at most
+search_gain <- 0.1         # nats, below which a step is the last
 search_draws <- 8          # of error and discrepancy, by which a step is judged
 search_difference <- 0.02  # of slopes, in standard deviations of the prior
 search_damping <- c(0, 1, 10, 100, 1000, 1e4)
@@ -56,10 +57,11 @@ search_mode <- function(set, start, threads) {
     outputs <- cbind(run, run_at(points[-1, , drop = FALSE]))
     values <- value_of(points, outputs, tangent)
     best <- which.max(values)
+    gain <- values[best] - values[1]
     if (best == 1) break
     x <- points[best, ]
     run <- outputs[, best]
-    if (far < 0.5) break
+    if (far < 0.5 || isTRUE(gain < search_gain)) break
   }
   list(centre = x, covariance = tangent$covariance, value = max(values), runs = made)
 }

@@ -176,8 +176,7 @@ double evidence_by_quadrature(const CalibrationTarget& target) {
   for (int i = 0; i <= m; ++i) {
     for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
     const VectorXd ll = target.log_likelihood(row);
-    for (int j = 0; j <= m; ++j)
-      log_terms[i * (m + 1) + j] = ll[j] + StandardNormal::log_density_at(row.col(j));
+    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + StandardNormal::at(row.col(j))[0];
   }
   return log_sum_exp(log_terms) + 2.0 * std::log(h);
 }

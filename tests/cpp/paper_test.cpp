@@ -515,7 +515,7 @@ TEST(PaperCalibrationTarget, EvidenceEqualsQuadrature) {
   for (int i = 0; i <= m; ++i) {
     for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
     const VectorXd ll = target.log_likelihood(row);
-    for (int j = 0; j <= m; ++j) terms[i * (m + 1) + j] = ll[j] + StandardNormal::log_density_at(row.col(j));
+    for (int j = 0; j <= m; ++j) terms[i * (m + 1) + j] = ll[j] + StandardNormal::at(row.col(j))[0];
   }
   const double top = terms.maxCoeff();
   const double truth = top + std::log((terms.array() - top).exp().sum() * h * h);

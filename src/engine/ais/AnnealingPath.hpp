@@ -1,5 +1,5 @@
 #pragma once
-#include "engine/ais/StandardNormal.hpp"
+#include "engine/ais/Distribution.hpp"
 #include "engine/ais/Target.hpp"
 
 namespace amiss {
@@ -11,10 +11,6 @@ namespace amiss {
 struct AnnealingPath {
   const Target& target;
   const Distribution& reference;
-
-  double rise(const Eigen::VectorXd& x, double log_likelihood) const {
-    return log_likelihood + (StandardNormal::log_density_at(x) - reference.log_density(x));
-  }
 };
 
 }  // namespace amiss

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace amiss {
 
@@ -11,72 +12,46 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kLeading = 4;             // axes that others may bend along
-constexpr double kPointsPerTerm = 5.0;  // effective, at least
-constexpr double kFarthest = 3.5;       // standard deviations beyond which a sheet goes on level
+constexpr int kLeading = 4, kDegree = 3;  // axes that others may bend along, and how
+constexpr double kPointsPerTerm = 5.0;    // effective, at least
+constexpr double kFarthest = 3.5;         // standard deviations beyond which a sheet goes on level
+
+// A product of at most kDegree of the leading coordinates: an earlier one times one more of them.
+struct Monomial {
+  Index parent;      // -1: the constant
+  int last, degree;  // the factor with the highest number
+};
+
+std::vector<Monomial> all_monomials(Index leading) {
+  std::vector<Monomial> all{{-1, 0, 0}};
+  for (std::size_t parent = 0; parent < all.size(); ++parent) {
+    const Monomial from = all[parent];
+    for (int i = from.last; i < leading && from.degree < kDegree; ++i)
+      all.push_back({static_cast<Index>(parent), i, from.degree + 1});
+  }
+  return all;
+}
+
+Index leading_of(Index dimension) { return std::min<Index>(kLeading, dimension); }
 
 }  // namespace
 
-Index BentMap::Terms::count() const {
-  // Monomials in `leading` variables of total degree 1 ... degree: C(leading + degree, degree) - 1.
-  Index n = 1;
-  for (int k = 1; k <= degree; ++k) n = n * (leading + k) / k;
-  return n - 1;
-}
-
-VectorXd BentMap::Terms::values(const VectorXd& t, MatrixXd* slopes) const {
-  VectorXd out(count());
-  if (slopes) slopes->setZero(count(), leading);
-  Index at = 0;
-  for (int i = 0; i < leading; ++i) {
-    if (slopes) (*slopes)(at, i) = 1.0;
-    out[at++] = t[i];
+MatrixXd BentMap::monomials(const MatrixXd& s) const {
+  const Index leading = leading_of(s.rows());
+  MatrixXd t = s.topRows(leading).transpose() * per_sd_.head(leading).asDiagonal();
+  t = t.unaryExpr([](double v) { return std::clamp(v, -kFarthest, kFarthest); });
+  const std::vector<Monomial> all = all_monomials(leading);
+  MatrixXd values(s.cols(), static_cast<Index>(all.size()));
+  values.col(0).setOnes();
+  for (Index k = 1; k < values.cols(); ++k) {
+    const Monomial& own = all[static_cast<std::size_t>(k)];
+    values.col(k) = values.col(own.parent).cwiseProduct(t.col(own.last));
   }
-  for (int i = 0; i < leading && degree >= 2; ++i) {
-    for (int j = i; j < leading; ++j) {
-      if (slopes) {
-        (*slopes)(at, i) += t[j];
-        (*slopes)(at, j) += t[i];
-      }
-      out[at++] = t[i] * t[j];
-    }
-  }
-  for (int i = 0; i < leading && degree >= 3; ++i) {
-    for (int j = i; j < leading; ++j) {
-      for (int k = j; k < leading; ++k) {
-        if (slopes) {
-          (*slopes)(at, i) += t[j] * t[k];
-          (*slopes)(at, j) += t[i] * t[k];
-          (*slopes)(at, k) += t[i] * t[j];
-        }
-        out[at++] = t[i] * t[j] * t[k];
-      }
-    }
-  }
-  return out;
-}
-
-VectorXd BentMap::standard(const VectorXd& s, VectorXd* slope) const {
-  const Index n = std::min<Index>(kLeading, s.size());
-  VectorXd t(n);
-  if (slope) slope->resize(n);
-  for (Index i = 0; i < n; ++i) {
-    const double v = s[i] / sd_[i];
-    t[i] = std::clamp(v, -kFarthest, kFarthest);
-    if (slope) (*slope)[i] = t[i] == v ? 1.0 / sd_[i] : 0.0;
-  }
-  return t;
-}
-
-double BentMap::shift(Index j, const VectorXd& s) const {
-  const auto k = static_cast<std::size_t>(j);
-  if (terms_[k].degree == 0) return 0.0;
-  const VectorXd& c = coefficients_[k];
-  return c[0] + c.tail(c.size() - 1).dot(terms_[k].values(standard(s)));
+  return values;
 }
 
 BentMap BentMap::fit(const MatrixXd& x, const VectorXd& weights) {
-  const Index d = x.rows(), n = x.cols();
+  const Index d = x.rows();
   BentMap map;
   map.centre_ = x * weights;
   const MatrixXd apart = x.colwise() - map.centre_;
@@ -87,80 +62,76 @@ BentMap BentMap::fit(const MatrixXd& x, const VectorXd& weights) {
     map.axes_.col(j).cwiseAbs().maxCoeff(&largest);
     if (map.axes_(largest, j) < 0) map.axes_.col(j) *= -1.0;
   }
-  map.sd_ = eigen.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
-  map.terms_.resize(static_cast<std::size_t>(d));
-  map.coefficients_.resize(static_cast<std::size_t>(d));
+  const VectorXd variance = eigen.eigenvalues().reverse().cwiseMax(0.0);
+  map.per_sd_ = variance.unaryExpr([](double v) { return v > 0 ? 1.0 / std::sqrt(v) : 0.0; });
   const double effective = 1.0 / weights.squaredNorm();
   const MatrixXd s = map.axes_.transpose() * apart;
+  const MatrixXd values = map.monomials(s);
+  const std::vector<Monomial> all = all_monomials(leading_of(d));
   const VectorXd root = weights.cwiseSqrt();
-  bool bent_at_all = false;
+  const MatrixXd pulled = root.asDiagonal() * MatrixXd(s.transpose());
+  map.coefficients_ = MatrixXd::Zero(values.cols(), d);
+  VectorXd best = VectorXd::Zero(d);  // gain over what is chosen so far
   for (int leading = 1; leading <= std::min<Index>(kLeading, d - 1); ++leading) {
-    for (int degree = 2; degree <= 3; ++degree) {
-      const Terms terms{leading, degree};
-      const Index m = terms.count();
-      if (static_cast<double>(m) * kPointsPerTerm > effective || !(map.sd_[leading - 1] > 0)) continue;
-      MatrixXd design(n, m + 1);
-      for (Index i = 0; i < n; ++i) design.row(i) << 1.0, terms.values(map.standard(s.col(i))).transpose();
-      const Eigen::HouseholderQR<MatrixXd> qr(root.asDiagonal() * design);
-      const MatrixXd coefficients = qr.solve(root.asDiagonal() * MatrixXd(s.transpose()));
-      const MatrixXd left = s.transpose() - design * coefficients;
+    for (int degree = 2; degree <= kDegree; ++degree) {
+      std::vector<Index> terms;
+      for (std::size_t k = 0; k < all.size(); ++k) {
+        if (all[k].last < leading && all[k].degree <= degree) terms.push_back(static_cast<Index>(k));
+      }
+      const double m = static_cast<double>(terms.size()) - 1.0;  // besides the constant
+      if (m * kPointsPerTerm > effective || !(variance[leading - 1] > 0)) continue;
+      MatrixXd design(values.rows(), static_cast<Index>(terms.size()));
+      for (Index k = 0; k < design.cols(); ++k)
+        design.col(k) = root.cwiseProduct(values.col(terms[static_cast<std::size_t>(k)]));
+      const MatrixXd coefficients = Eigen::HouseholderQR<MatrixXd>(design).solve(pulled);
+      const VectorXd left = (pulled - design * coefficients).colwise().squaredNorm().transpose();
       for (Index j = leading; j < d; ++j) {
-        const auto k = static_cast<std::size_t>(j);
-        const double before = map.sd_[j] * map.sd_[j];
-        const double after = (weights.array() * left.col(j).array().square()).sum();
-        const auto gain = [&](double variance, Index terms_used) {
-          return effective * std::log(before / variance) -
-                 static_cast<double>(terms_used) * std::log(effective);
-        };
-        double best = 0.0;
-        if (map.terms_[k].degree > 0) {
-          const VectorXd old = map.coefficients_[k];
-          double variance = 0.0;
-          for (Index i = 0; i < n; ++i) {
-            const double r = s(j, i) - map.shift(j, s.col(i));
-            variance += weights[i] * r * r;
-          }
-          best = gain(variance, old.size() - 1);
-        }
-        if (!(after > 0) || !(gain(after, m) > best)) continue;
-        map.terms_[k] = terms;
-        map.coefficients_[k] = coefficients.col(j);
-        bent_at_all = true;
+        const double gain = effective * std::log(variance[j] / left[j]) - m * std::log(effective);
+        if (!(left[j] > 0) || !(gain > best[j])) continue;
+        best[j] = gain;
+        map.coefficients_.col(j).setZero();
+        for (Index k = 0; k < design.cols(); ++k)
+          map.coefficients_(terms[static_cast<std::size_t>(k)], j) = coefficients(k, j);
       }
     }
   }
-  return bent_at_all ? map : BentMap();
+  return (best.array() > 0).any() ? map : BentMap();
 }
 
-VectorXd BentMap::straight(const VectorXd& x) const {
+MatrixXd BentMap::straight(const MatrixXd& x) const {
   if (!bends()) return x;
-  const VectorXd s = axes_.transpose() * (x - centre_);
-  VectorXd z = s;
-  for (Index j = 0; j < z.size(); ++j) z[j] -= shift(j, s);
-  return z;
+  const MatrixXd s = axes_.transpose() * (x.colwise() - centre_);
+  return s - (monomials(s) * coefficients_).transpose();
 }
 
-VectorXd BentMap::bent(const VectorXd& z) const {
+MatrixXd BentMap::bent(const MatrixXd& z) const {
   if (!bends()) return z;
-  VectorXd s = z;
-  for (Index j = 0; j < s.size(); ++j) s[j] += shift(j, s);  // of coordinates before it alone
-  return axes_ * s + centre_;
+  MatrixXd s = z;
+  // Leading coordinates may bend along those before them; all others along these alone.
+  const Index leading = leading_of(z.rows()), rest = z.rows() - leading;
+  for (Index j = 1; j < leading; ++j) {
+    if (!coefficients_.col(j).isZero(0)) s.row(j) += (monomials(s) * coefficients_.col(j)).transpose();
+  }
+  s.bottomRows(rest) += (monomials(s) * coefficients_.rightCols(rest)).transpose();
+  return (axes_ * s).colwise() + centre_;
 }
 
 VectorXd BentMap::gradient(const VectorXd& x, const VectorXd& by_z) const {
   if (!bends()) return by_z;
   const VectorXd s = axes_.transpose() * (x - centre_);
-  VectorXd by_s = by_z, inner;
-  const VectorXd t = standard(s, &inner);
-  for (Index j = 0; j < s.size(); ++j) {
-    const auto k = static_cast<std::size_t>(j);
-    if (terms_[k].degree == 0) continue;
-    MatrixXd slopes;
-    terms_[k].values(t, &slopes);
-    const VectorXd c = coefficients_[k].tail(coefficients_[k].size() - 1);
-    const VectorXd own = slopes.transpose() * c;
-    for (int i = 0; i < terms_[k].leading; ++i) by_s[i] -= by_z[j] * own[i] * inner[i];
+  const Index leading = leading_of(s.size());
+  const VectorXd values = monomials(s).row(0).transpose();
+  const std::vector<Monomial> all = all_monomials(leading);
+  MatrixXd slopes = MatrixXd::Zero(values.size(), leading);  // of the monomials
+  for (Index k = 1; k < values.size(); ++k) {
+    const Monomial& own = all[static_cast<std::size_t>(k)];
+    const double at = s[own.last] * per_sd_[own.last];
+    const bool level = std::abs(at) > kFarthest;
+    slopes.row(k) = slopes.row(own.parent) * std::clamp(at, -kFarthest, kFarthest);
+    if (!level) slopes(k, own.last) += values[own.parent] * per_sd_[own.last];
   }
+  VectorXd by_s = by_z;
+  by_s.head(leading) -= slopes.transpose() * (coefficients_ * by_z);
   return axes_ * by_s;
 }
 

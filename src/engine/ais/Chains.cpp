@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/evaluate.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 
@@ -16,15 +17,56 @@ namespace {
 
 constexpr int kLeapfrogs = 4;  // of one Hamiltonian move
 
+// What the path needs to know of points: log-likelihood and log density of the reference, in blocks that the
+// threads share, and the rise.
+struct Heights {
+  VectorXd ll, reference, rise;
+
+  explicit Heights(Index n) : reference(n), rise(n) {}
+
+  // Of points from first on, whose log-likelihoods come last.
+  void prepare(const AnnealingPath& path, const MatrixXd& points, Index first) {
+    const Index n = points.cols();
+    reference.segment(first, n) = path.reference.log_densities(points);
+    rise.segment(first, n) = StandardNormal::at(points) - reference.segment(first, n);
+  }
+};
+
+Heights heights(const AnnealingPath& path, const MatrixXd& x, const Context& context) {
+  Heights at(x.cols());
+  at.ll = evaluate(path.target, x, context,
+                   [&](Index first, Index n) { at.prepare(path, x.middleCols(first, n), first); });
+  at.rise += at.ll;
+  return at;
+}
+
+// Moves each chain with probability min(1, exp(log_ratio)), never to where the likelihood is zero; returns
+// the share that moved.
+double accept(Chains& chains, const MatrixXd& proposed, const Heights& at, const VectorXd& log_ratio,
+              Stream& stream) {
+  int accepted = 0;
+  for (Index i = 0; i < chains.size(); ++i) {
+    const double log_u = std::log(stream.uniform());
+    if (!std::isfinite(at.ll[i]) || !(log_u < log_ratio[i])) continue;
+    chains.x.col(i) = proposed.col(i);
+    chains.ll[i] = at.ll[i];
+    chains.reference[i] = at.reference[i];
+    chains.rise[i] = at.rise[i];
+    ++accepted;
+  }
+  return static_cast<double>(accepted) / static_cast<double>(chains.size());
+}
+
 }  // namespace
 
 Chains Chains::start(const AnnealingPath& path, int n, Stream& stream, const Context& context) {
   Chains chains;
   chains.x.resize(path.target.dimension(), n);
   for (int i = 0; i < n; ++i) chains.x.col(i) = path.reference.draw(stream);
-  chains.ll = evaluate(path.target, chains.x, context);
-  chains.rise.resize(n);
-  for (int i = 0; i < n; ++i) chains.rise[i] = path.rise(chains.x.col(i), chains.ll[i]);
+  Heights at = heights(path, chains.x, context);
+  chains.ll = std::move(at.ll);
+  chains.reference = std::move(at.reference);
+  chains.rise = std::move(at.rise);
   chains.log_w = VectorXd::Zero(n);
   return chains;
 }
@@ -35,7 +77,7 @@ void Chains::resample(Stream& stream) {
   const Index n = size();
   const VectorXd w = normalised_exp(log_w);
   MatrixXd kept_x(x.rows(), n);
-  VectorXd kept_ll(n), kept_rise(n);
+  VectorXd kept_ll(n), kept_reference(n), kept_rise(n);
   double cumulative = w[0];
   const double offset = stream.uniform();
   for (Index i = 0, from = 0; i < n; ++i) {
@@ -43,45 +85,25 @@ void Chains::resample(Stream& stream) {
       cumulative += w[++from];
     kept_x.col(i) = x.col(from);
     kept_ll[i] = ll[from];
+    kept_reference[i] = reference[from];
     kept_rise[i] = rise[from];
   }
   x = std::move(kept_x);
   ll = std::move(kept_ll);
+  reference = std::move(kept_reference);
   rise = std::move(kept_rise);
   log_w.setZero();
 }
 
 double crank_nicolson_move(const AnnealingPath& path, Chains& chains, double beta, const PartMove& part,
                            Stream& stream, const Context& context) {
-  const Index n = chains.size();
   MatrixXd proposed = chains.x;
-  VectorXd back(n);  // log density of the proposal at the chain over that at the point proposed
-  for (Index i = 0; i < n; ++i) {
-    const VectorXd from = part.bend.straight(chains.x.col(i).segment(part.first, part.size));
-    const VectorXd to = part.proposal.step(from, part.step, stream);
-    proposed.col(i).segment(part.first, part.size) = part.bend.bent(to);
-    back[i] = part.proposal.log_density(from) - part.proposal.log_density(to);
-  }
-  VectorXd at_chain(n), at_proposed(n), prior_over(n);
-  const VectorXd ll = evaluate(path.target, proposed, context, [&](Index i) {
-    const VectorXd to = proposed.col(i);
-    at_chain[i] = path.reference.log_density(chains.x.col(i));
-    at_proposed[i] = path.reference.log_density(to);
-    prior_over[i] = StandardNormal::log_density_at(to) - at_proposed[i];
-  });
-  int accepted = 0;
-  for (Index i = 0; i < n; ++i) {
-    const double log_u = std::log(stream.uniform());
-    if (!std::isfinite(ll[i])) continue;
-    const double rise = ll[i] + prior_over[i];
-    if (log_u < beta * (rise - chains.rise[i]) + at_proposed[i] - at_chain[i] + back[i]) {
-      chains.x.col(i) = proposed.col(i);
-      chains.ll[i] = ll[i];
-      chains.rise[i] = rise;
-      ++accepted;
-    }
-  }
-  return static_cast<double>(accepted) / static_cast<double>(n);
+  const StudentT::Step step =
+      part.proposal.step(part.bend.straight(chains.x.middleRows(part.first, part.size)), part.step, stream);
+  proposed.middleRows(part.first, part.size) = part.bend.bent(step.to);
+  const Heights at = heights(path, proposed, context);
+  const VectorXd log_ratio = beta * (at.rise - chains.rise) + at.reference - chains.reference + step.back;
+  return accept(chains, proposed, at, log_ratio, stream);
 }
 
 bool hamiltonian(const Target& target, const AisOptions& options) {
@@ -93,20 +115,21 @@ double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& 
   const Index n = chains.size(), d = chains.x.rows();
   const auto root = level.metric.root().triangularView<Eigen::Lower>();
   MatrixXd x = chains.x, slope(d, n), momentum = stream.normals(d, n);
-  VectorXd ll, prior_over(n), rise(n);
+  Heights at(n);
   const auto force = [&] {  // L' gradient of the log density at this temperature
-    ll = evaluate(path.target, x, slope, context, [&](Index i) {
-      const VectorXd at = x.col(i);
-      prior_over[i] = StandardNormal::log_density_at(at) - path.reference.log_density(at);
-      const VectorXd reference = path.reference.gradient(at);
-      slope.col(i) = reference + level.beta * (slope.col(i) - at - reference);
+    at.ll = evaluate(path.target, x, slope, context, [&](Index first, Index count) {
+      at.prepare(path, x.middleCols(first, count), first);
+      for (Index i = first; i < first + count; ++i) {
+        const VectorXd reference = path.reference.gradient(x.col(i));
+        slope.col(i) = reference + level.beta * (slope.col(i) - x.col(i) - reference);
+      }
     });
-    rise = ll + prior_over;
+    at.rise += at.ll;
     slope = root.transpose() * slope;
     slope = slope.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   };
-  VectorXd log_ratio = 0.5 * momentum.colwise().squaredNorm().transpose() - level.beta * chains.rise;
-  for (Index i = 0; i < n; ++i) log_ratio[i] -= path.reference.log_density(chains.x.col(i));
+  VectorXd log_ratio =
+      0.5 * momentum.colwise().squaredNorm().transpose() - level.beta * chains.rise - chains.reference;
   const double step = level.hamiltonian_step;
   force();
   for (int k = 0; k < kLeapfrogs; ++k) {
@@ -115,17 +138,8 @@ double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& 
     force();
     momentum += 0.5 * step * slope;
   }
-  log_ratio += level.beta * rise - 0.5 * momentum.colwise().squaredNorm().transpose();
-  int accepted = 0;
-  for (Index i = 0; i < n; ++i) {
-    const double log_u = std::log(stream.uniform());
-    if (!std::isfinite(ll[i]) || !(log_u < log_ratio[i] + path.reference.log_density(x.col(i)))) continue;
-    chains.x.col(i) = x.col(i);
-    chains.ll[i] = ll[i];
-    chains.rise[i] = rise[i];
-    ++accepted;
-  }
-  return static_cast<double>(accepted) / static_cast<double>(n);
+  log_ratio += level.beta * at.rise + at.reference - 0.5 * momentum.colwise().squaredNorm().transpose();
+  return accept(chains, x, at, log_ratio, stream);
 }
 
 int sweep_cost(const Target& target, const AisOptions& options) {

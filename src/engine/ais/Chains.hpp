@@ -9,10 +9,11 @@ namespace amiss {
 
 /// Chains that are annealed side by side.
 struct Chains {
-  Eigen::MatrixXd x;      ///< dimension x n
-  Eigen::VectorXd ll;     ///< log-likelihood
-  Eigen::VectorXd rise;   ///< of the path at x
-  Eigen::VectorXd log_w;  ///< log weights since the last resampling
+  Eigen::MatrixXd x;          ///< dimension x n
+  Eigen::VectorXd ll;         ///< log-likelihood
+  Eigen::VectorXd reference;  ///< log density of the path's reference
+  Eigen::VectorXd rise;       ///< of the path
+  Eigen::VectorXd log_w;      ///< log weights since the last resampling
 
   /// n draws from the reference.
   static Chains start(const AnnealingPath& path, int n, Stream& stream, const Context& context);

@@ -10,6 +10,7 @@
 namespace amiss {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 CloserReference::CloserReference(std::vector<StudentTMixture> blocks, double prior_share)
@@ -19,23 +20,26 @@ CloserReference::CloserReference(std::vector<StudentTMixture> blocks, double pri
   for (const StudentTMixture& block : blocks_) dimension_ += block.dimension();
 }
 
-double CloserReference::log_close(const VectorXd& x) const {
-  double value = 0.0;
+VectorXd CloserReference::log_close(const MatrixXd& x) const {
+  VectorXd value = VectorXd::Zero(x.cols());
   Index first = 0;
   for (const StudentTMixture& block : blocks_) {
-    value += block.log_density(x.segment(first, block.dimension()));
+    value += block.log_densities(x.middleRows(first, block.dimension()));
     first += block.dimension();
   }
   return value;
 }
 
-double CloserReference::log_density(const VectorXd& x) const {
-  return log_sum_exp(Eigen::Vector2d(std::log(prior_share_) + StandardNormal::log_density_at(x),
-                                     std::log1p(-prior_share_) + log_close(x)));
+VectorXd CloserReference::log_densities(const MatrixXd& x) const {
+  MatrixXd parts(x.cols(), 2);
+  parts.col(0) = StandardNormal::at(x).array() + std::log(prior_share_);
+  parts.col(1) = log_close(x).array() + std::log1p(-prior_share_);
+  return log_sum_exp_rows(parts);
 }
 
 VectorXd CloserReference::gradient(const VectorXd& x) const {
-  const double close = std::exp(std::log1p(-prior_share_) + log_close(x) - log_density(x));  // its share at x
+  const double close =
+      std::exp(std::log1p(-prior_share_) + log_close(x)[0] - log_density(x));  // its share at x
   VectorXd slope(x.size());
   Index first = 0;
   for (const StudentTMixture& block : blocks_) {

@@ -17,12 +17,12 @@ class CloserReference : public Distribution {
   /// @throws std::invalid_argument unless prior_share lies in (0, 1).
   CloserReference(std::vector<StudentTMixture> blocks, double prior_share = 0.1);
 
-  double log_density(const Eigen::VectorXd& x) const override;
+  Eigen::VectorXd log_densities(const Eigen::MatrixXd& x) const override;
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override;
   Eigen::VectorXd draw(Stream& stream) const override;
 
  private:
-  double log_close(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd log_close(const Eigen::MatrixXd& x) const;
 
   std::vector<StudentTMixture> blocks_;
   Eigen::Index dimension_ = 0;

@@ -17,6 +17,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kImportanceDof = 8.0;  // of the mixtures
+constexpr double kNegligible = 1e-3;    // share of the weight that the draws left out have at most
 
 // A mixture that comes closer to the posterior, fitted to a weighted sample of it and, if it may be skewed,
 // to all samples before it.
@@ -39,8 +40,9 @@ void ImportanceSample::extend(const Target& target, const Distribution& mixture,
   for (Index i = before; i < total; ++i) x.col(i) = mixture.draw(stream);
   const MatrixXd drawn = x.rightCols(n);
   VectorXd prior_over(n);
-  ll.tail(n) = evaluate(target, drawn, context, [&](Index i) {
-    prior_over[i] = StandardNormal::log_density_at(drawn.col(i)) - mixture.log_density(drawn.col(i));
+  ll.tail(n) = evaluate(target, drawn, context, [&](Index first, Index count) {
+    const MatrixXd block = drawn.middleCols(first, count);
+    prior_over.segment(first, count) = StandardNormal::at(block) - mixture.log_densities(block);
   });
   log_w.tail(n) = prior_over + ll.tail(n);
   if (!std::isfinite(log_w.maxCoeff())) return;
@@ -52,42 +54,46 @@ void ImportanceSample::extend(const Target& target, const Distribution& mixture,
 }
 
 void DrawPool::add(const MatrixXd& draws, const VectorXd& weights) {
-  const Index before = x_.cols();
-  x_.conservativeResize(draws.rows(), before + draws.cols());
-  weights_.conservativeResize(before + draws.cols());
-  x_.rightCols(draws.cols()) = draws;
-  // Truncated (Ionides 2008), so that no single draw decides on the mixture.
-  const VectorXd kept = weights.cwiseMin(1.0 / std::sqrt(static_cast<double>(weights.size())));
-  weights_.tail(draws.cols()) = kept * kept.sum() / kept.squaredNorm();
+  // Truncated (Ionides 2008), so that no single draw decides on the mixture; those that together weigh next
+  // to nothing are left out.
+  VectorXd kept = weights.cwiseMin(1.0 / std::sqrt(static_cast<double>(weights.size())));
+  kept *= kept.sum() / kept.squaredNorm();
+  const double least = kNegligible * kept.sum() / static_cast<double>(kept.size());
+  const Index before = x_.cols(), added = (kept.array() > least).count();
+  x_.conservativeResize(draws.rows(), before + added);
+  weights_.conservativeResize(before + added);
+  for (Index i = 0, at = before; i < draws.cols(); ++i) {
+    if (!(kept[i] > least)) continue;
+    x_.col(at) = draws.col(i);
+    weights_[at++] = kept[i];
+  }
 }
 
 SkewedMixture DrawPool::fit(int max_components, double dof, Stream& stream) const {
   return SkewedMixture::fit(x_, weights_ / weights_.sum(), max_components, dof, stream);
 }
 
-SkewedMixture closer_mixture(const Target& target, SkewedMixture mixture, int rounds, Index draws,
-                             int max_components, double dof, const Context& context, Stream& stream,
+SkewedMixture closer_mixture(const Target& target, SkewedMixture mixture, DrawPool pool,
+                             const CloserOptions& options, const Context& context, Stream& stream,
                              long& evaluations) {
-  DrawPool pool;
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < options.rounds; ++round) {
     ImportanceSample sample;
-    sample.extend(target, mixture, draws, context, stream);
-    evaluations += draws;
+    sample.extend(target, mixture, options.draws, context, stream);
+    evaluations += options.draws;
     if (!(sample.ess > 0)) break;
     pool.add(sample.x, sample.weights);
-    mixture = pool.fit(max_components, dof, stream);
+    mixture = pool.fit(options.max_components, options.dof, stream);
   }
   return mixture;
 }
 
-SkewedMixture closer_mixture(const Target& target, const MatrixXd& population, Index draws,
+SkewedMixture closer_mixture(const Target& target, const MatrixXd& population, const CloserOptions& options,
                              const Context& context, Stream& stream, long& evaluations) {
-  constexpr double kDof = 5.0;
-  constexpr int kComponents = 3, kRounds = 4;
   const Index n = population.cols();
-  const VectorXd weights = VectorXd::Constant(n, 1.0 / static_cast<double>(n));
-  return closer_mixture(target, SkewedMixture::fit(population, weights, kComponents, kDof, stream), kRounds,
-                        draws, kComponents, kDof, context, stream, evaluations);
+  DrawPool pool;
+  pool.add(population, VectorXd::Constant(n, 1.0 / static_cast<double>(n)));
+  SkewedMixture first = pool.fit(options.max_components, options.dof, stream);
+  return closer_mixture(target, std::move(first), std::move(pool), options, context, stream, evaluations);
 }
 
 StudentTMixture fit_elliptic(const MatrixXd& x, const VectorXd& weights, const AisOptions& options,

@@ -25,7 +25,7 @@ struct ImportanceSample {
 };
 
 /// Draws to which mixtures are fitted: weighted draws of one posterior from several samples, each of which
-/// counts by its effective size.
+/// counts by its effective size. Draws that together weigh next to nothing are not kept.
 class DrawPool {
  public:
   void add(const Eigen::MatrixXd& draws, const Eigen::VectorXd& weights);
@@ -36,16 +36,25 @@ class DrawPool {
   Eigen::VectorXd weights_;  // sum of each sample's: its effective size
 };
 
+/// How a mixture is brought closer to a posterior.
+struct CloserOptions {
+  Eigen::Index draws;  ///< of each round
+  int rounds = 4;
+  int max_components = 3;
+  double dof = 5.0;  ///< heavy tails: a reference to anneal from
+};
+
 /// A mixture close to a posterior of which `population` are draws of equal weight: fitted to them and then,
-/// in rounds, to weighted draws from itself and from the rounds before (population Monte Carlo; Cappe,
-/// Guillin, Marin and Robert 2004). Parts of the posterior in which the mixture has too little mass gain what
-/// their weights say, which chains that have to move there do slowly. Its tails are heavy (5 degrees of
-/// freedom): a reference to anneal from. The likelihood values that it takes are added to `evaluations`.
-/// @param draws  of each round.
-SkewedMixture closer_mixture(const Target& target, const Eigen::MatrixXd& population, Eigen::Index draws,
-                             const Context& context, Stream& stream, long& evaluations);
-SkewedMixture closer_mixture(const Target& target, SkewedMixture mixture, int rounds, Eigen::Index draws,
-                             int max_components, double dof, const Context& context, Stream& stream,
+/// in rounds, to them, to weighted draws from itself and to those of the rounds before (population Monte
+/// Carlo; Cappe, Guillin, Marin and Robert 2004). Parts of the posterior in which the mixture has too little
+/// mass gain what their weights say, which chains that have to move there do slowly. The likelihood values
+/// that it takes are added to `evaluations`.
+SkewedMixture closer_mixture(const Target& target, const Eigen::MatrixXd& population,
+                             const CloserOptions& options, const Context& context, Stream& stream,
+                             long& evaluations);
+/// From a mixture, and draws that it is fitted to besides its own.
+SkewedMixture closer_mixture(const Target& target, SkewedMixture mixture, DrawPool pool,
+                             const CloserOptions& options, const Context& context, Stream& stream,
                              long& evaluations);
 
 /// Importance sample from `first`, then from mixtures fitted to its own weighted draws and, if they may be

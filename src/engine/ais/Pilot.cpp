@@ -56,9 +56,7 @@ VectorXd ranks(const VectorXd& values) {
 
 PartMove part_move(const MatrixXd& x, const VectorXd& weights, Index first, double step) {
   const BentMap bend = BentMap::fit(x, weights);
-  MatrixXd z(x.rows(), x.cols());
-  for (Index i = 0; i < x.cols(); ++i) z.col(i) = bend.straight(x.col(i));
-  return {first, x.rows(), bend, StudentT::fit(z, weights, kMoveDof), step};
+  return {first, x.rows(), bend, StudentT::fit(bend.straight(x), weights, kMoveDof), step};
 }
 
 // Moves the chains, tuning the step, until their likelihoods have forgotten where they began. The first sweep

@@ -9,6 +9,7 @@
 
 #include "engine/ais/AnnealedRun.hpp"
 #include "engine/ais/ImportanceSample.hpp"
+#include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/purposes.hpp"
 
 namespace amiss {

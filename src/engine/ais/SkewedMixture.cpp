@@ -64,16 +64,22 @@ SkewMap SkewMap::fit(const MatrixXd& x, const VectorXd& weights) {
       if (!(own[i + 1] > own[i])) own = map.even_knots_;
     }
   }
+  const auto steps = [](const MatrixXd& knots) {
+    return (knots.bottomRows(kKnots - 1) - knots.topRows(kKnots - 1)).eval();
+  };
+  map.slopes_ = steps(map.even_knots_).replicate(1, x.rows()).cwiseQuotient(steps(map.knots_));
   return map;
 }
 
-VectorXd SkewMap::even(const VectorXd& x) const {
+MatrixXd SkewMap::even(const MatrixXd& x) const {
   if (knots_.rows() == 0) return x;
-  VectorXd z(x.size());
-  for (Index j = 0; j < x.size(); ++j) {
+  MatrixXd z(x.rows(), x.cols());
+  for (Index j = 0; j < x.rows(); ++j) {
     const auto own = knots_.col(j);
-    const Index i = piece(own, x[j]);
-    z[j] = even_knots_[i] + (x[j] - own[i]) * (even_knots_[i + 1] - even_knots_[i]) / (own[i + 1] - own[i]);
+    for (Index c = 0; c < x.cols(); ++c) {
+      const Index i = piece(own, x(j, c));
+      z(j, c) = even_knots_[i] + (x(j, c) - own[i]) * slopes_(i, j);
+    }
   }
   return z;
 }
@@ -84,18 +90,17 @@ VectorXd SkewMap::skewed(const VectorXd& z) const {
   for (Index j = 0; j < z.size(); ++j) {
     const auto own = knots_.col(j);
     const Index i = piece(even_knots_, z[j]);
-    x[j] = own[i] + (z[j] - even_knots_[i]) * (own[i + 1] - own[i]) / (even_knots_[i + 1] - even_knots_[i]);
+    x[j] = own[i] + (z[j] - even_knots_[i]) / slopes_(i, j);
   }
   return x;
 }
 
-VectorXd SkewMap::slope(const VectorXd& x) const {
-  VectorXd slope = VectorXd::Ones(x.size());
+MatrixXd SkewMap::slope(const MatrixXd& x) const {
+  MatrixXd slope = MatrixXd::Ones(x.rows(), x.cols());
   if (knots_.rows() == 0) return slope;
-  for (Index j = 0; j < x.size(); ++j) {
+  for (Index j = 0; j < x.rows(); ++j) {
     const auto own = knots_.col(j);
-    const Index i = piece(own, x[j]);
-    slope[j] = (even_knots_[i + 1] - even_knots_[i]) / (own[i + 1] - own[i]);
+    for (Index c = 0; c < x.cols(); ++c) slope(j, c) = slopes_(piece(own, x(j, c)), j);
   }
   return slope;
 }
@@ -105,32 +110,30 @@ SkewedMixture SkewedMixture::fit(const MatrixXd& x, const VectorXd& weights, int
   if (1.0 / weights.squaredNorm() < kLeastPoints)
     return SkewedMixture(SkewMap(), StudentTMixture::fit(x, weights, max_components, dof, stream));
   const auto fitted = [&](BentMap bend) {
-    MatrixXd z(x.rows(), x.cols());
-    for (Index i = 0; i < x.cols(); ++i) z.col(i) = bend.straight(x.col(i));
+    const MatrixXd z = bend.straight(x);
     SkewMap map = SkewMap::fit(z, weights);
-    for (Index i = 0; i < x.cols(); ++i) z.col(i) = map.even(z.col(i));
+    const MatrixXd even = map.even(z);
     return SkewedMixture(std::move(bend), std::move(map),
-                         StudentTMixture::fit(z, weights, max_components, dof, stream));
+                         StudentTMixture::fit(even, weights, max_components, dof, stream));
   };
   SkewedMixture plain = fitted(BentMap());
   BentMap bend = BentMap::fit(x, weights);
   if (!bend.bends()) return plain;
   // Bending turns the axes, in which each coordinate was made even: whichever comes closer to the points.
   SkewedMixture bent = fitted(std::move(bend));
-  double gain = 0.0;
-  for (Index i = 0; i < x.cols(); ++i)
-    gain += weights[i] * (bent.log_density(x.col(i)) - plain.log_density(x.col(i)));
+  const double gain = weights.dot(bent.log_densities(x) - plain.log_densities(x));
   return gain > 0 ? bent : plain;
 }
 
-double SkewedMixture::log_density(const VectorXd& x) const {
-  const VectorXd z = bend_.straight(x);
-  return mixture_.log_density(map_.even(z)) + map_.slope(z).array().log().sum();
+VectorXd SkewedMixture::log_densities(const MatrixXd& x) const {
+  const MatrixXd z = bend_.straight(x);
+  return mixture_.log_densities(map_.even(z)) +
+         map_.slope(z).array().log().colwise().sum().transpose().matrix();
 }
 
 VectorXd SkewedMixture::gradient(const VectorXd& x) const {
   const VectorXd z = bend_.straight(x);
-  return bend_.gradient(x, map_.slope(z).cwiseProduct(mixture_.gradient(map_.even(z))));
+  return bend_.gradient(x, VectorXd(map_.slope(z)).cwiseProduct(mixture_.gradient(map_.even(z))));
 }
 
 VectorXd SkewedMixture::draw(Stream& stream) const { return bend_.bent(map_.skewed(mixture_.draw(stream))); }

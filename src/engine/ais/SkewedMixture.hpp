@@ -15,13 +15,14 @@ class SkewMap {
   /// coordinate of which many points share one value is left as it is.
   static SkewMap fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights);
 
-  Eigen::VectorXd even(const Eigen::VectorXd& x) const;    ///< z of x
+  Eigen::MatrixXd even(const Eigen::MatrixXd& x) const;    ///< z of x, points as columns
   Eigen::VectorXd skewed(const Eigen::VectorXd& z) const;  ///< x of z
-  Eigen::VectorXd slope(const Eigen::VectorXd& x) const;   ///< dz/dx of each coordinate
+  Eigen::MatrixXd slope(const Eigen::MatrixXd& x) const;   ///< dz/dx of each coordinate
 
  private:
   Eigen::MatrixXd knots_;  // of x, one column for each coordinate; no rows: the identity
   Eigen::VectorXd even_knots_;
+  Eigen::MatrixXd slopes_;  // dz/dx between two knots
 };
 
 /// A mixture of Student t's in coordinates straightened and made even: for posteriors about a curved ridge,
@@ -36,7 +37,7 @@ class SkewedMixture : public Distribution {
   static SkewedMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components,
                            double dof, Stream& stream);
 
-  double log_density(const Eigen::VectorXd& x) const override;
+  Eigen::VectorXd log_densities(const Eigen::MatrixXd& x) const override;
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override;
   Eigen::VectorXd draw(Stream& stream) const override;
 

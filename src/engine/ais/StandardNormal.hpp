@@ -9,10 +9,10 @@ class StandardNormal : public Distribution {
  public:
   explicit StandardNormal(Eigen::Index dimension) : dimension_(dimension) {}
 
-  static double log_density_at(const Eigen::VectorXd& x) {
-    return -0.5 * (x.squaredNorm() + kLogTwoPi * static_cast<double>(x.size()));
+  static Eigen::VectorXd at(const Eigen::MatrixXd& x) {  ///< log density of each column of x
+    return -0.5 * (x.colwise().squaredNorm().transpose().array() + kLogTwoPi * static_cast<double>(x.rows()));
   }
-  double log_density(const Eigen::VectorXd& x) const override { return log_density_at(x); }
+  Eigen::VectorXd log_densities(const Eigen::MatrixXd& x) const override { return at(x); }
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override { return -x; }
   Eigen::VectorXd draw(Stream& stream) const override { return stream.normals(dimension_); }
 

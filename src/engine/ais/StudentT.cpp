@@ -16,8 +16,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 MatrixXd weighted_covariance(const MatrixXd& x, const VectorXd& weights, const VectorXd& mean) {
-  const MatrixXd centred = x.colwise() - mean;
-  return centred * weights.asDiagonal() * centred.transpose();
+  const MatrixXd scaled = (x.colwise() - mean) * weights.cwiseSqrt().asDiagonal();
+  MatrixXd covariance = MatrixXd::Zero(x.rows(), x.rows());
+  covariance.selfadjointView<Eigen::Lower>().rankUpdate(scaled);
+  return covariance.selfadjointView<Eigen::Lower>();
 }
 
 // Lower Cholesky factor of a covariance estimated from `points` points, shrunk towards its diagonal.
@@ -77,16 +79,13 @@ GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights,
   double log_likelihood = -std::numeric_limits<double>::infinity();
   MatrixXd responsibility(n, components);
   for (int iteration = 0; iteration < (components == 1 ? 1 : 50); ++iteration) {
-    double total = 0.0;
     for (int k = 0; k < components; ++k) {
       responsibility.col(k) =
           log_gaussian(x, mixture.means[k], mixture.roots[k]).array() + std::log(mixture.weights[k]);
     }
-    for (Index i = 0; i < n; ++i) {
-      const double log_density = log_sum_exp(responsibility.row(i).transpose());
-      responsibility.row(i) = (responsibility.row(i).array() - log_density).exp() * weights[i];
-      total += points * weights[i] * log_density;
-    }
+    const VectorXd log_density = log_sum_exp_rows(responsibility);
+    const double total = points * weights.dot(log_density);
+    responsibility = (responsibility.colwise() - log_density).array().exp().colwise() * weights.array();
     const bool settled = total - log_likelihood < 1e-3 * std::abs(total);
     log_likelihood = total;
     if (components == 1) break;
@@ -123,14 +122,14 @@ StudentT StudentT::fit(const MatrixXd& x, const VectorXd& weights, double dof) {
   return StudentT(mean, shrunk_root(weighted_covariance(x, weights, mean), points), dof);
 }
 
-VectorXd StudentT::whiten(const VectorXd& x) const {
-  return inverse_root_.triangularView<Eigen::Lower>() * (x - location_);
+MatrixXd StudentT::whiten(const MatrixXd& x) const { return inverse_root_ * (x.colwise() - location_); }
+
+Eigen::ArrayXd StudentT::log_kernel(const MatrixXd& white) const {
+  return -0.5 * (dof_ + static_cast<double>(white.rows())) *
+         (white.colwise().squaredNorm().transpose().array() / dof_).log1p();
 }
 
-double StudentT::log_density(const VectorXd& x) const {
-  return log_constant_ -
-         0.5 * (dof_ + static_cast<double>(x.size())) * std::log1p(whiten(x).squaredNorm() / dof_);
-}
+VectorXd StudentT::log_densities(const MatrixXd& x) const { return log_kernel(whiten(x)) + log_constant_; }
 
 VectorXd StudentT::gradient(const VectorXd& x) const {
   const VectorXd z = whiten(x);
@@ -144,12 +143,17 @@ VectorXd StudentT::draw(Stream& stream) const {
          root_.triangularView<Eigen::Lower>() * VectorXd(std::sqrt(w) * stream.normals(location_.size()));
 }
 
-VectorXd StudentT::step(const VectorXd& x, double s, Stream& stream) const {
-  const VectorXd d = whiten(x);
-  const double w =
-      0.5 * (dof_ + d.squaredNorm()) / stream.gamma(0.5 * (dof_ + static_cast<double>(d.size())));
-  const VectorXd moved = std::sqrt(1.0 - s * s) * d + s * std::sqrt(w) * stream.normals(d.size());
-  return location_ + root_.triangularView<Eigen::Lower>() * moved;
+StudentT::Step StudentT::step(const MatrixXd& x, double s, Stream& stream) const {
+  MatrixXd white = whiten(x);
+  Step step{{}, log_kernel(white)};
+  for (Index i = 0; i < x.cols(); ++i) {
+    const double square = white.col(i).squaredNorm();
+    const double w = 0.5 * (dof_ + square) / stream.gamma(0.5 * (dof_ + static_cast<double>(x.rows())));
+    white.col(i) = std::sqrt(1.0 - s * s) * white.col(i) + s * std::sqrt(w) * stream.normals(x.rows());
+  }
+  step.back -= log_kernel(white).matrix();
+  step.to = (root_ * white).colwise() + location_;
+  return step;
 }
 
 StudentTMixture::StudentTMixture(std::vector<StudentT> components, std::vector<double> weights)
@@ -163,7 +167,8 @@ StudentTMixture StudentTMixture::fit(const MatrixXd& x, const VectorXd& weights,
   GaussianMixture best;
   for (int k = 1; k <= max_components; ++k) {
     GaussianMixture candidate = fit_gaussian_mixture(x, weights, k, stream);
-    if (k == 1 || candidate.bic < best.bic) best = std::move(candidate);
+    if (k > 1 && !(candidate.bic < best.bic)) break;
+    best = std::move(candidate);
   }
   std::vector<StudentT> components;
   for (std::size_t k = 0; k < best.means.size(); ++k)
@@ -181,17 +186,17 @@ StudentTMixture StudentTMixture::together(const std::vector<StudentTMixture>& mi
   return StudentTMixture(std::move(components), std::move(weights));
 }
 
-VectorXd StudentTMixture::log_parts(const VectorXd& x) const {
-  VectorXd parts(static_cast<Index>(components_.size()));
+MatrixXd StudentTMixture::log_parts(const MatrixXd& x) const {
+  MatrixXd parts(x.cols(), static_cast<Index>(components_.size()));
   for (std::size_t k = 0; k < components_.size(); ++k)
-    parts[static_cast<Index>(k)] = std::log(weights_[k]) + components_[k].log_density(x);
+    parts.col(static_cast<Index>(k)) = components_[k].log_densities(x).array() + std::log(weights_[k]);
   return parts;
 }
 
-double StudentTMixture::log_density(const VectorXd& x) const { return log_sum_exp(log_parts(x)); }
+VectorXd StudentTMixture::log_densities(const MatrixXd& x) const { return log_sum_exp_rows(log_parts(x)); }
 
 VectorXd StudentTMixture::gradient(const VectorXd& x) const {
-  const VectorXd share = normalised_exp(log_parts(x));
+  const VectorXd share = normalised_exp(log_parts(x).row(0).transpose());
   VectorXd gradient = VectorXd::Zero(x.size());
   for (std::size_t k = 0; k < components_.size(); ++k)
     gradient += share[static_cast<Index>(k)] * components_[k].gradient(x);

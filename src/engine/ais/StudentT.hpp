@@ -14,19 +14,25 @@ class StudentT {
   /// diagonal by d / (d + number of points), so that few points in many dimensions give a usable one.
   static StudentT fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, double dof);
 
-  double log_density(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd log_densities(const Eigen::MatrixXd& x) const;  ///< of each column of x
+  double log_density(const Eigen::VectorXd& x) const { return log_densities(x)[0]; }
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  ///< of log_density
   Eigen::VectorXd draw(Stream& stream) const;
   const Eigen::MatrixXd& root() const { return root_; }  ///< L
   Eigen::Index dimension() const { return location_.size(); }
 
-  /// A step of length s in (0, 1] that leaves this distribution invariant and is reversible in it: with
-  /// d = L^-1 (x - m), draw w ~ InvGamma((nu + dim) / 2, (nu + d'd) / 2), then
+  /// A step of length s in (0, 1] from each column of x that leaves this distribution invariant and is
+  /// reversible in it: with d = L^-1 (x - m), draw w ~ InvGamma((nu + dim) / 2, (nu + d'd) / 2), then
   /// d' = sqrt(1 - s^2) d + s sqrt(w) N(0, I) (the preconditioned Crank-Nicolson step of a scale mixture).
-  Eigen::VectorXd step(const Eigen::VectorXd& x, double s, Stream& stream) const;
+  struct Step {
+    Eigen::MatrixXd to;
+    Eigen::VectorXd back;  ///< log density where it came from less that where it leads
+  };
+  Step step(const Eigen::MatrixXd& x, double s, Stream& stream) const;
 
  private:
-  Eigen::VectorXd whiten(const Eigen::VectorXd& x) const;
+  Eigen::MatrixXd whiten(const Eigen::MatrixXd& x) const;
+  Eigen::ArrayXd log_kernel(const Eigen::MatrixXd& white) const;  // log density but for its constant
 
   Eigen::VectorXd location_;
   Eigen::MatrixXd root_, inverse_root_;
@@ -40,22 +46,22 @@ class StudentTMixture : public Distribution {
   /// Weights sum to 1, one for each component.
   StudentTMixture(std::vector<StudentT> components, std::vector<double> weights);
 
-  /// Gaussian mixtures of 1 ... max_components components are fitted by expectation-maximisation; the one
-  /// with the least BIC gives locations and scales.
+  /// Gaussian mixtures of 1 ... max_components components are fitted by expectation-maximisation, until one
+  /// more does not lower the BIC; that with the least gives locations and scales.
   static StudentTMixture fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, int max_components,
                              double dof, Stream& stream);
 
   /// Several mixtures as one, with equal shares.
   static StudentTMixture together(const std::vector<StudentTMixture>& mixtures);
 
-  double log_density(const Eigen::VectorXd& x) const override;
+  Eigen::VectorXd log_densities(const Eigen::MatrixXd& x) const override;
   Eigen::VectorXd gradient(const Eigen::VectorXd& x) const override;
   Eigen::VectorXd draw(Stream& stream) const override;
   std::size_t size() const { return components_.size(); }
   Eigen::Index dimension() const { return components_.front().dimension(); }
 
  private:
-  Eigen::VectorXd log_parts(const Eigen::VectorXd& x) const;
+  Eigen::MatrixXd log_parts(const Eigen::MatrixXd& x) const;  // one row for each point
 
   std::vector<double> weights_;
   std::vector<StudentT> components_;

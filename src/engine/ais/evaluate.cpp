@@ -31,26 +31,24 @@ void for_blocks(const Target& target, Index n, const Context& context, const Tas
 }  // namespace
 
 VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& context,
-                  const std::function<void(Index)>& also) {
+                  const std::function<void(Index, Index)>& also) {
   VectorXd ll(x.cols());
   for_blocks(target, x.cols(), context, [&](Index first, Index count) {
     ll.segment(first, count) = target.log_likelihood(x.middleCols(first, count)).unaryExpr(&finite_or_zero);
-    if (!also) return;
-    for (Index i = first; i < first + count; ++i) also(i);
+    if (also) also(first, count);
   });
   return ll;
 }
 
 VectorXd evaluate(const Target& target, const MatrixXd& x, MatrixXd& gradient, const Context& context,
-                  const std::function<void(Index)>& also) {
+                  const std::function<void(Index, Index)>& also) {
   VectorXd ll(x.cols());
   for_blocks(target, x.cols(), context, [&](Index first, Index count) {
     MatrixXd slope(x.rows(), count);
     ll.segment(first, count) =
         target.log_likelihood(x.middleCols(first, count), slope).unaryExpr(&finite_or_zero);
     gradient.middleCols(first, count) = slope;
-    if (!also) return;
-    for (Index i = first; i < first + count; ++i) also(i);
+    if (also) also(first, count);
   });
   return ll;
 }

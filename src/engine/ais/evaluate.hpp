@@ -7,12 +7,13 @@
 namespace amiss {
 
 /// Log-likelihoods of the columns of x, in blocks that the threads share; what is not finite is -infinity.
-/// also(i) is what else the threads can do for column i.
+/// also(first, count) is what else the threads can do for the columns of a block.
 Eigen::VectorXd evaluate(const Target& target, const Eigen::MatrixXd& x, const Context& context,
-                         const std::function<void(Eigen::Index)>& also = {});
+                         const std::function<void(Eigen::Index, Eigen::Index)>& also = {});
 
-/// With gradients (dimension x n), whose memory is given; also(i) comes after gradient i.
+/// With gradients (dimension x n), whose memory is given; also() comes after the gradients of its columns.
 Eigen::VectorXd evaluate(const Target& target, const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient,
-                         const Context& context, const std::function<void(Eigen::Index)>& also = {});
+                         const Context& context,
+                         const std::function<void(Eigen::Index, Eigen::Index)>& also = {});
 
 }  // namespace amiss

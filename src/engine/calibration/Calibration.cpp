@@ -34,7 +34,8 @@ struct StartOptions {
 const StartOptions kRoughStart{64, 0.3, 3, 2, {128, 3}};
 const StartOptions kStart{96, 0.5, 5, 2, {64, 3}};  // for each reach
 constexpr double kReferenceDof = 8.0;
-constexpr Index kRoundDraws = 100;  // that bring the reference closer, each round, per coordinate
+constexpr int kRounds = 2;          // that bring the reference closer
+constexpr Index kRoundDraws = 100;  // each, per coordinate
 
 // n draws of equal weight, evenly spread over weighted ones.
 std::vector<Index> spread_draws(const VectorXd& weights, int n) {
@@ -109,7 +110,7 @@ AisResult sample_once(const CalibrationTarget& target, const AisOptions& options
   const MatrixXd population = sample_population(target, reference, options, context.fork(kPopulation), spent);
   Stream stream(context.seed, kCloser, 0);
   const SkewedMixture mixture =
-      closer_mixture(target, population, kRoundDraws * target.dimension(), context, stream, spent);
+      closer_mixture(target, population, {kRoundDraws * target.dimension(), kRounds}, context, stream, spent);
   AisOptions own = options;
   own.skewed = true;
   const Context last = context.fork(kPosterior);

@@ -162,12 +162,12 @@ SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
   if (model.size() <= sampling.coarsest)
     return closer_mixture(
         target, sample_population(target, StandardNormal(target.dimension()), options, own, evaluations),
-        kRoundDraws, own, stream, evaluations);
+        {kRoundDraws}, own, stream, evaluations);
   const SkewedMixture before =
       sample_stage(model.thinned(sampling.thinning), options, sampling, own, evaluations);
   const ApproximateTarget approximate(model, before, kCoarser * sampling.tolerance, context, stream);
   const MatrixXd draws = sample_population(approximate, before, options, own, evaluations);
-  return closer_mixture(approximate, draws, kRoundDraws, own, stream, evaluations);
+  return closer_mixture(approximate, draws, {kRoundDraws}, own, stream, evaluations);
 }
 
 }  // namespace

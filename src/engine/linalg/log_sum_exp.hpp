@@ -12,6 +12,13 @@ inline double log_sum_exp(const Eigen::VectorXd& x) {
   return largest + std::log((x.array() - largest).exp().sum());
 }
 
+/// The same of each row; -infinity where all of it is.
+inline Eigen::VectorXd log_sum_exp_rows(const Eigen::MatrixXd& x) {
+  Eigen::ArrayXd largest = x.rowwise().maxCoeff();
+  const Eigen::ArrayXd shift = largest.isFinite().select(largest, 0.0);
+  return shift + (x.array().colwise() - shift).exp().rowwise().sum().log();
+}
+
 inline double log_mean_exp(const Eigen::VectorXd& x) {
   return log_sum_exp(x) - std::log(static_cast<double>(x.size()));
 }
