@@ -7,13 +7,14 @@
 #'
 #' @param ensemble An ensemble: [simulate_design()], [refine_ensemble()], [ensemble()] (which can be checked, but not refined).
 #' @param rounds Greatest number of refinements; 0 for the check alone.
-#' @param runs Runs made in each round, beside those of searches and checks; by default 40 or, if more, ten for each parameter.
+#' @param runs Runs made in the first round, beside those of searches and checks, by default 40 or, if more, ten for each parameter;
+#'   each further round makes 1.3 times as many.
 #' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and [calibrate()] take them.
 #' @inheritParams calibrate
 #' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how many
 #'   runs of the simulator were made here, those of the checks included.
 #' @export
-calibrate_refined <- function(ensemble, measurements, rounds = 4, runs = NULL, control = NULL, seed = NULL, threads = 1) {
+calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_count(rounds), "rounds")
   check_input(checkmate::check_count(runs, positive = TRUE, null.ok = TRUE), "runs")
@@ -21,20 +22,28 @@ calibrate_refined <- function(ensemble, measurements, rounds = 4, runs = NULL, c
   refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), threads, runs = runs)$fit
 }
 
+good_effective <- 1 / 3  # effective share of the runs at posterior draws from which no more is refined
+lost <- 3                # error over noise from which an emulator does not even tell where the posterior lies
+
 # list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`: such a
 # list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more is wanted of it.
 refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
                                  hopeless = function(fit) FALSE) {
   runs <- runs %||% regional_runs(ensemble$parameters)
   runs_made <- 0
-  trained <- function(ensemble) train_emulator(ensemble, measurements, control$emulator, threads = threads)
   round <- 0L
+  # A round that did not do has shown that the simulator asks for more runs.
+  next_round <- function() {
+    if (round > 0) runs <<- ceiling(1.3 * runs)
+    round <<- round + 1L
+  }
+  trained <- function(ensemble) train_emulator(ensemble, measurements, control$emulator, threads = threads)
   calibrated <- function(ensemble, calibration, emulator = trained(ensemble)) {
     own <- tryCatch(calibrate_with_runs(emulator, measurements, calibration, seed, threads), amiss_error_numerical = function(e) {
       if (is.null(ensemble$region) || round >= rounds) rlang::cnd_signal(e)
     })
     if (is.null(own)) {  # the posterior lies at the very end of the region
-      round <<- round + 1L
+      next_round()
       runs_made <<- runs_made + runs
       set <- list(emulator = emulator, measurements = measurements)
       return(calibrated(regional_ensemble(ensemble, wider_region(ensemble$region), set, runs, threads), calibration))
@@ -52,7 +61,7 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   if (is.null(result)) {
     emulator <- trained(ensemble)
     if (rounds > 0 && !is.null(ensemble$simulator) && too_coarse(emulator, measurements)) {
-      round <- 1L
+      next_round()
       coarse <- TRUE
       result <- searched(ensemble, calibration_setting(emulator, measurements, control$calibration, seed))
     } else {
@@ -61,13 +70,13 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   }
   repeat {
     check <- result$fit$check
-    settled <- is.null(result$made) || isTRUE(check$passed)
+    settled <- is.null(result$made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective))
     if (!settled && round < rounds) {
       if (hopeless(result$fit)) break
       # A coarse sampler is enough to see where the posterior lies, until the check passes.
-      round <- round + 1L
+      next_round()
       wider <- with_checked_runs(result)
-      result <- if (check$ratio > 1) searched(wider, result$fit, posterior_centre(result$fit)) else {
+      result <- if (check$ratio > lost) searched(wider, result$fit, posterior_centre(result$fit)) else {
         runs_made <- runs_made + runs
         calibrated(refine_ensemble(wider, result$fit, runs, threads), coarsely(control$calibration))
       }

@@ -20,7 +20,7 @@ test_that("a good emulator passes the check by runs", {
   expect_true(fit$check$passed)
   expect_lt(fit$check$ratio, 0.01)  # two vectors hold a linear simulator exactly
   expect_true(fit$trust$trusted)
-  expect_match(fit$check$verdict, "by 40 runs of the simulator at posterior draws", fixed = TRUE)
+  expect_match(fit$check$verdict, sprintf("by %d runs of the simulator at posterior draws", fit$check$runs), fixed = TRUE)
   expect_identical(glance(fit)$emulator_error, fit$check$ratio)
   expect_equal(fitted(fit), fit$check$mean)
 })
@@ -93,9 +93,10 @@ test_that("runs that fail at posterior draws are left out and told", {
                        function(k, y) if (k %% 10 == 0) stop("no steady state") else y,
                        function(k, y) if (k %% 10 == 0) replace(y, 7, Inf) else y)) {
     expect_no_warning(fit <- checked(failing))
-    expect_equal(fit$check$failed, 4)
-    expect_lte(fit$check$runs, 36)
-    expect_match(fit$check$verdict, "(4 more failed)", fixed = TRUE)
+    # A draw of more weight than one of 40 is run once.
+    expect_equal(fit$check$failed, (fit$check$runs + fit$check$failed) %/% 10)
+    expect_gte(fit$check$failed, 3)
+    expect_match(fit$check$verdict, sprintf("(%d more failed)", fit$check$failed), fixed = TRUE)
     expect_true(fit$trust$trusted)
   }
 })
@@ -104,7 +105,7 @@ test_that("where more than a fifth of the runs at posterior draws fail, one of t
   expect_error(checked(function(k, y) if (k %% 3 == 0) NaN * y else y),
                "failed at 1[23] of [34][0-9] draws.*more than 20 %.*first is run 3 at offset = [0-9.]+, gain = [0-9.]+",
                class = "amiss_error_numerical")
-  expect_error(checked(function(k, y) stop("no steady state")), "failed at 40 of 40", class = "amiss_error_numerical")
+  expect_error(checked(function(k, y) stop("no steady state")), "failed at ([34][0-9]) of \\1", class = "amiss_error_numerical")
 })
 
 test_that("a simulator that returns another number of values at posterior draws is refused", {
