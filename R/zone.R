@@ -379,6 +379,12 @@ free_fields <- function(x, path = integer()) {
   do.call(c, lapply(seq_along(x), function(i) free_fields(x[[i]], c(path, i))))
 }
 
+# Values of the fields at each row of parameter values: runs x fields.
+field_values <- function(fields, values) {
+  columns <- lapply(fields, function(field) field$factor * values[, field$free$name])
+  matrix(as.numeric(unlist(columns)), nrow(values), length(fields))
+}
+
 fill_free <- function(x, fields, values) {
   for (field in fields) x[[field$path]] <- field$factor * values[[field$free$name]]
   x
@@ -427,7 +433,7 @@ zone_resolve <- function(zone, values = numeric()) {
   parameters <- names(zone_parameters(zone))
   check_values(names(values), parameters, rlang::current_env())
   check_input(checkmate::check_numeric(values, any.missing = FALSE, finite = TRUE), "values")
-  resolve_zone(zone, values, rlang::current_env())
+  resolve_zone(zone, free_fields(unclass(zone)), values, rlang::current_env())
 }
 
 check_values <- function(given, parameters, call) {
@@ -438,9 +444,12 @@ check_values <- function(given, parameters, call) {
   }
 }
 
-resolve_zone <- function(zone, values, call) {
-  resolved <- fill_free(zone, free_fields(unclass(zone)), values)
-  for (x in resolved$components) check_component(x, call)
+# `fields`: the free ones; components without any were checked when they were made.
+resolve_zone <- function(zone, fields, values, call) {
+  resolved <- fill_free(zone, fields, values)
+  at <- match("components", names(zone))
+  paths <- Filter(function(path) path[1] == at, lapply(fields, `[[`, "path"))
+  for (i in unique(vapply(paths, `[[`, 0L, 2L))) check_component(resolved$components[[i]], call)
   check_fields(resolved, zone_fields$zone, "zone", call)
 }
 
@@ -479,13 +488,12 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
   }
   control <- check_zone_control(control, call)
   # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between them.
+  fields <- free_fields(unclass(zone))
   extremes <- vapply(parameters, function(p) range(values[, p]), numeric(2))
-  for (i in 1:2) resolve_zone(zone, extremes[i, ], call)
-  indexed <- index_zone(unclass(zone), colnames(drivers))
-  fields <- free_fields(indexed)
-  zones <- lapply(seq_len(nrow(values)), function(i) fill_free(indexed, fields, values[i, ]))
+  for (i in seq_len(if (nrow(values) > 1) 2 else 1)) resolve_zone(zone, fields, extremes[i, ], call)
   storage.mode(drivers) <- "double"
-  zone_simulate_(zones, drivers, step_s, as.numeric(hold), control, as.integer(threads))
+  zone_simulate_(index_zone(unclass(zone), colnames(drivers)), lapply(fields, `[[`, "path"), field_values(fields, values),
+                 drivers, step_s, as.numeric(hold), control, as.integer(threads))
 }
 
 check_drivers <- function(zone, drivers, call) {

@@ -193,18 +193,20 @@ BEGIN_RCPP
 END_RCPP
 }
 // zone_simulate_
-Rcpp::NumericMatrix zone_simulate_(Rcpp::List zones, Rcpp::NumericMatrix drivers, double step_s, Rcpp::NumericVector hold, Rcpp::List control, int threads);
-RcppExport SEXP _amiss_zone_simulate_(SEXP zonesSEXP, SEXP driversSEXP, SEXP step_sSEXP, SEXP holdSEXP, SEXP controlSEXP, SEXP threadsSEXP) {
+Rcpp::NumericMatrix zone_simulate_(Rcpp::List zone, Rcpp::List paths, Rcpp::NumericMatrix values, Rcpp::NumericMatrix drivers, double step_s, Rcpp::NumericVector hold, Rcpp::List control, int threads);
+RcppExport SEXP _amiss_zone_simulate_(SEXP zoneSEXP, SEXP pathsSEXP, SEXP valuesSEXP, SEXP driversSEXP, SEXP step_sSEXP, SEXP holdSEXP, SEXP controlSEXP, SEXP threadsSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< Rcpp::List >::type zones(zonesSEXP);
+    Rcpp::traits::input_parameter< Rcpp::List >::type zone(zoneSEXP);
+    Rcpp::traits::input_parameter< Rcpp::List >::type paths(pathsSEXP);
+    Rcpp::traits::input_parameter< Rcpp::NumericMatrix >::type values(valuesSEXP);
     Rcpp::traits::input_parameter< Rcpp::NumericMatrix >::type drivers(driversSEXP);
     Rcpp::traits::input_parameter< double >::type step_s(step_sSEXP);
     Rcpp::traits::input_parameter< Rcpp::NumericVector >::type hold(holdSEXP);
     Rcpp::traits::input_parameter< Rcpp::List >::type control(controlSEXP);
     Rcpp::traits::input_parameter< int >::type threads(threadsSEXP);
-    rcpp_result_gen = Rcpp::wrap(zone_simulate_(zones, drivers, step_s, hold, control, threads));
+    rcpp_result_gen = Rcpp::wrap(zone_simulate_(zone, paths, values, drivers, step_s, hold, control, threads));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -238,7 +240,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
     {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},
-    {"_amiss_zone_simulate_", (DL_FUNC) &_amiss_zone_simulate_, 6},
+    {"_amiss_zone_simulate_", (DL_FUNC) &_amiss_zone_simulate_, 8},
     {"_amiss_zone_balance_", (DL_FUNC) &_amiss_zone_balance_, 5},
     {NULL, NULL, 0}
 };

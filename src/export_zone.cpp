@@ -110,6 +110,11 @@ Zone read_zone(const Rcpp::List& from) {
   return zone;
 }
 
+void set_field(SEXP list, const Rcpp::IntegerVector& path, double value) {
+  for (R_xlen_t k = 0; k + 1 < path.size(); ++k) list = VECTOR_ELT(list, path[k] - 1);
+  SET_VECTOR_ELT(list, path[path.size() - 1] - 1, Rf_ScalarReal(value));
+}
+
 Options read_options(const Rcpp::List& from) {
   Options options;
   options.max_substep_s = number(from, "max_substep_s");
@@ -121,18 +126,25 @@ Options read_options(const Rcpp::List& from) {
 
 }  // namespace
 
-// N x M mean air temperatures of M zones under the same drivers; a run that fails is a column of NaN.
+// N x M mean air temperatures of one zone, whose free fields have the values of a row of `values` (M x
+// fields) in each run; a run that fails is a column of NaN. `paths`: where each field stands in the nested
+// list, from 1.
 // [[Rcpp::export]]
-Rcpp::NumericMatrix zone_simulate_(Rcpp::List zones, Rcpp::NumericMatrix drivers, double step_s,
-                                   Rcpp::NumericVector hold, Rcpp::List control, int threads) {
+Rcpp::NumericMatrix zone_simulate_(Rcpp::List zone, Rcpp::List paths, Rcpp::NumericMatrix values,
+                                   Rcpp::NumericMatrix drivers, double step_s, Rcpp::NumericVector hold,
+                                   Rcpp::List control, int threads) {
   // Copies: see export_engine.cpp.
   const Eigen::MatrixXd data =
       Eigen::Map<const Eigen::MatrixXd>(drivers.begin(), drivers.nrow(), drivers.ncol());
   const Eigen::VectorXd held = Eigen::Map<const Eigen::VectorXd>(hold.begin(), hold.size());
   const Options options = read_options(control);
   std::vector<Zone> read;
-  for (const Rcpp::List zone : zones) read.push_back(read_zone(zone));
-  for (const Zone& zone : read) zone.check(drivers.ncol());
+  const Rcpp::List own = Rcpp::clone(zone);
+  for (int run = 0; run < values.nrow(); ++run) {
+    for (int k = 0; k < values.ncol(); ++k) set_field(own, paths[k], values(run, k));
+    read.push_back(read_zone(own));
+  }
+  for (const Zone& one : read) one.check(drivers.ncol());
   options.check();
 
   const int n_runs = static_cast<int>(read.size());
