@@ -23,6 +23,7 @@ calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, c
 }
 
 good_effective <- 1 / 3  # effective share of the runs at posterior draws from which no more is refined
+good_border <- 0.01      # share of the posterior in the outer tenth of the region; a normal one has a tenth of that there
 lost <- 3                # error over noise from which an emulator does not even tell where the posterior lies
 
 # list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`: such a
@@ -70,7 +71,7 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   }
   repeat {
     check <- result$fit$check
-    settled <- is.null(result$made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective))
+    settled <- is.null(result$made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= good_border)
     if (!settled && round < rounds) {
       if (hopeless(result$fit)) break
       # A coarse sampler is enough to see where the posterior lies, until the check passes.

@@ -140,6 +140,8 @@ score_rates <- function(rows) {
   none <- pick(function(r) r$kind == "none")
   outside <- pick(function(r) r$hidden && !length(r$true_mechanism))
   both <- pick(function(r) r$kind == "two effects" && r$achieved >= 1.95)
+  # Where the base is wrong in structure, effects can be smaller than what its structure leaves, whatever the noise is.
+  above <- Filter(function(r) isTRUE(r$achieved >= r$misfit), strong)
   weak <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved < 0.8)
   rivals <- c("condition", "attributed_condition", "paper_condition", "correlation_condition", "forest_condition", "ard_condition")
   right <- lapply(stats::setNames(rivals, paste0("right_", rivals)), function(rule) rate(flags(strong, function(r) condition_right(r, rule))))
@@ -150,6 +152,7 @@ score_rates <- function(rows) {
          false_paper_condition = rate(flags(none, function(r) !is.na(r$paper_condition))),
          false_named = rate(flags(rows, function(r) any(!named_mechanisms(r) %in% r$true_mechanism))),
          hidden_among_adopted = rate(flags(strong, function(r) all(r$true_mechanism %in% r$adopted))),
+         hidden_above_misfit_among_adopted = rate(flags(above, function(r) all(r$true_mechanism %in% r$adopted))),
          rmse_ratio_ok = rate(flags(pick(function(r) r$hidden && named_right(r)), function(r) r$rmse_ratio <= 1.2)),
          check_failed = rate(flags(rows, function(r) !r$check_passed)),
          named_unchecked = rate(flags(pick(function(r) isFALSE(r$check_passed)),

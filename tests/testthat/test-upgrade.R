@@ -107,7 +107,7 @@ test_that("models with a poor design are refined where the check fails, as often
                                  attribution = list(surrogates = 19)))
   }
   refined <- loop(2)
-  expect_identical(refined$models[[1]]$fit$rounds, 1L)
+  expect_gte(refined$models[[1]]$fit$rounds, 1L)
   expect_true(refined$models[[1]]$fit$trust$trusted)
   rough <- loop(0)
   expect_false(rough$models[[1]]$fit$trust$trusted)
