@@ -18,7 +18,8 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #' emulator's error there, over the measurement error as the likelihood weighs it (autocorrelated as it was seen; if more was seen than stated, over the
 #' noise stated), is the check that counts: above a third,
 #' neither the posterior nor the evidence is trusted ([calibrate_refined()] then makes an emulator for the region and tries again). The likelihoods of `exact`
-#' such runs correct the evidence, so that it is the simulator's own; fewer than a tenth effective among them fail the check too. For an ensemble made elsewhere the
+#' such runs correct the evidence, so that it is the simulator's own; fewer than a tenth effective among them fail the check too, and so does
+#' more than a twentieth of the posterior in the outer tenth of the emulator's region. For an ensemble made elsewhere the
 #' check uses runs left out one by one, the fifth (at least 20) that lie nearest to the posterior.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
@@ -35,7 +36,7 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #' @param threads Number of threads; the result does not depend on it.
 #' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the parameters; `log_evidence`,
 #'   `standard_error` and `interval` its evidence; `reach` the posterior probability of each reach; `check` what the runs said of
-#'   the emulator: `error` (RMS at the record's rows), `ratio` (over the noise), `border` (share of the posterior at the end of the emulator's
+#'   the emulator: `error` (RMS at the record's rows), `ratio` (over the noise), `border` (share of the posterior in the outer tenth of the emulator's
 #'   region), `z2` (mean square in units of the
 #'   emulator's own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and `verdict`.
 #' @export

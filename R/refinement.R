@@ -1,6 +1,7 @@
 #' Calibrate, check by runs and refine
 #'
 #' Trains the emulator, calibrates, and lets the simulator check the emulator where the posterior lies. Where the check fails,
+#' fewer than a third of its runs are effective, or more than a hundredth of the posterior lies in the outer tenth of the emulator's region,
 #' runs are made in the region of that posterior ([refine_ensemble()]; those of the check join them), an emulator is
 #' trained for this region, and all is done again, up to a number of rounds. Where the emulator was surer than it was right, the error that
 #' the check saw is added to the noise before the region is drawn, so that the region is as wide as the emulator deserves.

@@ -11,8 +11,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' two thirds of all, and compared with the present model calibrated in the same way; then in full, with the other runs made
 #' where the coarse posterior lies ([refine_ensemble()]) and the emulator checked by runs of the simulator and refined
 #' ([calibrate_refined()]), those that could come within `margin` of the best, if any could come
-#' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and by what its
-#' annealed estimate lags behind the second one. Candidates that stay behind keep their coarse Bayes factor;
+#' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and, if `screening` asks
+#' for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their coarse Bayes factor;
 #' `candidates$screened` says which.
 #'
 #' @param simulator The base model.
@@ -20,7 +20,7 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
-#'   none), `rounds` (of refinement where the check by runs fails; 4), `decisive` (log10 Bayes factor that a mechanism must earn, with
+#'   none), `rounds` (of refinement where the check by runs asks for it; 8), `decisive` (log10 Bayes factor that a mechanism must earn, with
 #'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
