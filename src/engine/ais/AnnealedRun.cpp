@@ -93,6 +93,8 @@ AnnealedRun::Group AnnealedRun::run_group(Stream stream, const Context& context)
       for (std::size_t p = 0; p < parts.size(); ++p)
         accepted[static_cast<Index>(p)] +=
             crank_nicolson_move(path_, group.chains, levels_[k].beta, parts[p], stream, context);
+      if (path_.target.has_conditional())
+        conditional_move(path_, group.chains, levels_[k].beta, levels_[k].conditional, stream, context);
       if (hamiltonian(path_.target, options_))
         hamiltonian_move(path_, group.chains, levels_[k], stream, context);
     }

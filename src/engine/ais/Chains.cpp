@@ -6,6 +6,7 @@
 #include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/evaluate.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
+#include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
 
@@ -142,8 +143,37 @@ double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& 
   return accept(chains, x, at, log_ratio, stream);
 }
 
+double conditional_move(const AnnealingPath& path, Chains& chains, double beta, const ConditionalMove& move,
+                        Stream& stream, const Context& context) {
+  const Index n = chains.size(), p = move.root.rows(), first = chains.x.rows() - p;
+  const auto root = move.root.triangularView<Eigen::Lower>();
+  MatrixXd proposed = chains.x, momentum = stream.normals(p, n);
+  const double step = move.step * (0.8 + 0.4 * stream.uniform());  // no two moves in resonance
+  VectorXd log_ratio = 0.5 * momentum.colwise().squaredNorm().transpose();
+  parallel_for(static_cast<int>(n), context, [&](int i) {
+    const std::unique_ptr<Conditional> along = path.target.along_last_part(chains.x.col(i));
+    VectorXd x = chains.x.col(i), m = momentum.col(i);
+    const auto force = [&] {  // L' gradient of the log density at this temperature
+      const VectorXd reference = path.reference.gradient(x).tail(p), part = x.tail(p);
+      const VectorXd slope = reference + beta * (along->gradient(part) - part - reference);
+      return VectorXd(
+          (root.transpose() * slope).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }));
+    };
+    m += 0.5 * step * force();
+    for (int k = 0; k < kLeapfrogs; ++k) {
+      x.tail(p) += root * VectorXd(step * m);
+      m += (k + 1 < kLeapfrogs ? step : 0.5 * step) * force();
+    }
+    proposed.col(i) = x;
+    log_ratio[i] -= 0.5 * m.squaredNorm();
+  });
+  const Heights at = heights(path, proposed, context);
+  log_ratio += beta * (at.rise - chains.rise) + at.reference - chains.reference;
+  return accept(chains, proposed, at, log_ratio, stream);
+}
+
 int sweep_cost(const Target& target, const AisOptions& options) {
-  const int parts = static_cast<int>(target.parts().size());
+  const int parts = static_cast<int>(target.parts().size()) + (target.has_conditional() ? 1 : 0);
   return hamiltonian(target, options) ? parts + 1 + kLeapfrogs : parts;
 }
 

@@ -35,12 +35,19 @@ struct PartMove {
   double step;
 };
 
+/// How chains move along the last part where the target has a conditional: a Hamiltonian move of this metric.
+struct ConditionalMove {
+  Eigen::MatrixXd root;  ///< of the part's covariance
+  double step;
+};
+
 /// One temperature of the ladder, and how chains move there.
 struct Level {
   double beta;  ///< inverse temperature
   std::vector<PartMove> parts;
   StudentT metric;  ///< of Hamiltonian moves
   double hamiltonian_step;
+  ConditionalMove conditional;
   int sweeps;  ///< moves of every chain in every part
 };
 
@@ -56,6 +63,11 @@ bool hamiltonian(const Target& target, const AisOptions& options);
 /// identity (Neal 2011); returns the share accepted.
 double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                         const Context& context);
+
+/// One Hamiltonian move of every chain along the last part, the others staying as they are; returns the share
+/// accepted.
+double conditional_move(const AnnealingPath& path, Chains& chains, double beta, const ConditionalMove& move,
+                        Stream& stream, const Context& context);
 
 /// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move in each part and, where there is
 /// a gradient, a Hamiltonian one.

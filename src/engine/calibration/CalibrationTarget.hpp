@@ -19,6 +19,9 @@ class CalibrationTarget : public Target {
   /// Error and discrepancy; the parameters.
   std::vector<Eigen::Index> parts() const override { return {history_.dimension(), emulator_.n_inputs()}; }
 
+  bool has_conditional() const override { return true; }
+  std::unique_ptr<Conditional> along_last_part(const Eigen::VectorXd& x) const override;
+
   HistoryParameters history(const Eigen::VectorXd& x) const {
     return history_.parameters(x.head(history_.dimension()));
   }

@@ -31,18 +31,30 @@ double CoefficientLikelihood::log_density(const VectorXd& mean, const VectorXd& 
          0.5 * half.squaredNorm();
 }
 
+double CoefficientLikelihood::log_density(const VectorXd& w, VectorXd& gradient) const {
+  const VectorXd d = w - reference_, pulled = information_ * d;
+  gradient = score_ - pulled;
+  return log_density_ + d.dot(score_) - 0.5 * d.dot(pulled);
+}
+
+// With H = F^-1/2 S^1/2: A - (HA)'HA, c - (HA)'Hc, and log|F| and Hc in the value at w0.
+CoefficientLikelihood CoefficientLikelihood::blurred(const VectorXd& variance) const {
+  const VectorXd root = variance.cwiseSqrt();
+  const Eigen::LLT<MatrixXd> f = factor(root);
+  const MatrixXd half = f.matrixL().solve(root.asDiagonal() * information_);
+  const VectorXd pulled = f.matrixL().solve(root.cwiseProduct(score_));
+  return {reference_, information_ - half.transpose() * half, score_ - half.transpose() * pulled,
+          log_density_ - f.matrixLLT().diagonal().array().log().sum() + 0.5 * pulled.squaredNorm()};
+}
+
 CoefficientLikelihood::Posterior CoefficientLikelihood::posterior() const {
   const Eigen::LLT<MatrixXd> f = factor(VectorXd::Ones(score_.size()));
   return {f.solve(score_ + information_ * reference_),
           f.solve(MatrixXd::Identity(score_.size(), score_.size()))};
 }
 
-// A - A S^1/2 F^-1 S^1/2 A.
 MatrixXd CoefficientLikelihood::information(const VectorXd& variance) const {
-  const VectorXd root = variance.cwiseSqrt();
-  const Eigen::LLT<MatrixXd> f = factor(root);
-  const MatrixXd half = f.matrixL().solve(root.asDiagonal() * information_);
-  return information_ - half.transpose() * half;
+  return blurred(variance).information_;
 }
 
 }  // namespace amiss

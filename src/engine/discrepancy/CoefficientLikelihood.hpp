@@ -16,6 +16,10 @@ class CoefficientLikelihood {
                         double log_density);
 
   double log_density(const Eigen::VectorXd& mean, const Eigen::VectorXd& variance) const;
+  /// For w known, and its gradient.
+  double log_density(const Eigen::VectorXd& w, Eigen::VectorXd& gradient) const;
+  /// The same record for coefficients that vary about w with these variances: of N(y; K w, V + K S K').
+  CoefficientLikelihood blurred(const Eigen::VectorXd& variance) const;
   /// K' (V + K S K')^-1 K: how firmly the coefficients' mean is seen.
   Eigen::MatrixXd information(const Eigen::VectorXd& variance) const;
   /// Of w given the record, if w ~ N(0, I) before: covariance (I + A)^-1, mean (I + A)^-1 (c + A w0).

@@ -40,15 +40,14 @@ Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.co
                             GaussianProcessParameters::unpack(state.parameters.row(q).transpose()));
   }
   region_ = state.region;
-  if (region_.everywhere()) return;
   MatrixXd mean, variance;
   const MatrixXd normal = Stream(kRegionSeed, kRegionPoints, 0).normals(n_inputs(), kPoints);
   predict(region_.inputs(region_.place(normal)), mean, variance);
-  variance_in_region_.resize(n_outputs());
+  typical_variance_.resize(n_outputs());
   for (Index q = 0; q < n_outputs(); ++q) {
     double* const own = variance.col(q).data();
     std::nth_element(own, own + kPoints / 2, own + kPoints);
-    variance_in_region_[q] = own[kPoints / 2];
+    typical_variance_[q] = own[kPoints / 2];
   }
 }
 
@@ -95,7 +94,18 @@ void Emulator::predict_at(const MatrixXd& points, MatrixXd& mean, MatrixXd& vari
     processes_[static_cast<std::size_t>(q)].predict(inputs, mean.col(q));
     mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
   }
-  variance = variance_in_region_.replicate(inputs.rows(), 1);
+  variance = typical_variance_.replicate(inputs.rows(), 1);
+}
+
+VectorXd Emulator::mean_at(const VectorXd& point, MatrixXd& slopes) const {
+  const VectorXd input = region_.inputs(point).row(0).transpose();
+  MatrixXd by_input(n_inputs(), n_outputs());
+  VectorXd mean(n_outputs());
+  for (Index q = 0; q < n_outputs(); ++q)
+    mean[q] =
+        processes_[static_cast<std::size_t>(q)].predict(input, by_input.col(q)) * scale_[q] + centre_[q];
+  slopes = scale_.asDiagonal() * (by_input.transpose() * region_.slopes(point));
+  return mean;
 }
 
 void Emulator::leave_one_out(MatrixXd& mean, MatrixXd& variance) const {

@@ -49,6 +49,10 @@ class Emulator {
   /// likely for no other reason than that nothing is known. Outside the region an emulator knows nothing, and
   /// does not say so here: ask region().contains().
   void predict_at(const Eigen::MatrixXd& points, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
+  /// Mean of the coefficients at one such point, and its gradient (Q x P).
+  Eigen::VectorXd mean_at(const Eigen::VectorXd& point, Eigen::MatrixXd& slopes) const;
+  /// The median of each coefficient's variance, over the region or, everywhere, over the prior.
+  const Eigen::RowVectorXd& typical_variance() const { return typical_variance_; }
   /// Leave-one-out mean and variance (M x Q), widened, by hyper-parameters that have not seen the run left
   /// out, in the coefficients' own scale. @throws std::logic_error if made of a state, not trained.
   void leave_one_out(Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
@@ -68,7 +72,7 @@ class Emulator {
   Eigen::MatrixXd inputs_, coefficients_;
   Eigen::RowVectorXd centre_, scale_;
   Region region_;
-  Eigen::RowVectorXd variance_in_region_;  // if it is not everywhere
+  Eigen::RowVectorXd typical_variance_;  // of an emulator made of its state
   std::vector<GaussianProcess> processes_;
 };
 

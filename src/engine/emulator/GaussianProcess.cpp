@@ -150,7 +150,8 @@ GaussianProcessParameters GaussianProcessParameters::unpack(const VectorXd& x) {
 
 GaussianProcess::GaussianProcess(const MatrixXd& inputs, const VectorXd& values,
                                  const GaussianProcessParameters& parameters)
-    : scaled_inputs_(inputs * decay_rates(parameters.logit_beta).cwiseSqrt().asDiagonal()),
+    : input_scale_(decay_rates(parameters.logit_beta).cwiseSqrt()),
+      scaled_inputs_(inputs * input_scale_.asDiagonal()),
       values_(values),
       parameters_(parameters) {
   beta_of.resize(static_cast<std::size_t>(inputs.cols()));
@@ -206,7 +207,7 @@ double GaussianProcess::noise() const { return noise_variance(parameters_); }
 
 void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
                               Eigen::Ref<VectorXd> variance) const {
-  const MatrixXd scaled = points * decay_rates(parameters_.logit_beta).cwiseSqrt().asDiagonal();
+  const MatrixXd scaled = points * input_scale_.asDiagonal();
   const double amplitude = std::exp(parameters_.log_amplitude);
   const MatrixXd kernel = gaussian_kernel(scaled_inputs_, scaled);  // M x n
   mean.noalias() = amplitude * (kernel.transpose() * weights_);
@@ -217,9 +218,18 @@ void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean,
 }
 
 void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean) const {
-  const MatrixXd scaled = points * decay_rates(parameters_.logit_beta).cwiseSqrt().asDiagonal();
+  const MatrixXd scaled = points * input_scale_.asDiagonal();
   mean.noalias() =
       std::exp(parameters_.log_amplitude) * (gaussian_kernel(scaled_inputs_, scaled).transpose() * weights_);
+}
+
+// d/ds exp(-|u_i - s|^2) = 2 (u_i - s) exp(-|u_i - s|^2) at the scaled point s.
+double GaussianProcess::predict(const VectorXd& point, Eigen::Ref<VectorXd> gradient) const {
+  const MatrixXd apart = scaled_inputs_.rowwise() - point.cwiseProduct(input_scale_).transpose();
+  const VectorXd share =
+      std::exp(parameters_.log_amplitude) * weights_.array() * (-apart.rowwise().squaredNorm().array()).exp();
+  gradient = 2.0 * input_scale_.cwiseProduct(apart.transpose() * share);
+  return share.sum();
 }
 
 void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {

@@ -92,6 +92,8 @@ class GaussianProcess {
   /// The mean alone, which costs a small part of it.
   void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean) const;
 
+  /// Mean at one point, and its gradient with respect to the point.
+  double predict(const Eigen::VectorXd& point, Eigen::Ref<Eigen::VectorXd> gradient) const;
   /// Leave-one-out prediction of each value, closed form (Rasmussen and Williams 2006, equation 5.12).
   void leave_one_out(Eigen::VectorXd& mean, Eigen::VectorXd& variance) const;
 
@@ -132,6 +134,7 @@ class GaussianProcess {
   struct Slopes;
   Slopes slopes(const HyperPriors& priors, const Eigen::VectorXd& error) const;
 
+  Eigen::VectorXd input_scale_;    // sqrt(-4 log beta_p)
   Eigen::MatrixXd scaled_inputs_;  // M x P: input p times sqrt(-4 log beta_p)
   Eigen::VectorXd values_;
   GaussianProcessParameters parameters_;

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "engine/linalg/constants.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -32,6 +33,11 @@ bool Region::contains(const Eigen::Ref<const VectorXd>& x) const {
 MatrixXd Region::inputs(const MatrixXd& x) const {
   if (everywhere()) return x.transpose().unaryExpr(&normal_cdf);
   return (standardised(x).transpose().array() / (2.0 * radius_) + 0.5).matrix();
+}
+
+MatrixXd Region::slopes(const VectorXd& x) const {
+  if (everywhere()) return ((-0.5 * x.array().square()).exp() / std::sqrt(2.0 * kPi)).matrix().asDiagonal();
+  return factor_.inverse() / (2.0 * radius_);
 }
 
 MatrixXd Region::place(const MatrixXd& normal) const {
