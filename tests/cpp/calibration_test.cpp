@@ -119,6 +119,37 @@ TEST(CalibrationTarget, CoordinatesAreTheHistorysThenTheParameters) {
   }
 }
 
+TEST(CalibrationTarget, AlongTheParametersItIsTheSameLikelihood) {
+  EmulatorState state = make_emulator(2).state();
+  const Joint everywhere;
+  const CalibrationTarget whole = everywhere.target();
+  state.region = Region(VectorXd::Zero(2), MatrixXd::Identity(2, 2), 6.0);
+  const Emulator regional(state);
+  const CalibrationTarget within(everywhere.model, {0, 1}, regional);
+  MatrixXd x = normal_matrix(7, 8, 88), elsewhere = normal_matrix(2, 8, 89);
+  for (const CalibrationTarget* target : {&whole, &within}) {
+    ASSERT_TRUE(target->has_conditional());
+    const std::unique_ptr<Conditional> along = target->along_last_part(x);
+    MatrixXd moved = x;
+    moved.bottomRows(2) = elsewhere;
+    const VectorXd expected = target->log_likelihood(moved);
+    EXPECT_LT((along->log_likelihood(elsewhere) - expected).cwiseAbs().maxCoeff(), 1e-8);
+  }
+  // In a region the emulator's variance is the same at every point, and the gradient the likelihood's own.
+  const std::unique_ptr<Conditional> along = within.along_last_part(x);
+  const MatrixXd gradient = along->gradient(elsewhere);
+  constexpr double kStep = 1e-5;
+  for (Index p = 0; p < 2; ++p) {
+    MatrixXd above = elsewhere, below = elsewhere;
+    above.row(p).array() += kStep;
+    below.row(p).array() -= kStep;
+    const VectorXd slope = (along->log_likelihood(above) - along->log_likelihood(below)) / (2 * kStep);
+    EXPECT_LT((slope - gradient.row(p).transpose()).norm(), 1e-5 * gradient.norm()) << p;
+  }
+  elsewhere.col(0).setConstant(5.0);  // |x| > 6
+  EXPECT_EQ(along->log_likelihood(elsewhere)[0], -kInfinity);
+}
+
 TEST(CalibrationTarget, LikelihoodIsTheDenseDensityOfTheMeasurement) {
   const Joint joint;
   const CalibrationTarget target = joint.target();

@@ -71,5 +71,56 @@ TEST(Emulator, InARegionItsVarianceIsTheMedianThere) {
   EXPECT_EQ(emulator.state().region.radius(), 2.5);
 }
 
+TEST(Region, GradientsArePulledBackToThePoints) {
+  const MatrixXd by_input = normal_matrix(4, 3, 406);
+  for (const Region& region : {make_region(), Region()}) {
+    const MatrixXd x = 0.5 * normal_matrix(3, 4, 407);
+    const MatrixXd gradient = region.pulled_back(x, by_input);
+    ASSERT_EQ(gradient.rows(), 3);
+    ASSERT_EQ(gradient.cols(), 4);
+    constexpr double kStep = 1e-6;  // differences are good to its square
+    for (Index p = 0; p < 3; ++p) {
+      MatrixXd above = x, below = x;
+      above.row(p).array() += kStep;
+      below.row(p).array() -= kStep;
+      const MatrixXd slope = (region.inputs(above) - region.inputs(below)) / (2 * kStep);
+      EXPECT_LT((slope.cwiseProduct(by_input).rowwise().sum() - gradient.row(p).transpose()).norm(), 1e-8);
+    }
+  }
+}
+
+// Of sum_q b_q(j) mean_q(j), b that of each point.
+TEST(Emulator, SlopesAreThoseOfTheMean) {
+  EmulatorState state;
+  state.inputs = uniform_matrix(20, 3, 408);
+  state.coefficients = normal_matrix(20, 2, 409);
+  state.coefficients.col(1) *= 30.0;
+  state.parameters = MatrixXd::Constant(2, 6, 1.0);
+  state.parameters.col(1).setConstant(-6.0);
+  const MatrixXd b = normal_matrix(5, 2, 410);
+  for (const Region& region : {make_region(), Region()}) {
+    state.region = region;
+    const Emulator emulator(state);
+    const MatrixXd x = region.place(0.5 * normal_matrix(3, 5, 411));
+    MatrixXd seen, mean, variance;
+    const MatrixXd gradient = emulator.slopes_at(x, [&](const MatrixXd& at) {
+      seen = at;
+      return b;
+    });
+    emulator.predict_at(x, mean, variance);
+    EXPECT_LT((seen - mean).norm(), 1e-10 * mean.norm());
+    constexpr double kStep = 1e-5;
+    for (Index p = 0; p < 3; ++p) {
+      MatrixXd above = x, below = x, higher, lower;
+      above.row(p).array() += kStep;
+      below.row(p).array() -= kStep;
+      emulator.predict_at(above, higher, variance);
+      emulator.predict_at(below, lower, variance);
+      const VectorXd slope = ((higher - lower).cwiseProduct(b) / (2 * kStep)).rowwise().sum();
+      EXPECT_LT((slope - gradient.row(p).transpose()).norm(), 1e-6 * gradient.norm());
+    }
+  }
+}
+
 }  // namespace
 }  // namespace amiss

@@ -93,8 +93,8 @@ AnnealedRun::Group AnnealedRun::run_group(Stream stream, const Context& context)
       for (std::size_t p = 0; p < parts.size(); ++p)
         accepted[static_cast<Index>(p)] +=
             crank_nicolson_move(path_, group.chains, levels_[k].beta, parts[p], stream, context);
-      if (path_.target.has_conditional())
-        conditional_move(path_, group.chains, levels_[k].beta, levels_[k].conditional, stream, context);
+      if (levels_[k].conditional)
+        conditional_move(path_, group.chains, *levels_[k].conditional, stream, context);
       if (hamiltonian(path_.target, options_))
         hamiltonian_move(path_, group.chains, levels_[k], stream, context);
     }
@@ -124,7 +124,7 @@ double AnnealedRun::variance() const {
 
 long AnnealedRun::moves() const {
   long values = 1;
-  for (const Level& level : levels_) values += level.sweeps * sweep_cost(path_.target, options_);
+  for (const Level& level : levels_) values += level.sweeps * sweep_cost(path_.target, level, options_);
   return values * options_.chains;
 }
 

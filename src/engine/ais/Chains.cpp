@@ -6,7 +6,6 @@
 #include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/evaluate.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
-#include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
 
@@ -16,7 +15,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kLeapfrogs = 4;  // of one Hamiltonian move
+constexpr int kLeapfrogs = 4;              // of one Hamiltonian move
+constexpr int kConditionalLeapfrogs = 12;  // which are cheap
 
 // What the path needs to know of points: log-likelihood and log density of the reference, in blocks that the
 // threads share, and the rise.
@@ -143,37 +143,42 @@ double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& 
   return accept(chains, x, at, log_ratio, stream);
 }
 
-double conditional_move(const AnnealingPath& path, Chains& chains, double beta, const ConditionalMove& move,
+// The blocks of chains go their whole ways one after the other, so that what is known of the others of a
+// chain's coordinates is worked out once.
+double conditional_move(const AnnealingPath& path, Chains& chains, const ConditionalMove& move,
                         Stream& stream, const Context& context) {
-  const Index n = chains.size(), p = move.root.rows(), first = chains.x.rows() - p;
+  const Index n = chains.size(), p = move.root.rows();
   const auto root = move.root.triangularView<Eigen::Lower>();
-  MatrixXd proposed = chains.x, momentum = stream.normals(p, n);
   const double step = move.step * (0.8 + 0.4 * stream.uniform());  // no two moves in resonance
-  VectorXd log_ratio = 0.5 * momentum.colwise().squaredNorm().transpose();
-  parallel_for(static_cast<int>(n), context, [&](int i) {
-    const std::unique_ptr<Conditional> along = path.target.along_last_part(chains.x.col(i));
-    VectorXd x = chains.x.col(i), m = momentum.col(i);
-    const auto force = [&] {  // L' gradient of the log density at this temperature
-      const VectorXd reference = path.reference.gradient(x).tail(p), part = x.tail(p);
-      const VectorXd slope = reference + beta * (along->gradient(part) - part - reference);
-      return VectorXd(
-          (root.transpose() * slope).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }));
+  MatrixXd proposed = chains.x, momentum = stream.normals(p, n);
+  VectorXd log_ratio = 0.5 * momentum.colwise().squaredNorm().transpose() - chains.rise - chains.reference;
+  Heights at(n);
+  at.ll.resize(n);
+  for_blocks(path.target, n, context, [&](Index first, Index count) {
+    const std::unique_ptr<Conditional> along = path.target.along_last_part(chains.x.middleCols(first, count));
+    MatrixXd x = chains.x.bottomRows(p).middleCols(first, count), m = momentum.middleCols(first, count);
+    const auto force = [&] {  // L' gradient of the log posterior
+      const MatrixXd slope = root.transpose() * MatrixXd(along->gradient(x) - x);
+      return MatrixXd(slope.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }));
     };
     m += 0.5 * step * force();
-    for (int k = 0; k < kLeapfrogs; ++k) {
-      x.tail(p) += root * VectorXd(step * m);
-      m += (k + 1 < kLeapfrogs ? step : 0.5 * step) * force();
+    for (int k = 0; k < kConditionalLeapfrogs; ++k) {
+      x += root * MatrixXd(step * m);
+      m += (k + 1 < kConditionalLeapfrogs ? step : 0.5 * step) * force();
     }
-    proposed.col(i) = x;
-    log_ratio[i] -= 0.5 * m.squaredNorm();
+    at.ll.segment(first, count) = along->log_likelihood(x).unaryExpr(&finite_or_zero);
+    auto block = proposed.middleCols(first, count);
+    block.bottomRows(p) = x;
+    at.prepare(path, block, first);
+    log_ratio.segment(first, count) -= 0.5 * m.colwise().squaredNorm().transpose();
   });
-  const Heights at = heights(path, proposed, context);
-  log_ratio += beta * (at.rise - chains.rise) + at.reference - chains.reference;
+  at.rise += at.ll;
+  log_ratio += at.rise + at.reference;
   return accept(chains, proposed, at, log_ratio, stream);
 }
 
-int sweep_cost(const Target& target, const AisOptions& options) {
-  const int parts = static_cast<int>(target.parts().size()) + (target.has_conditional() ? 1 : 0);
+int sweep_cost(const Target& target, const Level& level, const AisOptions& options) {
+  const int parts = static_cast<int>(target.parts().size()) + (level.conditional ? 1 : 0);
   return hamiltonian(target, options) ? parts + 1 + kLeapfrogs : parts;
 }
 

@@ -1,4 +1,7 @@
 #pragma once
+#include <optional>
+#include <vector>
+
 #include "engine/Context.hpp"
 #include "engine/ais/AisOptions.hpp"
 #include "engine/ais/AnnealingPath.hpp"
@@ -35,7 +38,8 @@ struct PartMove {
   double step;
 };
 
-/// How chains move along the last part where the target has a conditional: a Hamiltonian move of this metric.
+/// How chains of the posterior itself move along the last part where the target has a conditional: a
+/// Hamiltonian move of this metric.
 struct ConditionalMove {
   Eigen::MatrixXd root;  ///< of the part's covariance
   double step;
@@ -47,7 +51,7 @@ struct Level {
   std::vector<PartMove> parts;
   StudentT metric;  ///< of Hamiltonian moves
   double hamiltonian_step;
-  ConditionalMove conditional;
+  std::optional<ConditionalMove> conditional;
   int sweeps;  ///< moves of every chain in every part
 };
 
@@ -64,13 +68,14 @@ bool hamiltonian(const Target& target, const AisOptions& options);
 double hamiltonian_move(const AnnealingPath& path, Chains& chains, const Level& level, Stream& stream,
                         const Context& context);
 
-/// One Hamiltonian move of every chain along the last part, the others staying as they are; returns the share
-/// accepted.
-double conditional_move(const AnnealingPath& path, Chains& chains, double beta, const ConditionalMove& move,
+/// One Hamiltonian move of every chain along the last part, the others staying as they are, that leaves the
+/// posterior itself invariant; returns the share accepted. Where the posterior is curved along the
+/// parameters, it goes along the curve.
+double conditional_move(const AnnealingPath& path, Chains& chains, const ConditionalMove& move,
                         Stream& stream, const Context& context);
 
-/// Likelihood values that a sweep of one chain costs: a Crank-Nicolson move in each part and, where there is
-/// a gradient, a Hamiltonian one.
-int sweep_cost(const Target& target, const AisOptions& options);
+/// Likelihood values that a sweep of one chain costs at a level: a Crank-Nicolson move in each part and,
+/// where there are gradients, Hamiltonian ones.
+int sweep_cost(const Target& target, const Level& level, const AisOptions& options);
 
 }  // namespace amiss

@@ -72,10 +72,10 @@ void tune(const AnnealingPath& path, const AisOptions& options, Chains& chains, 
         const double accepted = crank_nicolson_move(path, chains, level.beta, part, stream, context);
         part.step = std::min(1.0, std::max(0.003, part.step * std::exp(accepted - kAcceptance)));
       }
-      if (path.target.has_conditional()) {
-        ConditionalMove& move = level.conditional;
-        const double accepted = conditional_move(path, chains, level.beta, move, stream, context);
-        move.step = std::min(1.5, std::max(0.001, move.step * std::exp(accepted - kHamiltonianAcceptance)));
+      if (level.conditional) {
+        ConditionalMove& move = *level.conditional;
+        const double moved = conditional_move(path, chains, move, stream, context);
+        move.step = std::min(1.5, std::max(0.001, move.step * std::exp(moved - kHamiltonianAcceptance)));
       }
       if (!hamiltonian(path.target, options)) continue;
       const double moved = hamiltonian_move(path, chains, level, stream, context);
@@ -94,7 +94,7 @@ Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context
   evaluations = options.pilot_chains;
   if (!std::isfinite(chains.ll.maxCoeff()))
     throw std::runtime_error("ais: the likelihood is zero at every draw from the reference");
-  double beta = 0.0, hamiltonian_step = 0.5, conditional_step = 0.5;
+  double beta = 0.0, hamiltonian_step = 0.5;
   const std::vector<Index> parts = path.target.parts();
   std::vector<double> steps(parts.size(), 0.8);
   while (beta < 1.0) {
@@ -105,10 +105,10 @@ Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context
     chains.log_w += chains.rise * (next - beta);
     beta = next;
     const VectorXd weights = normalised_exp(chains.log_w);
-    Level level{beta, {}, StudentT::fit(chains.x, weights, kMoveDof), hamiltonian_step, {}, 0};
-    if (path.target.has_conditional()) {
+    Level level{beta, {}, StudentT::fit(chains.x, weights, kMoveDof), hamiltonian_step, std::nullopt, 0};
+    if (beta == 1.0 && path.target.has_conditional()) {
       const MatrixXd last = chains.x.bottomRows(parts.back());
-      level.conditional = {StudentT::fit(last, weights, kMoveDof).root(), conditional_step};
+      level.conditional = ConditionalMove{StudentT::fit(last, weights, kMoveDof).root(), 0.5};
     }
     Index first = 0;
     for (std::size_t k = 0; k < parts.size(); ++k) {
@@ -118,10 +118,10 @@ Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context
     levels.push_back(std::move(level));
     chains.resample(stream);
     tune(path, options, chains, levels.back(), stream, context);
-    evaluations += chains.size() * (levels.back().sweeps + 1) * sweep_cost(path.target, options);
+    evaluations +=
+        chains.size() * (levels.back().sweeps + 1) * sweep_cost(path.target, levels.back(), options);
     for (std::size_t k = 0; k < parts.size(); ++k) steps[k] = levels.back().parts[k].step;
     hamiltonian_step = levels.back().hamiltonian_step;
-    conditional_step = levels.back().conditional.step;
   }
 }
 

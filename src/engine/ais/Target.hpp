@@ -2,18 +2,10 @@
 #include <memory>
 #include <vector>
 
+#include "engine/ais/Conditional.hpp"
 #include "engine/linalg/Eigen.hpp"
 
 namespace amiss {
-
-/// A likelihood along some of its coordinates, the others known.
-class Conditional {
- public:
-  virtual ~Conditional() = default;
-  /// Gradient of the log-likelihood; it may be approximate, as it only leads moves to where they are
-  /// proposed.
-  virtual Eigen::VectorXd gradient(const Eigen::VectorXd& part) const = 0;
-};
 
 /// A posterior to be sampled and normalised: prior times likelihood. The prior is x ~ N(0, I): u = Phi(x) is
 /// uniform on the unit cube, and a prior's quantile function maps u onto the parameters. From which
@@ -30,10 +22,11 @@ class Target {
   /// the parts in turn.
   virtual std::vector<Eigen::Index> parts() const { return {dimension()}; }
 
-  /// A target whose likelihood is cheap to follow along its last part, the others staying as they are in x,
-  /// says so and overrides the next function; its chains then make Hamiltonian moves along that part.
+  /// A target whose likelihood is cheap to follow along its last part, the others staying as they are in the
+  /// columns of x, says so and overrides the next function; its chains then make Hamiltonian moves along that
+  /// part.
   virtual bool has_conditional() const { return false; }
-  virtual std::unique_ptr<Conditional> along_last_part(const Eigen::VectorXd& /*x*/) const { return nullptr; }
+  virtual std::unique_ptr<Conditional> along_last_part(const Eigen::MatrixXd& /*x*/) const { return nullptr; }
 
   /// How many points are asked for at once, at most; several such blocks share the threads.
   virtual Eigen::Index block() const { return 16; }

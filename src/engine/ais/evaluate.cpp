@@ -12,23 +12,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-namespace {
-
-// Not a number, and infinity, count as likelihood zero.
 double finite_or_zero(double v) { return std::isfinite(v) ? v : -std::numeric_limits<double>::infinity(); }
 
-// Columns 0 ... n-1 in blocks that the threads share: task(first, count). Their size is fixed, so that no
-// result depends on the number of threads.
-template <class Task>
-void for_blocks(const Target& target, Index n, const Context& context, const Task& task) {
+void for_blocks(const Target& target, Index n, const Context& context,
+                const std::function<void(Index, Index)>& task) {
   const Index block = std::min(n, target.block());
   parallel_for(static_cast<int>((n + block - 1) / block), context, [&](int b) {
     const Index first = b * block;
     task(first, std::min(block, n - first));
   });
 }
-
-}  // namespace
 
 VectorXd evaluate(const Target& target, const MatrixXd& x, const Context& context,
                   const std::function<void(Index, Index)>& also) {

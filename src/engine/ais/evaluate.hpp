@@ -6,6 +6,14 @@
 
 namespace amiss {
 
+/// Columns 0 ... n-1 in blocks of at most target.block() that the threads share: task(first, count). Their
+/// size is fixed, so that no result depends on the number of threads.
+void for_blocks(const Target& target, Eigen::Index n, const Context& context,
+                const std::function<void(Eigen::Index, Eigen::Index)>& task);
+
+/// Not a number, and infinity, count as likelihood zero.
+double finite_or_zero(double log_likelihood);
+
 /// Log-likelihoods of the columns of x, in blocks that the threads share; what is not finite is -infinity.
 /// also(first, count) is what else the threads can do for the columns of a block.
 Eigen::VectorXd evaluate(const Target& target, const Eigen::MatrixXd& x, const Context& context,

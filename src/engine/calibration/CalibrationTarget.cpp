@@ -14,23 +14,41 @@ using Eigen::VectorXd;
 
 namespace {
 
-// The record as the parameters see it, error and discrepancy known; the emulator's variance is the typical
-// one.
+// The record as the parameters see it, error and discrepancy known.
 class AlongParameters : public Conditional {
  public:
-  AlongParameters(const Emulator& emulator, CoefficientLikelihood likelihood)
-      : emulator_(emulator), likelihood_(std::move(likelihood)) {}
+  // Of each chain, what the record says about the coefficients.
+  AlongParameters(const Emulator& emulator, std::vector<CoefficientLikelihood> exact)
+      : emulator_(emulator), exact_(std::move(exact)) {
+    const VectorXd variance = emulator.typical_variance().transpose();
+    for (const CoefficientLikelihood& own : exact_) typical_.push_back(own.blurred(variance));
+  }
 
-  VectorXd gradient(const VectorXd& x) const override {
-    MatrixXd slopes;
-    VectorXd by_mean;
-    likelihood_.log_density(emulator_.mean_at(x, slopes), by_mean);
-    return slopes.transpose() * by_mean;
+  VectorXd log_likelihood(const MatrixXd& x) const override {
+    MatrixXd mean, variance;
+    emulator_.predict_at(x, mean, variance);
+    VectorXd values(x.cols());
+    for (Index i = 0; i < x.cols(); ++i)
+      values[i] = emulator_.region().contains(x.col(i))
+                      ? exact_[static_cast<std::size_t>(i)].log_density(mean.row(i).transpose(),
+                                                                        variance.row(i).transpose())
+                      : -std::numeric_limits<double>::infinity();
+    return values;
+  }
+
+  // By the emulator's typical variance, whose own gradient is left out.
+  MatrixXd gradient(const MatrixXd& x) const override {
+    return emulator_.slopes_at(x, [&](const MatrixXd& mean) {
+      MatrixXd by_mean(mean.rows(), mean.cols());
+      for (Index i = 0; i < mean.rows(); ++i)
+        by_mean.row(i) = typical_[static_cast<std::size_t>(i)].score(mean.row(i).transpose()).transpose();
+      return by_mean;
+    });
   }
 
  private:
   const Emulator& emulator_;
-  CoefficientLikelihood likelihood_;
+  std::vector<CoefficientLikelihood> exact_, typical_;
 };
 
 }  // namespace
@@ -60,9 +78,10 @@ VectorXd CalibrationTarget::log_likelihood(const MatrixXd& x) const {
   return values;
 }
 
-std::unique_ptr<Conditional> CalibrationTarget::along_last_part(const VectorXd& x) const {
-  return std::make_unique<AlongParameters>(
-      emulator_, model().given(history(x)).blurred(emulator_.typical_variance().transpose()));
+std::unique_ptr<Conditional> CalibrationTarget::along_last_part(const MatrixXd& x) const {
+  std::vector<CoefficientLikelihood> given;
+  for (Index i = 0; i < x.cols(); ++i) given.push_back(model().given(history(x.col(i))));
+  return std::make_unique<AlongParameters>(emulator_, std::move(given));
 }
 
 }  // namespace amiss

@@ -20,7 +20,7 @@ class CalibrationTarget : public Target {
   std::vector<Eigen::Index> parts() const override { return {history_.dimension(), emulator_.n_inputs()}; }
 
   bool has_conditional() const override { return true; }
-  std::unique_ptr<Conditional> along_last_part(const Eigen::VectorXd& x) const override;
+  std::unique_ptr<Conditional> along_last_part(const Eigen::MatrixXd& x) const override;
 
   HistoryParameters history(const Eigen::VectorXd& x) const {
     return history_.parameters(x.head(history_.dimension()));

@@ -31,10 +31,8 @@ double CoefficientLikelihood::log_density(const VectorXd& mean, const VectorXd& 
          0.5 * half.squaredNorm();
 }
 
-double CoefficientLikelihood::log_density(const VectorXd& w, VectorXd& gradient) const {
-  const VectorXd d = w - reference_, pulled = information_ * d;
-  gradient = score_ - pulled;
-  return log_density_ + d.dot(score_) - 0.5 * d.dot(pulled);
+VectorXd CoefficientLikelihood::score(const VectorXd& w) const {
+  return score_ - information_ * (w - reference_);
 }
 
 // With H = F^-1/2 S^1/2: A - (HA)'HA, c - (HA)'Hc, and log|F| and Hc in the value at w0.

@@ -16,8 +16,8 @@ class CoefficientLikelihood {
                         double log_density);
 
   double log_density(const Eigen::VectorXd& mean, const Eigen::VectorXd& variance) const;
-  /// For w known, and its gradient.
-  double log_density(const Eigen::VectorXd& w, Eigen::VectorXd& gradient) const;
+  /// Gradient of log N(y; K w, V) with respect to w: c - A (w - w0).
+  Eigen::VectorXd score(const Eigen::VectorXd& w) const;
   /// The same record for coefficients that vary about w with these variances: of N(y; K w, V + K S K').
   CoefficientLikelihood blurred(const Eigen::VectorXd& variance) const;
   /// K' (V + K S K')^-1 K: how firmly the coefficients' mean is seen.

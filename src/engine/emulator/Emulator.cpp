@@ -97,15 +97,19 @@ void Emulator::predict_at(const MatrixXd& points, MatrixXd& mean, MatrixXd& vari
   variance = typical_variance_.replicate(inputs.rows(), 1);
 }
 
-VectorXd Emulator::mean_at(const VectorXd& point, MatrixXd& slopes) const {
-  const VectorXd input = region_.inputs(point).row(0).transpose();
-  MatrixXd by_input(n_inputs(), n_outputs());
-  VectorXd mean(n_outputs());
+MatrixXd Emulator::slopes_at(const MatrixXd& points, const ByMean& by_mean) const {
+  const MatrixXd inputs = region_.inputs(points);
+  MatrixXd mean(inputs.rows(), n_outputs()), by_input = MatrixXd::Zero(inputs.rows(), n_inputs());
+  std::vector<MatrixXd> slopes(static_cast<std::size_t>(n_outputs()));
+  for (Index q = 0; q < n_outputs(); ++q) {
+    const auto k = static_cast<std::size_t>(q);
+    processes_[k].predict(inputs, mean.col(q), slopes[k]);
+    mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
+  }
+  const MatrixXd along = by_mean(mean) * scale_.asDiagonal();
   for (Index q = 0; q < n_outputs(); ++q)
-    mean[q] =
-        processes_[static_cast<std::size_t>(q)].predict(input, by_input.col(q)) * scale_[q] + centre_[q];
-  slopes = scale_.asDiagonal() * (by_input.transpose() * region_.slopes(point));
-  return mean;
+    by_input += along.col(q).asDiagonal() * slopes[static_cast<std::size_t>(q)];
+  return region_.pulled_back(points, by_input);
 }
 
 void Emulator::leave_one_out(MatrixXd& mean, MatrixXd& variance) const {

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -49,8 +50,10 @@ class Emulator {
   /// likely for no other reason than that nothing is known. Outside the region an emulator knows nothing, and
   /// does not say so here: ask region().contains().
   void predict_at(const Eigen::MatrixXd& points, Eigen::MatrixXd& mean, Eigen::MatrixXd& variance) const;
-  /// Mean of the coefficients at one such point, and its gradient (Q x P).
-  Eigen::VectorXd mean_at(const Eigen::VectorXd& point, Eigen::MatrixXd& slopes) const;
+  /// Gradient (P x n), at n such points, of a function of the mean coefficients there, whose gradient with
+  /// respect to these (n x Q, as they are given) is by_mean.
+  using ByMean = std::function<Eigen::MatrixXd(const Eigen::MatrixXd& mean)>;
+  Eigen::MatrixXd slopes_at(const Eigen::MatrixXd& points, const ByMean& by_mean) const;
   /// The median of each coefficient's variance, over the region or, everywhere, over the prior.
   const Eigen::RowVectorXd& typical_variance() const { return typical_variance_; }
   /// Leave-one-out mean and variance (M x Q), widened, by hyper-parameters that have not seen the run left

@@ -224,12 +224,14 @@ void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean)
 }
 
 // d/ds exp(-|u_i - s|^2) = 2 (u_i - s) exp(-|u_i - s|^2) at the scaled point s.
-double GaussianProcess::predict(const VectorXd& point, Eigen::Ref<VectorXd> gradient) const {
-  const MatrixXd apart = scaled_inputs_.rowwise() - point.cwiseProduct(input_scale_).transpose();
-  const VectorXd share =
-      std::exp(parameters_.log_amplitude) * weights_.array() * (-apart.rowwise().squaredNorm().array()).exp();
-  gradient = 2.0 * input_scale_.cwiseProduct(apart.transpose() * share);
-  return share.sum();
+void GaussianProcess::predict(const MatrixXd& points, Eigen::Ref<VectorXd> mean, MatrixXd& slopes) const {
+  const MatrixXd scaled = points * input_scale_.asDiagonal();
+  MatrixXd share = gaussian_kernel(scaled_inputs_, scaled);  // of run i in the mean at point j
+  share.array().colwise() *= std::exp(parameters_.log_amplitude) * weights_.array();
+  mean = share.colwise().sum().transpose();
+  slopes.noalias() = share.transpose() * scaled_inputs_;
+  slopes -= mean.asDiagonal() * scaled;
+  slopes = 2.0 * slopes * input_scale_.asDiagonal();
 }
 
 void GaussianProcess::leave_one_out(VectorXd& mean, VectorXd& variance) const {

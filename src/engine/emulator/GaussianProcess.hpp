@@ -92,8 +92,9 @@ class GaussianProcess {
   /// The mean alone, which costs a small part of it.
   void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean) const;
 
-  /// Mean at one point, and its gradient with respect to the point.
-  double predict(const Eigen::VectorXd& point, Eigen::Ref<Eigen::VectorXd> gradient) const;
+  /// The mean and its gradient with respect to the points (n x P).
+  void predict(const Eigen::MatrixXd& points, Eigen::Ref<Eigen::VectorXd> mean,
+               Eigen::MatrixXd& slopes) const;
   /// Leave-one-out prediction of each value, closed form (Rasmussen and Williams 2006, equation 5.12).
   void leave_one_out(Eigen::VectorXd& mean, Eigen::VectorXd& variance) const;
 

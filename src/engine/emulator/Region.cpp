@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "engine/linalg/constants.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -35,9 +34,9 @@ MatrixXd Region::inputs(const MatrixXd& x) const {
   return (standardised(x).transpose().array() / (2.0 * radius_) + 0.5).matrix();
 }
 
-MatrixXd Region::slopes(const VectorXd& x) const {
-  if (everywhere()) return ((-0.5 * x.array().square()).exp() / std::sqrt(2.0 * kPi)).matrix().asDiagonal();
-  return factor_.inverse() / (2.0 * radius_);
+MatrixXd Region::pulled_back(const MatrixXd& x, const MatrixXd& by_input) const {
+  if (everywhere()) return by_input.transpose().cwiseProduct(x.unaryExpr(&normal_density));
+  return (by_input * factor_.inverse()).transpose() / (2.0 * radius_);
 }
 
 MatrixXd Region::place(const MatrixXd& normal) const {

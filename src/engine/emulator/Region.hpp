@@ -19,8 +19,9 @@ class Region {
   bool everywhere() const { return centre_.size() == 0; }
   bool contains(const Eigen::Ref<const Eigen::VectorXd>& x) const;
   Eigen::MatrixXd inputs(const Eigen::MatrixXd& x) const;  ///< n x P, of points P x n
-  /// d inputs / dx at one point, P x P.
-  Eigen::MatrixXd slopes(const Eigen::VectorXd& x) const;
+  /// Gradients with respect to points x (P x n) of functions whose gradients with respect to the inputs are
+  /// given (n x P).
+  Eigen::MatrixXd pulled_back(const Eigen::MatrixXd& x, const Eigen::MatrixXd& by_input) const;
   /// Points of the region for draws from N(0, I), both P x n: themselves, or c + R x, drawn in where the
   /// ellipsoid ends.
   Eigen::MatrixXd place(const Eigen::MatrixXd& normal) const;
