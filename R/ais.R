@@ -24,8 +24,8 @@ ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision 
 #'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned records
 #'     of [calibrate_paper()] 1; 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
-#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient ([calibrate()]'s discrepancy; `FALSE`: they make
-#'     the annealed run more reliable at several times its cost). [ais()] makes them if it is given a gradient;
+#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE` in [calibrate()], along the parameters, where
+#'     they follow a posterior that is curved at up to twice the cost; `FALSE` elsewhere). [ais()] makes them if it is given a gradient;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
 #'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95 %),

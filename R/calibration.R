@@ -1,6 +1,6 @@
 calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf), time_constants = NULL,
                             error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, check = 40,
-                            exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12, precision = 0.2))
+                            exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12, precision = 0.2, gradient = TRUE))
 
 #' Calibrate a simulator on measurements
 #'

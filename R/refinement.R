@@ -100,7 +100,7 @@ too_coarse <- function(emulator, measurements) {
 
 regional_runs <- function(parameters, least = 0) max(least, 40, 10 * length(parameters))
 
-refining_ais <- list(pilot_chains = 128, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, importance_draws = 0)
+refining_ais <- list(pilot_chains = 128, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, gradient = FALSE, importance_draws = 0)
 
 coarsely <- function(calibration) {
   calibration <- utils::modifyList(as.list(calibration), list(exact = 0))

@@ -1,5 +1,5 @@
 upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
-                        screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, importance_draws = 0))
+                        screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, gradient = FALSE, importance_draws = 0))
 
 #' The loop: show, name the cause, extend, measure
 #'

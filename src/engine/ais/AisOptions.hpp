@@ -12,7 +12,7 @@ struct AisOptions {
   int sweeps = 0;          ///< least number of moves of every chain at every temperature; 0: 3
   int max_sweeps = 30;     ///< greatest; the pilot finds how many the likelihood needs to forget where it was
   double ess_drop = 0.7;   ///< the pilot's next temperature leaves this conditional effective size per chain
-  bool gradient = true;    ///< Hamiltonian moves too, where the target has a gradient
+  bool gradient = true;    ///< Hamiltonian moves too, where the target has a gradient, or a conditional
   bool resample = true;    ///< resample a group when its effective size falls below half; false: plain AIS
   int importance_draws = 1000;  ///< of the second estimator, from a fitted Student-t mixture; 0 leaves it out
   int refit_draws =

@@ -106,7 +106,7 @@ Pilot::Pilot(const AnnealingPath& path, const AisOptions& options, const Context
     beta = next;
     const VectorXd weights = normalised_exp(chains.log_w);
     Level level{beta, {}, StudentT::fit(chains.x, weights, kMoveDof), hamiltonian_step, std::nullopt, 0};
-    if (beta == 1.0 && path.target.has_conditional()) {
+    if (beta == 1.0 && options.gradient && path.target.has_conditional()) {
       const MatrixXd last = chains.x.bottomRows(parts.back());
       level.conditional = ConditionalMove{StudentT::fit(last, weights, kMoveDof).root(), 0.5};
     }

@@ -23,8 +23,8 @@ class Target {
   virtual std::vector<Eigen::Index> parts() const { return {dimension()}; }
 
   /// A target whose likelihood is cheap to follow along its last part, the others staying as they are in the
-  /// columns of x, says so and overrides the next function; its chains then make Hamiltonian moves along that
-  /// part.
+  /// columns of x, says so and overrides the next function; the chains of the posterior itself then make
+  /// Hamiltonian moves along that part.
   virtual bool has_conditional() const { return false; }
   virtual std::unique_ptr<Conditional> along_last_part(const Eigen::MatrixXd& /*x*/) const { return nullptr; }
 
