@@ -53,8 +53,8 @@ paper_discrepancy_ <- function(data, priors, draws) {
     .Call(`_amiss_paper_discrepancy_`, data, priors, draws)
 }
 
-zone_simulate_ <- function(zone, paths, values, drivers, step_s, hold, control, threads) {
-    .Call(`_amiss_zone_simulate_`, zone, paths, values, drivers, step_s, hold, control, threads)
+zone_simulate_ <- function(zone, paths, values, drivers, step_s, hold, control, context) {
+    .Call(`_amiss_zone_simulate_`, zone, paths, values, drivers, step_s, hold, control, context)
 }
 
 zone_balance_ <- function(zone, drivers, step_s, hold, control) {

@@ -18,8 +18,8 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
     mechanism("wind-driven infiltration", boundary = c("Ws", "Wd", "Te"),
               edit = function(model) {
                 leak <- free("leak_area", uniform(1, 2000), "mm2", "area of each leak") * 1e-6
-                model <- add_component(model, opening("leak_low", leak, outside = "Te", height = 0.2, azimuth = azimuth, wind_speed = "Ws", wind_direction = "Wd"))
-                add_component(model, opening("leak_high", leak, outside = "Te", height = 0.8, azimuth = azimuth + 180, wind_speed = "Ws", wind_direction = "Wd"))
+                model <- add_component(model, zone_opening("leak_low", leak, outside = "Te", height = 0.2, azimuth = azimuth, wind_speed = "Ws", wind_direction = "Wd"))
+                add_component(model, zone_opening("leak_high", leak, outside = "Te", height = 0.8, azimuth = azimuth + 180, wind_speed = "Ws", wind_direction = "Wd"))
               },
               sentence = "Wind and buoyancy drive outdoor air through leaks that the model does not have."),
     mechanism("window transmission", boundary = "Gv",
@@ -29,7 +29,7 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
               edit = function(model) change_component(model, "heater", capacity = free("heater_capacity", uniform(0, 4e4), "J/K", "heat capacity of the heater")),
               sentence = "The heater stores heat and gives it off with a delay that the model leaves out."),
     mechanism("missing thermal mass", boundary = c("RHP", "Te"),
-              edit = function(model) add_component(model, wall("mass", area = free("mass_area", uniform(0.01, 3), "m2", "surface of additional mass"), layer(0.02, 0.5, 2e6))),
+              edit = function(model) add_component(model, zone_wall("mass", area = free("mass_area", uniform(0.01, 3), "m2", "surface of additional mass"), zone_layer(0.02, 0.5, 2e6))),
               sentence = "The box holds mass that the model leaves out."),
     mechanism("glazing U-value", boundary = "Te",
               edit = function(model) change_component(model, "window", u_value = free("u_window", uniform(0.3, 6), "W/m2K", "U-value of the window")),
@@ -44,7 +44,7 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
               },
               sentence = "Wind changes the heat transfer at the outer surfaces, which the model takes as constant."),
     mechanism("neighbour coupling", boundary = "Tn",
-              edit = function(model) add_component(model, coupling("neighbour", free("neighbour", uniform(0, 3), "W/K", "conductance to the neighbour"), temperature = "Tn")),
+              edit = function(model) add_component(model, zone_coupling("neighbour", free("neighbour", uniform(0, 3), "W/K", "conductance to the neighbour"), temperature = "Tn")),
               sentence = "Heat is exchanged with a neighbour that the model does not know."))
   do.call(catalogue, Filter(function(m) all(m$boundary %in% columns), all))
 }

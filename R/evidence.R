@@ -1,7 +1,8 @@
 #' Bayes factor of two calibrated models
 #'
 #' Both evidences are densities of the same measured record, so that models with different bases may be compared.
-#' The words are those of Monari (2022), table 1.
+#' The words are those of Monari (2022), table 1, for what the whole interval supports: a Bayes factor of 10^3.6 that may as well be
+#' 10^-18 is "undecided".
 #'
 #' @param model,reference Calibrations on the same measurements by the same method ([calibrate()] or [calibrate_paper()]).
 #' @return A one-row data frame: `log10_bf` in favour of `model`, its 95 % interval `lower95`, `upper95`, and `word`.
@@ -19,10 +20,13 @@ bayes_factor <- function(model, reference) {
   }
   log10_bf <- (model$log_evidence - reference$log_evidence) / log(10)
   se <- sqrt(model$standard_error^2 + reference$standard_error^2) / log(10)
-  data.frame(log10_bf = log10_bf, lower95 = log10_bf - 1.96 * se, upper95 = log10_bf + 1.96 * se, word = evidence_word(log10_bf))
+  interval <- log10_bf + c(-1.96, 1.96) * se
+  data.frame(log10_bf = log10_bf, lower95 = interval[1], upper95 = interval[2], word = evidence_word(interval[1], interval[2]))
 }
 
-evidence_word <- function(log10_bf) {
-  words <- c("negative", "weak", "substantial", "strong", "decisive")
-  words[findInterval(log10_bf, c(0, 0.5, 1, 2)) + 1]
+evidence_word <- function(lower, upper) {
+  words <- c("undecided", "weak", "substantial", "strong", "decisive")
+  word <- words[findInterval(lower, c(0, 0.5, 1, 2)) + 1]
+  word[upper < 0] <- "negative"
+  word
 }

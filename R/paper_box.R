@@ -24,21 +24,21 @@ paper_box <- function(model = "M3", azimuth = 180) {
   window_area <- 0.60^2
   layers <- box_layers(model)
   side <- function(name, area = inside^2, sun = NULL) {
-    do.call(wall, c(list(name, area), layers, list(outside = "Te", sun = sun)))
+    do.call(zone_wall, c(list(name, area), layers, list(outside = "Te", sun = sun)))
   }
   transmission <- if (model == "M4") free("window_transmission", uniform(0.5, 0.72)) else 0.61
   box <- zone(
     side("front", inside^2 - window_area, sun = "Gv"),
     side("back"), side("left"), side("right"), side("roof"), side("floor"),
-    window("window", window_area, outside = "Te", u_value = 1.5, sun = "Gv",
-           solar_factor = transmission * (0.52^2 / window_area)),
-    heater("heater", power = "RHP", radiant_fraction = free("heater_radiant", uniform(0.53, 0.98))),
+    zone_window("window", window_area, outside = "Te", u_value = 1.5, sun = "Gv",
+                solar_factor = transmission * (0.52^2 / window_area)),
+    zone_heater("heater", power = "RHP", radiant_fraction = free("heater_radiant", uniform(0.53, 0.98))),
     volume = inside^3)
   area <- box_crack_area(model)
   if (is.null(area)) return(box)
   leak <- function(name, height, azimuth) {
-    opening(name, area * 1e-6, outside = "Te", height = height, azimuth = azimuth, wind_speed = "Ws",
-            wind_direction = "Wd")
+    zone_opening(name, area * 1e-6, outside = "Te", height = height, azimuth = azimuth, wind_speed = "Ws",
+                 wind_direction = "Wd")
   }
   box <- add_component(box, leak("crack_low", 0.2, azimuth))
   add_component(box, leak("crack_high", 0.8, azimuth + 180))
@@ -46,13 +46,13 @@ paper_box <- function(model = "M3", azimuth = 180) {
 
 box_layers <- function(model) {
   if (model == "M1") {
-    return(list(layer(0.12, free("wall_k", uniform(0.07, 0.13), "W/mK"),
-                      free("wall_c", uniform(1680, 3120), "kJ/m3K") * 1e3)))
+    return(list(zone_layer(0.12, free("wall_k", uniform(0.07, 0.13), "W/mK"),
+                           free("wall_c", uniform(1680, 3120), "kJ/m3K") * 1e3)))
   }
   outer_c <- if (model == "M6") uniform(1440, 3360) else uniform(2240, 4160)
-  outer <- layer(0.03, free("outer_k", uniform(0.7, 1.3), "W/mK"), free("outer_c", outer_c, "kJ/m3K") * 1e3)
-  insulation <- layer(0.06, free("insulation_k", uniform(0.035, 0.065), "W/mK"),
-                      free("insulation_c", uniform(112, 208), "kJ/m3K") * 1e3)
+  outer <- zone_layer(0.03, free("outer_k", uniform(0.7, 1.3), "W/mK"), free("outer_c", outer_c, "kJ/m3K") * 1e3)
+  insulation <- zone_layer(0.06, free("insulation_k", uniform(0.035, 0.065), "W/mK"),
+                           free("insulation_c", uniform(112, 208), "kJ/m3K") * 1e3)
   list(outer, insulation, outer)
 }
 

@@ -7,9 +7,9 @@
 #' @param name Name of the component, unique in its zone.
 #' @param thickness Thickness of a layer, m.
 #' @param conductivity Thermal conductivity, W/mK.
-#' @param capacity `layer()`: volumetric heat capacity, J/m3K. `heater()`: heat capacity, J/K; 0 for no lag.
+#' @param capacity `zone_layer()`: volumetric heat capacity, J/m3K. `zone_heater()`: heat capacity, J/K; 0 for no lag.
 #' @param area Area, m2 (of an opening: the orifice).
-#' @param ... `wall()`: layers from inside to outside. `zone()`: components.
+#' @param ... `zone_wall()`: layers from inside to outside. `zone()`: components.
 #' @param outside Column of the temperature on the other side, degC. `NULL` makes a wall adiabatic: internal mass.
 #' @param outside_film Film coefficient of the outer surface, convection and radiation, W/m2K.
 #' @param inside_convection Convective coefficient of the inner surface, W/m2K.
@@ -32,8 +32,8 @@
 #' @param ach Air changes per hour.
 #' @param power Column of the power, W.
 #' @param radiant_fraction Share of the power that goes to the inner surfaces by area x emissivity.
-#' @param conductance `heater()`: emission, W/K, so that the lag is `capacity / conductance` seconds.
-#'   `coupling()`: to the known temperature, W/K.
+#' @param conductance `zone_heater()`: emission, W/K, so that the lag is `capacity / conductance` seconds.
+#'   `zone_coupling()`: to the known temperature, W/K.
 #' @param flow Column of the supplied air, m3/h.
 #' @param temperature Column of the supply's or neighbour's temperature, degC.
 #' @param scale Factor on the flow of a supply or the power of a gain.
@@ -46,10 +46,10 @@
 #' @details One opening alone exchanges nothing: use two at different heights or facades.
 #' @examples
 #' zone(
-#'   wall("facade", area = 12, layer(0.02, 0.8, 1.4e6), layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5),
+#'   zone_wall("facade", area = 12, zone_layer(0.02, 0.8, 1.4e6), zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5),
 #'        outside = "Te", sun = "Gv"),
-#'   window("window", area = 2, outside = "Te", sun = "Gv"),
-#'   heater("heater", power = "P"),
+#'   zone_window("window", area = 2, outside = "Te", sun = "Gv"),
+#'   zone_heater("heater", power = "P"),
 #'   volume = 40)
 #' @name zone_components
 NULL
@@ -155,14 +155,14 @@ new_component <- function(type, name, fields, call = rlang::caller_env()) {
 
 #' @rdname zone_components
 #' @export
-layer <- function(thickness, conductivity, capacity) {
+zone_layer <- function(thickness, conductivity, capacity) {
   x <- structure(list(thickness = thickness, conductivity = conductivity, capacity = capacity), class = "amiss_layer")
   check_fields(x, zone_fields$layer, "layer", rlang::current_env())
 }
 
 #' @rdname zone_components
 #' @export
-wall <- function(name, area, ..., outside = NULL, outside_film = 25, sun = NULL, absorptance = 0.5, sky = NULL,
+zone_wall <- function(name, area, ..., outside = NULL, outside_film = 25, sun = NULL, absorptance = 0.5, sky = NULL,
                  sky_view = 0.5, wind_speed = NULL, wind_direction = NULL, azimuth = 0, wind_film = 0,
                  inside_convection = 3, inside_emissivity = 0.9, outside_emissivity = 0.9) {
   new_component("wall", name, list(
@@ -175,14 +175,14 @@ wall <- function(name, area, ..., outside = NULL, outside_film = 25, sun = NULL,
 
 #' @rdname zone_components
 #' @export
-window <- function(name, area, outside, u_value = 1.1, solar_factor = 0.5, sun = NULL, to_air = 0.1) {
+zone_window <- function(name, area, outside, u_value = 1.1, solar_factor = 0.5, sun = NULL, to_air = 0.1) {
   new_component("window", name, list(area = area, outside = outside, u_value = u_value, solar_factor = solar_factor,
                                      sun = sun, to_air = to_air))
 }
 
 #' @rdname zone_components
 #' @export
-opening <- function(name, area, outside, height = 0, azimuth = 0, wind_speed = NULL, wind_direction = NULL,
+zone_opening <- function(name, area, outside, height = 0, azimuth = 0, wind_speed = NULL, wind_direction = NULL,
                     exposure = "semi-exposed", shelter = 1) {
   new_component("opening", name, list(
     area = area, outside = outside, height = height, azimuth = azimuth, wind_speed = wind_speed,
@@ -191,7 +191,7 @@ opening <- function(name, area, outside, height = 0, azimuth = 0, wind_speed = N
 
 #' @rdname zone_components
 #' @export
-crack <- function(name, width, length, outside, height = 0, azimuth = 0, wind_speed = NULL, wind_direction = NULL,
+zone_crack <- function(name, width, length, outside, height = 0, azimuth = 0, wind_speed = NULL, wind_direction = NULL,
                   exposure = "semi-exposed", shelter = 1) {
   new_component("crack", name, list(
     width = width, length = length, outside = outside, height = height, azimuth = azimuth, wind_speed = wind_speed,
@@ -200,30 +200,30 @@ crack <- function(name, width, length, outside, height = 0, azimuth = 0, wind_sp
 
 #' @rdname zone_components
 #' @export
-infiltration <- function(name, ach, outside) new_component("infiltration", name, list(ach = ach, outside = outside))
+zone_infiltration <- function(name, ach, outside) new_component("infiltration", name, list(ach = ach, outside = outside))
 
 #' @rdname zone_components
 #' @export
-heater <- function(name, power, radiant_fraction = 0.3, capacity = 0, conductance = 10) {
+zone_heater <- function(name, power, radiant_fraction = 0.3, capacity = 0, conductance = 10) {
   new_component("heater", name, list(power = power, radiant_fraction = radiant_fraction, capacity = capacity,
                                      conductance = conductance))
 }
 
 #' @rdname zone_components
 #' @export
-supply <- function(name, flow, temperature, scale = 1) {
+zone_supply <- function(name, flow, temperature, scale = 1) {
   new_component("supply", name, list(flow = flow, temperature = temperature, scale = scale))
 }
 
 #' @rdname zone_components
 #' @export
-coupling <- function(name, conductance, temperature) {
+zone_coupling <- function(name, conductance, temperature) {
   new_component("coupling", name, list(conductance = conductance, temperature = temperature))
 }
 
 #' @rdname zone_components
 #' @export
-gain <- function(name, power, scale = 1, radiant_fraction = 0.5) {
+zone_gain <- function(name, power, scale = 1, radiant_fraction = 0.5) {
   new_component("gain", name, list(power = power, scale = scale, radiant_fraction = radiant_fraction))
 }
 
@@ -259,11 +259,11 @@ new_zone <- function(components, own, call = rlang::caller_env()) {
 #' @param component A component to add.
 #' @param name Name of a component, or `"zone"` for the zone's own fields (`volume`, `air_capacity_factor`,
 #'   `initial_air`, `initial_wall_offset`).
-#' @param ... Fields to replace, by name; the layers of a wall as `layers = list(layer(...), ...)`.
+#' @param ... Fields to replace, by name; the layers of a wall as `layers = list(zone_layer(...), ...)`.
 #' @return The edited zone; of `component()`, the component.
 #' @examples
-#' room <- zone(heater("heater", power = "P"), coupling("door", 10, "T_hall"), volume = 40)
-#' room <- add_component(room, infiltration("leaks", ach = 0.2, outside = "Te"))
+#' room <- zone(zone_heater("heater", power = "P"), zone_coupling("door", 10, "T_hall"), volume = 40)
+#' room <- add_component(room, zone_infiltration("leaks", ach = 0.2, outside = "Te"))
 #' room <- change_component(room, "heater", capacity = 8000)
 #' room <- change_component(room, "zone", air_capacity_factor = 4)
 #' room <- drop_component(room, "door")
@@ -492,8 +492,8 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
   extremes <- vapply(parameters, function(p) range(values[, p]), numeric(2))
   for (i in seq_len(if (nrow(values) > 1) 2 else 1)) resolve_zone(zone, fields, extremes[i, ], call)
   storage.mode(drivers) <- "double"
-  zone_simulate_(index_zone(unclass(zone), colnames(drivers)), lapply(fields, `[[`, "path"), field_values(fields, values),
-                 drivers, step_s, as.numeric(hold), control, as.integer(threads))
+  call_engine(zone_simulate_(index_zone(unclass(zone), colnames(drivers)), lapply(fields, `[[`, "path"), field_values(fields, values),
+                             drivers, step_s, as.numeric(hold), control, engine_context(0, as.integer(threads))), call)
 }
 
 check_drivers <- function(zone, drivers, call) {

@@ -193,33 +193,33 @@ BEGIN_RCPP
 END_RCPP
 }
 // zone_simulate_
-Rcpp::NumericMatrix zone_simulate_(Rcpp::List zone, Rcpp::List paths, Rcpp::NumericMatrix values, Rcpp::NumericMatrix drivers, double step_s, Rcpp::NumericVector hold, Rcpp::List control, int threads);
-RcppExport SEXP _amiss_zone_simulate_(SEXP zoneSEXP, SEXP pathsSEXP, SEXP valuesSEXP, SEXP driversSEXP, SEXP step_sSEXP, SEXP holdSEXP, SEXP controlSEXP, SEXP threadsSEXP) {
+Eigen::MatrixXd zone_simulate_(Rcpp::List zone, Rcpp::List paths, Eigen::MatrixXd values, Eigen::MatrixXd drivers, double step_s, Eigen::VectorXd hold, Rcpp::List control, Rcpp::List context);
+RcppExport SEXP _amiss_zone_simulate_(SEXP zoneSEXP, SEXP pathsSEXP, SEXP valuesSEXP, SEXP driversSEXP, SEXP step_sSEXP, SEXP holdSEXP, SEXP controlSEXP, SEXP contextSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< Rcpp::List >::type zone(zoneSEXP);
     Rcpp::traits::input_parameter< Rcpp::List >::type paths(pathsSEXP);
-    Rcpp::traits::input_parameter< Rcpp::NumericMatrix >::type values(valuesSEXP);
-    Rcpp::traits::input_parameter< Rcpp::NumericMatrix >::type drivers(driversSEXP);
+    Rcpp::traits::input_parameter< Eigen::MatrixXd >::type values(valuesSEXP);
+    Rcpp::traits::input_parameter< Eigen::MatrixXd >::type drivers(driversSEXP);
     Rcpp::traits::input_parameter< double >::type step_s(step_sSEXP);
-    Rcpp::traits::input_parameter< Rcpp::NumericVector >::type hold(holdSEXP);
+    Rcpp::traits::input_parameter< Eigen::VectorXd >::type hold(holdSEXP);
     Rcpp::traits::input_parameter< Rcpp::List >::type control(controlSEXP);
-    Rcpp::traits::input_parameter< int >::type threads(threadsSEXP);
-    rcpp_result_gen = Rcpp::wrap(zone_simulate_(zone, paths, values, drivers, step_s, hold, control, threads));
+    Rcpp::traits::input_parameter< Rcpp::List >::type context(contextSEXP);
+    rcpp_result_gen = Rcpp::wrap(zone_simulate_(zone, paths, values, drivers, step_s, hold, control, context));
     return rcpp_result_gen;
 END_RCPP
 }
 // zone_balance_
-Rcpp::List zone_balance_(Rcpp::List zone, Rcpp::NumericMatrix drivers, double step_s, Rcpp::NumericVector hold, Rcpp::List control);
+Rcpp::List zone_balance_(Rcpp::List zone, Eigen::MatrixXd drivers, double step_s, Eigen::VectorXd hold, Rcpp::List control);
 RcppExport SEXP _amiss_zone_balance_(SEXP zoneSEXP, SEXP driversSEXP, SEXP step_sSEXP, SEXP holdSEXP, SEXP controlSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< Rcpp::List >::type zone(zoneSEXP);
-    Rcpp::traits::input_parameter< Rcpp::NumericMatrix >::type drivers(driversSEXP);
+    Rcpp::traits::input_parameter< Eigen::MatrixXd >::type drivers(driversSEXP);
     Rcpp::traits::input_parameter< double >::type step_s(step_sSEXP);
-    Rcpp::traits::input_parameter< Rcpp::NumericVector >::type hold(holdSEXP);
+    Rcpp::traits::input_parameter< Eigen::VectorXd >::type hold(holdSEXP);
     Rcpp::traits::input_parameter< Rcpp::List >::type control(controlSEXP);
     rcpp_result_gen = Rcpp::wrap(zone_balance_(zone, drivers, step_s, hold, control));
     return rcpp_result_gen;

@@ -1,11 +1,8 @@
-#include <Rcpp.h>
-
-#include <algorithm>
-#include <limits>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "engine/parallel/parallel_for.hpp"
+#include "export_convert.h"
 #include "zone/Simulation.hpp"
 
 // The zone simulator for R: convert, run, convert. Column references are 0-based, -1 for none.
@@ -115,6 +112,17 @@ void set_field(SEXP list, const Rcpp::IntegerVector& path, double value) {
   SET_VECTOR_ELT(list, path[path.size() - 1] - 1, Rf_ScalarReal(value));
 }
 
+// One zone for each row of the values.
+std::vector<Zone> read_zones(const Rcpp::List& zone, const Rcpp::List& paths, const Eigen::MatrixXd& values) {
+  std::vector<Zone> zones;
+  const Rcpp::List filled = Rcpp::clone(zone);
+  for (Eigen::Index run = 0; run < values.rows(); ++run) {
+    for (Eigen::Index k = 0; k < values.cols(); ++k) set_field(filled, paths[k], values(run, k));
+    zones.push_back(read_zone(filled));
+  }
+  return zones;
+}
+
 Options read_options(const Rcpp::List& from) {
   Options options;
   options.max_substep_s = number(from, "max_substep_s");
@@ -127,55 +135,27 @@ Options read_options(const Rcpp::List& from) {
 }  // namespace
 
 // N x M mean air temperatures of one zone, whose free fields have the values of a row of `values` (M x
-// fields) in each run; a run that fails is a column of NaN. `paths`: where each field stands in the nested
-// list, from 1.
+// fields) in each run. `paths`: where each field stands in the nested list, from 1.
 // [[Rcpp::export]]
-Rcpp::NumericMatrix zone_simulate_(Rcpp::List zone, Rcpp::List paths, Rcpp::NumericMatrix values,
-                                   Rcpp::NumericMatrix drivers, double step_s, Rcpp::NumericVector hold,
-                                   Rcpp::List control, int threads) {
-  // Copies: see export_engine.cpp.
-  const Eigen::MatrixXd data =
-      Eigen::Map<const Eigen::MatrixXd>(drivers.begin(), drivers.nrow(), drivers.ncol());
-  const Eigen::VectorXd held = Eigen::Map<const Eigen::VectorXd>(hold.begin(), hold.size());
+Eigen::MatrixXd zone_simulate_(Rcpp::List zone, Rcpp::List paths, Eigen::MatrixXd values,
+                               Eigen::MatrixXd drivers, double step_s, Eigen::VectorXd hold,
+                               Rcpp::List control, Rcpp::List context) {
   const Options options = read_options(control);
-  std::vector<Zone> read;
-  const Rcpp::List own = Rcpp::clone(zone);
-  for (int run = 0; run < values.nrow(); ++run) {
-    for (int k = 0; k < values.ncol(); ++k) set_field(own, paths[k], values(run, k));
-    read.push_back(read_zone(own));
-  }
-  for (const Zone& one : read) one.check(drivers.ncol());
+  const std::vector<Zone> zones = read_zones(zone, paths, values);
+  for (const Zone& read : zones) read.check(drivers.cols());
   options.check();
-
-  const int n_runs = static_cast<int>(read.size());
-  Rcpp::NumericMatrix result(drivers.nrow(), n_runs);
-  Eigen::Map<Eigen::MatrixXd> air(result.begin(), drivers.nrow(), n_runs);
-  const int n_threads = std::clamp(threads, 1, std::max(1, n_runs));
-  const auto work = [&](int first) {
-    for (int i = first; i < n_runs; i += n_threads) {
-      try {
-        air.col(i) = simulate(read[i], data, step_s, held, options).air;
-      } catch (...) {  // an exception must not leave a thread
-        air.col(i).setConstant(std::numeric_limits<double>::quiet_NaN());
-      }
-    }
-  };
-  std::vector<std::thread> pool;
-  for (int i = 1; i < n_threads; ++i) pool.emplace_back(work, i);
-  work(0);
-  for (std::thread& thread : pool) thread.join();
-  return result;
+  Eigen::MatrixXd air(drivers.rows(), values.rows());
+  amiss::parallel_for(static_cast<int>(zones.size()), amiss::convert::context(context), [&](int run) {
+    air.col(run) = simulate(zones[static_cast<std::size_t>(run)], drivers, step_s, hold, options).air;
+  });
+  return air;
 }
 
 // One run with its energy balance: list(air, through (named, J), hold, stored (named, J)).
 // [[Rcpp::export]]
-Rcpp::List zone_balance_(Rcpp::List zone, Rcpp::NumericMatrix drivers, double step_s,
-                         Rcpp::NumericVector hold, Rcpp::List control) {
-  // Copies: see export_engine.cpp.
-  const Eigen::MatrixXd data =
-      Eigen::Map<const Eigen::MatrixXd>(drivers.begin(), drivers.nrow(), drivers.ncol());
-  const Eigen::VectorXd held = Eigen::Map<const Eigen::VectorXd>(hold.begin(), hold.size());
-  const Run run = simulate(read_zone(zone), data, step_s, held, read_options(control));
+Rcpp::List zone_balance_(Rcpp::List zone, Eigen::MatrixXd drivers, double step_s, Eigen::VectorXd hold,
+                         Rcpp::List control) {
+  const Run run = simulate(read_zone(zone), drivers, step_s, hold, read_options(control));
   const EnergyBalance& balance = run.balance;
   Rcpp::NumericVector through(balance.through.begin(), balance.through.end());
   through.names() = Rcpp::wrap(balance.component);

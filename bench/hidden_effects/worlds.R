@@ -66,8 +66,8 @@ effect_output <- function(kind, base, values, data, size) {
   if (kind == "drifting sensor") return(simulate_truth(base, values, data) + size * 3 * (data$hour / max(data$hour))^2)
   if (kind %in% outside_kinds) {
     zone <- switch(kind,
-      "door opened daily" = amiss::add_component(base, amiss::supply("door", flow = "extra", temperature = "Te")),
-      "unmetered load" = amiss::add_component(base, amiss::gain("load", power = "extra")))
+      "door opened daily" = amiss::add_component(base, amiss::zone_supply("door", flow = "extra", temperature = "Te")),
+      "unmetered load" = amiss::add_component(base, amiss::zone_gain("load", power = "extra")))
     data$extra <- outside_effect(kind, data, size * c("door opened daily" = 40, "unmetered load" = 60)[[kind]])
     return(simulate_truth(zone, values, data))
   }

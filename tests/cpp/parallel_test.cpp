@@ -1,7 +1,12 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <fstream>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -42,6 +47,43 @@ TEST(ParallelFor, RunsTasksAtTheSameTime) {
     if (started == 2) met = true;
   });
   EXPECT_TRUE(met);
+}
+
+// Address space for a few stacks of threads and no more.
+class LittleMemory {
+ public:
+  LittleMemory() {
+    getrlimit(RLIMIT_AS, &before_);
+    long pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    rlimit limit = before_;
+    limit.rlim_cur = static_cast<rlim_t>(pages * sysconf(_SC_PAGESIZE)) + (40u << 20);
+    setrlimit(RLIMIT_AS, &limit);
+  }
+  ~LittleMemory() { setrlimit(RLIMIT_AS, &before_); }
+
+ private:
+  rlimit before_;
+};
+
+TEST(ParallelFor, MakesDoWithTheThreadsThereAre) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers reserve address space of their own";
+#endif
+  std::atomic<int> done{0};
+  std::set<std::thread::id> seen;
+  std::mutex mutex;
+  {
+    const LittleMemory little;
+    parallel_for(100, with_threads(100), [&](int) {
+      nap();
+      std::lock_guard<std::mutex> lock(mutex);
+      seen.insert(std::this_thread::get_id());
+      ++done;
+    });
+  }
+  EXPECT_EQ(done, 100);
+  EXPECT_LT(seen.size(), 20u);
 }
 
 TEST(ParallelFor, ExceptionOfATaskArrivesAndStopsTheRest) {

@@ -151,5 +151,6 @@ test_that("a Bayes factor needs one record", {
   b <- linear_fit(linear_measurements(linear_data(seed = 12)))
   expect_error(bayes_factor(a, b), "different records", class = "amiss_error_input")
   expect_equal(bayes_factor(a, a)$log10_bf, 0)
-  expect_equal(amiss:::evidence_word(c(-1, 0.2, 0.7, 1.5, 3)), c("negative", "weak", "substantial", "strong", "decisive"))
+  expect_equal(amiss:::evidence_word(c(-1, 0.2, 0.7, 1.5, 3), rep(8, 5)), c("undecided", "weak", "substantial", "strong", "decisive"))
+  expect_equal(amiss:::evidence_word(-3, -1), "negative")
 })

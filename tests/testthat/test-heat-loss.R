@@ -14,7 +14,7 @@ test_that("a sealed box loses what its closed form says", {
 
 test_that("sun, gains and sky do not count; infiltration adds its air", {
   ach <- 0.7
-  leaky <- add_component(paper_box("M2"), infiltration("leaks", ach, outside = "Te"))
+  leaky <- add_component(paper_box("M2"), zone_infiltration("leaks", ach, outside = "Te"))
   leaky <- change_component(leaky, "roof", sky = "Lw", outside_emissivity = 0)
   sealed <- change_component(paper_box("M2"), "roof", outside_emissivity = 0)
   per_air_change <- 0.96^3 * 1006 / 3600 * 1.1881 * 293.15 / (273.15 + c(10, 30))  # density of either side

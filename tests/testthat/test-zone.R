@@ -1,8 +1,8 @@
 room <- function(...) {
   zone(
-    wall("facade", 12, layer(0.02, 0.8, 1.4e6), layer(0.2, 0.2, 8e5), outside = "Te", sun = "Gv"),
-    window("window", 2, outside = "Te"),
-    heater("heater", power = "P"),
+    zone_wall("facade", 12, zone_layer(0.02, 0.8, 1.4e6), zone_layer(0.2, 0.2, 8e5), outside = "Te", sun = "Gv"),
+    zone_window("window", 2, outside = "Te"),
+    zone_heater("heater", power = "P"),
     ..., volume = 40)
 }
 
@@ -14,7 +14,7 @@ weather <- function(n = 96) {
 k <- function(prior = uniform(0.1, 0.3)) free("k", prior, "W/mK")
 
 test_that("a zone says what it needs", {
-  x <- room(infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
+  x <- room(zone_infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
   expect_s3_class(x, "amiss_zone")
   expect_identical(names(zone_parameters(x)), "ach")
   expect_setequal(zone_boundary(x), c("Te", "Gv", "P"))
@@ -23,13 +23,13 @@ test_that("a zone says what it needs", {
 })
 
 test_that("components are edited by name", {
-  x <- add_component(room(), coupling("door", 10, "T_hall"))
+  x <- add_component(room(), zone_coupling("door", 10, "T_hall"))
   expect_true("T_hall" %in% zone_boundary(x))
   expect_identical(component(x, "door")$conductance, 10)
   x <- change_component(x, "door", conductance = 20)
   expect_identical(component(x, "door")$conductance, 20)
   expect_false("T_hall" %in% zone_boundary(drop_component(x, "door")))
-  x <- change_component(x, "facade", layers = list(layer(0.1, k(), 1e6)), sun = NULL)
+  x <- change_component(x, "facade", layers = list(zone_layer(0.1, k(), 1e6)), sun = NULL)
   expect_identical(names(zone_parameters(x)), "k")
   expect_null(component(x, "facade")$sun)
   expect_true("sun" %in% names(component(x, "facade")))
@@ -37,13 +37,13 @@ test_that("components are edited by name", {
 })
 
 test_that("misuse is a classed error that names component, field and value", {
-  expect_error(layer(-0.1, 1, 1e6), "thickness.*-0.1", class = "amiss_error_input")
-  expect_error(wall("w", -2, layer(0.1, 1, 1e6)), "'w'.*area.*-2", class = "amiss_error_input")
-  expect_error(wall("w", 2), "layer", class = "amiss_error_input")
-  expect_error(wall("w", 2, layer(0.1, 1, 1e6), wind_film = 1), "wind_speed", class = "amiss_error_input")
-  expect_error(opening("o", 1, "Te", exposure = "windy"), "windy", class = "amiss_error_input")
-  expect_error(room(heater("heater", "P")), "heater", class = "amiss_error_input")
-  expect_error(heater("zone", "P"), "zone", class = "amiss_error_input")
+  expect_error(zone_layer(-0.1, 1, 1e6), "thickness.*-0.1", class = "amiss_error_input")
+  expect_error(zone_wall("w", -2, zone_layer(0.1, 1, 1e6)), "'w'.*area.*-2", class = "amiss_error_input")
+  expect_error(zone_wall("w", 2), "layer", class = "amiss_error_input")
+  expect_error(zone_wall("w", 2, zone_layer(0.1, 1, 1e6), wind_film = 1), "wind_speed", class = "amiss_error_input")
+  expect_error(zone_opening("o", 1, "Te", exposure = "windy"), "windy", class = "amiss_error_input")
+  expect_error(room(zone_heater("heater", "P")), "heater", class = "amiss_error_input")
+  expect_error(zone_heater("zone", "P"), "zone", class = "amiss_error_input")
   expect_error(component(room(), "attic"), "attic.*facade", class = "amiss_error_input")
   expect_error(drop_component(room(), "attic"), "attic", class = "amiss_error_input")
   expect_error(change_component(room(), "heater", lag = 3), "lag.*capacity", class = "amiss_error_input")
@@ -53,15 +53,15 @@ test_that("misuse is a classed error that names component, field and value", {
 })
 
 test_that("a free parameter may stand in several places with one prior only", {
-  x <- zone(wall("w", 1, layer(0.1, k(), 1e6), layer(0.2, k(), 1e6)), volume = 1)
+  x <- zone(zone_wall("w", 1, zone_layer(0.1, k(), 1e6), zone_layer(0.2, k(), 1e6)), volume = 1)
   expect_length(zone_parameters(x), 1)
-  x <- zone(wall("w", 1, layer(0.1, k(), 1e6), layer(0.2, k(uniform(0, 1)), 1e6)), volume = 1)
+  x <- zone(zone_wall("w", 1, zone_layer(0.1, k(), 1e6), zone_layer(0.2, k(uniform(0, 1)), 1e6)), volume = 1)
   expect_error(zone_parameters(x), "two different priors", class = "amiss_error_input")
 })
 
 test_that("resolving puts numbers in, in the unit of the field", {
   area <- free("area", uniform(700, 1300), "mm2")
-  x <- room(opening("low", area * 1e-6, "Te"), opening("high", 2 * (area / 1e6), "Te", height = 2))
+  x <- room(zone_opening("low", area * 1e-6, "Te"), zone_opening("high", 2 * (area / 1e6), "Te", height = 2))
   expect_identical(zone_parameters(x)$area$unit, "mm2")
   y <- zone_resolve(x, c(area = 1000))
   expect_length(zone_parameters(y), 0)
@@ -74,7 +74,7 @@ test_that("resolving puts numbers in, in the unit of the field", {
 })
 
 test_that("runs follow their parameters and do not depend on threads", {
-  x <- room(infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
+  x <- room(zone_infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
   values <- cbind(ach = c(0.1, 0.5, 0.9, 0.1, 0.3))
   air <- simulate_zone(x, values, weather(), 900)
   expect_identical(dim(air), c(96L, 5L))
@@ -94,7 +94,7 @@ test_that("held intervals return what they are held at", {
 })
 
 test_that("a steady zone loses what it is given, and the energy balance closes", {
-  x <- zone(coupling("door", 10, "Te"), heater("heater", "P"), volume = 20)
+  x <- zone(zone_coupling("door", 10, "Te"), zone_heater("heater", "P"), volume = 20)
   drivers <- cbind(Te = rep(5, 300), P = 200)
   expect_equal(simulate_zone(x, NULL, drivers, 3600)[300, 1], 25, tolerance = 1e-8)
   indexed <- index_zone(room(), colnames(weather()))
@@ -113,7 +113,7 @@ test_that("data that cannot be simulated are refused", {
   expect_true(all(is.finite(simulate_zone(room(), NULL, gap, 900))))
   expect_error(simulate_zone(room(), NULL, weather(), 900, hold = 1:3), "hold", class = "amiss_error_input")
   expect_error(simulate_zone(room(), NULL, weather(), 900, control = list(cell = 2)), "cells", class = "amiss_error_input")
-  free_room <- room(infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
+  free_room <- room(zone_infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
   expect_error(simulate_zone(free_room, NULL, weather(), 900), "ach", class = "amiss_error_input")
 })
 
@@ -148,7 +148,7 @@ test_that("the paper's box loses heat as measured, and more with a crack", {
 
 test_that("the initial offset of the walls is forgotten at the walls' own pace, and only they feel it", {
   room <- function(offset) {
-    zone(wall("facade", 10, layer(0.1, 1, 2e6), outside = "Te"), volume = 50, initial_wall_offset = offset)
+    zone(zone_wall("facade", 10, zone_layer(0.1, 1, 2e6), outside = "Te"), volume = 50, initial_wall_offset = offset)
   }
   drivers <- cbind(Te = rep(10, 96))
   difference <- simulate_zone(room(2), drivers = drivers, step_s = 900)[, 1] - simulate_zone(room(0), drivers = drivers, step_s = 900)[, 1]

@@ -26,6 +26,7 @@ Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients)
     : inputs_(inputs), coefficients_(coefficients), centre_(coefficients.colwise().mean()) {
   if (inputs.rows() != coefficients.rows())
     throw std::invalid_argument("emulator: inputs and coefficients differ in rows");
+  if (inputs.cols() == 0) throw std::invalid_argument("emulator: at least one parameter is needed");
   const MatrixXd centred = coefficients.rowwise() - centre_;
   scale_ = (centred.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, inputs.rows() - 1)))
                .cwiseSqrt();

@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -52,7 +53,13 @@ void parallel_for(int n, const Context& context, const std::function<void(int)>&
 
   std::vector<std::thread> threads;
   threads.reserve(workers);
-  for (int t = 0; t < workers; ++t) threads.emplace_back(work);
+  try {
+    for (int t = 0; t < workers; ++t) threads.emplace_back(work);
+  } catch (const std::system_error&) {  // the system gives no more: with those there are
+    std::lock_guard<std::mutex> lock(mutex);
+    running -= workers - static_cast<int>(threads.size());
+  }
+  if (threads.empty()) return serial_for(n, context, task);
   for (bool done = false; !done;) {
     {
       std::unique_lock<std::mutex> lock(mutex);
