@@ -183,13 +183,13 @@ new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, reg
   failed <- which(colSums(!is.finite(outputs)) > 0)
   if (length(failed)) {
     left <- ncol(outputs) - length(failed)
+    row <- which(!is.finite(outputs[, failed[1]]))[1]
+    first <- "The first is run {failed[1]} at {point_words(values[failed[1], , drop = FALSE])}: its row {row} is {outputs[row, failed[1]]}."
     if (left < max(5, length(parameters) + 2)) {
       abort_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable run{?s} {?is/are} too few.",
-                    x = "The first is run {failed[1]} at {paste(colnames(values), signif(values[failed[1], ], 4), sep = ' = ', collapse = ', ')}.",
-                    i = "Find out why the simulator fails there, or narrow the priors."), call = call)
+                    x = first, i = "Find out why the simulator fails there, or narrow the priors."), call = call)
     }
-    warn_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left out.",
-                 i = "The first is run {failed[1]} at {paste(colnames(values), signif(values[failed[1], ], 4), sep = ' = ', collapse = ', ')}."))
+    warn_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left out.", i = first))
     outputs <- outputs[, -failed, drop = FALSE]
     unit <- unit[-failed, , drop = FALSE]
     values <- values[-failed, , drop = FALSE]
