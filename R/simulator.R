@@ -43,7 +43,7 @@
 function_simulator <- function(f, ..., boundary = character(), name = "simulator") {
   check_run_function(f, "info")
   parameters <- named_parameters(list(...))
-  check_input(checkmate::check_character(boundary, any.missing = FALSE, unique = TRUE), "boundary")
+  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
   structure(list(format_version = format_version, name = name, f = f, parameters = parameters, boundary = boundary),
             class = "amiss_function_simulator")
 }
@@ -55,7 +55,7 @@ with_parameters <- function(model, ..., f = NULL, boundary = character(), name =
   check_input(checkmate::check_class(model, "amiss_function_simulator"), "model", "A {.fn zone} has edits of its own.")
   if (!is.null(f)) check_run_function(f, c("info", "base"))
   added <- named_parameters(list(...))
-  check_input(checkmate::check_character(boundary, any.missing = FALSE, unique = TRUE), "boundary")
+  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
   for (parameter in added[names(added) %in% names(model$parameters)]) {
     if (identical(parameter$prior, model$parameters[[parameter$name]]$prior)) next
     abort_input(c("Parameter {.val {parameter$name}} is in the model already, with another prior.",

@@ -140,11 +140,11 @@ world <- local({
 of_runs <- function(name, edit, boundary) mechanism(name, edit, boundary, "It acts.")
 
 test_that("mechanisms may be other sets of given runs", {
-  sun <- world$made(c("offset", "gain", "sun"))
   # A function of what there is gives runs with what was adopted.
-  wind <- function(present) world$made(c(names(free_parameters(present)), "wind"))
-  upgrade <- given_upgrade(catalogue(of_runs("sun", sun, "Gv"), of_runs("wind", wind, "Ws")))
-  expect_setequal(vapply(upgrade$models[-1], `[[`, "", "mechanism"), if (length(upgrade$models) == 3) c("sun", "wind") else "wind")
+  with <- function(name) function(present) world$made(c(names(free_parameters(present)), name))
+  upgrade <- given_upgrade(catalogue(of_runs("sun", with("sun"), "Gv"), of_runs("wind", with("wind"), "Ws")))
+  expect_setequal(vapply(upgrade$models[-1], `[[`, "", "mechanism"), c("sun", "wind"))
+  expect_setequal(names(coef(upgrade$models[[3]]$fit)), c("offset", "gain", "sun", "wind"))
   first <- upgrade$candidates[upgrade$candidates$from == "base", ]
   expect_gt(min(first$log10_bf), 2)
   for (model in upgrade$models) {
