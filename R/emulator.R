@@ -84,7 +84,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
                  unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
                  left_out = list(error = trained$coefficients - trained$loo_mean, variance = trained$loo_variance), selection = selection,
                  diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble), control = control,
-                 hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble, noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
+                 hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
+                 noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
 }
 
 check_runs_differ <- function(ensemble, call = rlang::caller_env()) {

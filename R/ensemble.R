@@ -96,25 +96,27 @@ without_simulator <- function(emulator) {
 #' A design and its runs as an ensemble. Given runs at the validation rows too, a calibration of them predicts held-out
 #' rows, and [upgrade_model()] judges mechanisms by them, each another set of runs.
 #'
-#' With the `measurements`, `outputs` may hold their calibration rows, calibration and validation rows in the order of the
-#' record, all rows, or all rows of the data before they were averaged: then the runs are averaged alike. With `time` rows
-#' may stand in any order, and what the measurements do not use may be there too. Either way the ensemble keeps the
+#' With the `measurements`, `outputs` may hold their calibration rows, calibration and validation rows in the order of
+#' the record, all rows, or all rows of the data before they were averaged: then the runs are averaged alike. With `time`
+#' rows may stand in any order, and what the measurements do not use may be there too. Either way the ensemble keeps the
 #' times of its rows, and is refused for measurements of others.
 #'
 #' @param design Matrix of parameter values, one run a row, named columns.
 #' @param outputs Matrix of outputs, one run a column: at the calibration rows of the measurements, or as said below.
 #' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not given, each gets a
 #'   uniform prior over the range of its column.
-#' @param measurements The [measurements()] that the runs are compared with. Without them `outputs` are taken to be at the
-#'   calibration rows, and validation rows are not known.
+#' @param measurements The [measurements()] that the runs are compared with. Without them `outputs` are taken to be at
+#'   the calibration rows, and validation rows are not known.
 #' @param validation Matrix of outputs at the validation rows, one run a column, if `outputs` does not hold them.
-#' @param time Times of the rows of `outputs`, and then of `validation`: `POSIXct`, ISO 8601 text or hours, as in the data.
+#' @param time Times of the rows of `outputs`, and then of `validation`: `POSIXct`, ISO 8601 text or hours, as in the
+#'   data.
 #' @return An object of class `amiss_ensemble`; `held_out` holds its runs at the validation rows.
 #' @seealso [read_calibro()]
 #' @examples
 #' table <- data.frame(hour = 1:72, Te = 5 + 3 * sin(1:72 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * sin(61 * (1:72)^2)
-#' house <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, validate = table$hour > 48)
+#' house <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+#'                       validate = table$hour > 48)
 #' design <- cbind(gain = seq(0.1, 0.9, 0.1))
 #' runs <- 20 + tcrossprod(table$Te, design)
 #' made <- ensemble(design, runs, list(free("gain", uniform(0, 1))), measurements = house)
@@ -139,7 +141,8 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
   check_design_columns(colnames(design), names(parameters))
   values <- design[, names(parameters), drop = FALSE]
   unit <- places_in_priors(values, parameters)
-  made <- new_ensemble(parameters, unname(unit), values, runs$calibrate, NULL, NA, hours = runs$hours, held_out = runs$held_out)
+  made <- new_ensemble(parameters, unname(unit), values, runs$calibrate, NULL, NA,
+                       hours = runs$hours, held_out = runs$held_out)
   uncovered <- uncovered_statement(made)
   if (!is.null(uncovered)) {
     warn_input(c("{toupper(substr(uncovered, 1, 1))}{substring(uncovered, 2)}.",
@@ -153,7 +156,8 @@ check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
   check_input(checkmate::check_matrix(outputs, "numeric", min.rows = 1), name, call = call)
   storage.mode(outputs) <- "double"
   if (runs != ncol(outputs)) {
-    abort_input(c("{.arg design} has {runs} rows and {.arg {name}} {ncol(outputs)} columns; each row of the design needs its run.",
+    abort_input(c(paste("{.arg design} has {runs} rows and {.arg {name}} {ncol(outputs)} columns; each row of the",
+                        "design needs its run."),
                   i = "Give the outputs as one column per run."), call = call)
   }
   unname(outputs)
@@ -164,7 +168,8 @@ check_design_columns <- function(columns, parameters, call = rlang::caller_env()
   if (length(absent)) abort_input("{.arg design} lacks {cli::qty(absent)}column{?s} {.val {absent}}.", call = call)
   unknown <- setdiff(columns, parameters)
   if (length(unknown)) {
-    abort_input(c("{.arg design} has {cli::qty(unknown)}column{?s} {.val {unknown}} without a parameter; the runs vary with {?it/them} nevertheless.",
+    abort_input(c(paste("{.arg design} has {cli::qty(unknown)}column{?s} {.val {unknown}} without a parameter; the",
+                        "runs vary with {?it/them} nevertheless."),
                   i = "Declare {cli::qty(unknown)}{?it/them} by {.fun free} in {.arg parameters}."), call = call)
   }
 }
@@ -180,7 +185,8 @@ places_in_priors <- function(values, parameters, call = rlang::caller_env()) {
                     i = "Correct the prior or make runs inside it."), call = call)
     }
     if (length(outside)) {
-      abort_input(c("{length(outside)} run{?s} lie{?s/} outside the prior of {.val {name}}, {format(prior)}; the first is run {outside[1]} with value {values[outside[1], name]}.",
+      abort_input(c(paste("{length(outside)} run{?s} lie{?s/} outside the prior of {.val {name}}, {format(prior)};",
+                          "the first is run {outside[1]} with value {values[outside[1], name]}."),
                     i = "Widen the prior or leave these runs out."), call = call)
     }
     unit[, name] <- prior_cdf(prior, values[, name])
@@ -193,14 +199,20 @@ places_in_priors <- function(values, parameters, call = rlang::caller_env()) {
 place_runs <- function(outputs, validation, measurements, time, call = rlang::caller_env()) {
   check_input(checkmate::check_class(measurements, "amiss_measurements", null.ok = TRUE), "measurements", call = call)
   if (is.null(measurements)) {
-    if (!is.null(validation)) abort_input("{.arg validation} needs {.arg measurements}, which say what its rows are.", call = call)
+    if (!is.null(validation)) abort_input(paste("{.arg validation} needs {.arg measurements}, which say what its rows",
+                                                "are."), call = call)
     hours <- if (!is.null(time)) row_times(time, nrow(outputs), call)
     return(list(calibrate = outputs, hours = hours))
   }
-  record <- if (is.null(time)) runs_by_count(outputs, validation, measurements, call)
-            else runs_by_time(rbind(outputs, validation), row_times(time, nrow(outputs) + NROW(validation), call), measurements, call)
+  record <- if (is.null(time)) {
+    runs_by_count(outputs, validation, measurements, call)
+  } else {
+    runs <- rbind(outputs, validation)
+    runs_by_time(runs, row_times(time, nrow(runs), call), measurements, call)
+  }
   held <- used_rows(measurements, "validate")
-  list(calibrate = record[used_rows(measurements, "calibrate"), , drop = FALSE], hours = row_hours(measurements, "calibrate"),
+  list(calibrate = record[used_rows(measurements, "calibrate"), , drop = FALSE],
+       hours = row_hours(measurements, "calibrate"),
        held_out = if (length(held) && !all(is.na(record[held, 1]))) {
          list(outputs = record[held, , drop = FALSE], hours = row_hours(measurements, "validate"))
        })
@@ -208,7 +220,8 @@ place_runs <- function(outputs, validation, measurements, time, call = rlang::ca
 
 row_times <- function(time, rows, call) {
   hours <- read_time(time, "time", call)
-  if (length(hours) != rows) abort_input("{.arg time} has {length(hours)} value{?s}, the runs have {rows} row{?s}.", call = call)
+  if (length(hours) != rows) abort_input(paste("{.arg time} has {length(hours)} value{?s}, the runs have {rows}",
+                                               "row{?s}."), call = call)
   hours
 }
 
@@ -221,7 +234,9 @@ runs_by_count <- function(outputs, validation, measurements, call) {
   rows <- list(calibration = used_rows(m, "calibrate"), validation = used_rows(m, "validate"), record = seq_along(m$y))
   if (!is.null(validation)) {
     if (nrow(outputs) != length(rows$calibration) || nrow(validation) != length(rows$validation)) {
-      abort_input(c("{.arg outputs} has {nrow(outputs)} rows and {.arg validation} {nrow(validation)}; the measurements have {length(rows$calibration)} calibration and {length(rows$validation)} validation rows.",
+      abort_input(c(paste("{.arg outputs} has {nrow(outputs)} rows and {.arg validation} {nrow(validation)}; the",
+                          "measurements have {length(rows$calibration)} calibration and {length(rows$validation)}",
+                          "validation rows."),
                     i = "Give the runs at exactly these rows, or the {.arg time} of each."), call = call)
     }
     record[unlist(rows[1:2]), ] <- rbind(outputs, validation)
@@ -229,12 +244,15 @@ runs_by_count <- function(outputs, validation, measurements, call) {
   }
   if (m$per_step > 1 && nrow(outputs) == length(m$raw$hours)) return(averaged_runs(outputs, m))
   kinds <- list(rows$calibration, sort(c(rows$calibration, rows$validation)), rows$record)
-  own <- match(nrow(outputs), lengths(kinds))
-  if (is.na(own)) {
-    abort_input(c("The runs have {nrow(outputs)} rows; the measurements have {length(rows$calibration)} calibration and {length(rows$validation)} validation rows, of {length(m$y)} in all{if (m$per_step > 1) paste0(', and ', length(m$raw$hours), ' before they were averaged') else ''}.",
-                  i = "Give the runs at the calibration rows, at both, or at all; or the {.arg time} of each row."), call = call)
+  kind <- match(nrow(outputs), lengths(kinds))
+  if (is.na(kind)) {
+    abort_input(c(paste("The runs have {nrow(outputs)} rows; the measurements have {length(rows$calibration)}",
+                        "calibration and {length(rows$validation)} validation rows, of {length(m$y)} in",
+                        "all{if (m$per_step > 1) paste0(', and ', length(m$raw$hours), ' before they were averaged') else ''}."),
+                  i = paste("Give the runs at the calibration rows, at both, or at all; or the {.arg time} of each",
+                            "row.")), call = call)
   }
-  record[kinds[[own]], ] <- outputs
+  record[kinds[[kind]], ] <- outputs
   record
 }
 
@@ -248,11 +266,13 @@ runs_by_time <- function(runs, hours, measurements, call) {
   # Times before averaging where they are there: the end of an average is one of them.
   fine <- m$per_step > 1 && !anyNA(raw)
   for (use in c("calibrate", "validate")) {
-    own <- used_rows(m, use)
-    absent <- own[is.na(rows[own])]
-    if (!length(absent) || use == "validate" && length(absent) == length(own)) next
-    abort_input(c("The runs lack {length(absent)} of the {length(own)} rows of the measurements that {use}; the first is at {format(m$time[absent[1]])}.",
-                  i = "The runs span {signif(min(hours), 8)} to {signif(max(hours), 8)} h and the measurements {signif(min(m$hours), 8)} to {signif(max(m$hours), 8)} h: check time zone and step."), call = call)
+    wanted <- used_rows(m, use)
+    absent <- wanted[is.na(rows[wanted])]
+    if (!length(absent) || use == "validate" && length(absent) == length(wanted)) next
+    abort_input(c(paste("The runs lack {length(absent)} of the {length(wanted)} rows of the measurements that {use}; the",
+                        "first is at {format(m$time[absent[1]])}."),
+                  i = paste("The runs span {signif(min(hours), 8)} to {signif(max(hours), 8)} h and the measurements",
+                            "{signif(min(m$hours), 8)} to {signif(max(m$hours), 8)} h: check time zone and step.")), call = call)
   }
   if (fine) averaged_runs(runs[raw, , drop = FALSE], m) else runs[rows, , drop = FALSE]
 }
@@ -264,7 +284,9 @@ check_same_rows <- function(hours, measurements, use = "calibrate", call = rlang
   same <- length(hours) == length(expected) && all(abs(hours - expected) < 1e-6)
   if (same) return(invisible())
   differs <- if (length(hours) == length(expected)) which(abs(hours - expected) >= 1e-6)[1] else 1
-  abort_input(c("The runs were made at other rows than those of the measurements that {use}: row {differs} is at {signif(hours[differs], 8)} h in the runs, at {signif(expected[differs], 8)} h in the measurements.",
+  abort_input(c(paste("The runs were made at other rows than those of the measurements that {use}: row {differs} is",
+                      "at {signif(hours[differs], 8)} h in the runs, at {signif(expected[differs], 8)} h in the",
+                      "measurements."),
                 i = "Use the measurements that the ensemble was made with, or make the runs anew."), call = call)
 }
 
@@ -313,35 +335,39 @@ unit_to_values <- function(unit, parameters) {
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
 }
 
-# `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do; `hours`: times of the rows, if known;
-# `held_out`: given runs at the validation rows.
-new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL, over_priors = NULL, hours = NULL, held_out = NULL,
-                         call = rlang::caller_env()) {
+# `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do; `hours`: times of the
+# rows, if known; `held_out`: given runs at the validation rows.
+new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL, over_priors = NULL,
+                         hours = NULL, held_out = NULL, call = rlang::caller_env()) {
   everything <- rbind(outputs, held_out$outputs)
   failed <- which(colSums(!is.finite(everything)) > 0)
   if (length(failed)) {
     left <- ncol(outputs) - length(failed)
     row <- which(!is.finite(everything[, failed[1]]))[1]
-    first <- "The first is run {failed[1]} at {point_words(values[failed[1], , drop = FALSE])}: its row {row} is {everything[row, failed[1]]}."
+    first <- paste("The first is run {failed[1]} at {point_words(values[failed[1], , drop = FALSE])}: its row {row}",
+                   "is {everything[row, failed[1]]}.")
     if (left < max(5, length(parameters) + 2)) {
       abort_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable run{?s} {?is/are} too few.",
                     x = first, i = "Find out why the simulator fails there, or narrow the priors."), call = call)
     }
-    warn_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left out.", i = first))
+    warn_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left",
+                       "out."), i = first))
     outputs <- outputs[, -failed, drop = FALSE]
     if (!is.null(held_out)) held_out$outputs <- held_out$outputs[, -failed, drop = FALSE]
     unit <- unit[-failed, , drop = FALSE]
     values <- values[-failed, , drop = FALSE]
   }
   structure(list(format_version = format_version, parameters = parameters, unit = unit, values = values, outputs = outputs,
-                 simulator = simulator, failed = length(failed), seed = seed, region = region, over_priors = over_priors,
-                 hours = hours, held_out = held_out), class = "amiss_ensemble")
+                 simulator = simulator, failed = length(failed), seed = seed, region = region,
+                 over_priors = over_priors, hours = hours, held_out = held_out), class = "amiss_ensemble")
 }
 
 #' @export
 print.amiss_ensemble <- function(x, ...) {
   cli::cli_text("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over {length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}")
-  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}", if (!is.null(x$region)) c("*" = "in the region where a posterior lies"),
-                     if (!is.null(x$held_out)) c("*" = "and at {nrow(x$held_out$outputs)} validation steps"), ">" = "next: {.fun train_emulator}"))
+  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}",
+                     if (!is.null(x$region)) c("*" = "in the region where a posterior lies"),
+                     if (!is.null(x$held_out)) c("*" = "and at {nrow(x$held_out$outputs)} validation steps"),
+                     ">" = "next: {.fun train_emulator}"))
   invisible(x)
 }

@@ -1,5 +1,5 @@
-# Ensembles of runs that were made elsewhere, where others run their simulator: at held-out rows the runs have an emulator of
-# their own, of the same design.
+# Ensembles of runs that were made elsewhere, where others run their simulator: runs at held-out rows have another
+# emulator, of the same design.
 
 #' @export
 free_parameters.amiss_ensemble <- function(simulator) simulator$parameters
@@ -11,13 +11,18 @@ driver_names.amiss_ensemble <- function(simulator) character()
 model_of <- function(fit) fit$emulator$simulator %||% fit$emulator$given
 
 # The uses whose rows a fit can predict.
-predictable <- function(fit) c("calibrate", if (!is.null(fit$emulator$simulator) || !is.null(fit$emulator$given$held_out)) "validate")
+predictable <- function(fit) {
+  given <- fit$emulator$given
+  c("calibrate", if (is.null(given) || !is.null(given$held_out)) "validate")
+}
 
 held_out_runs <- function(fit, call = rlang::caller_env()) {
   held <- fit$emulator$given$held_out
   if (is.null(held)) {
-    abort_input(c("The runs of this ensemble were made elsewhere, and none at the validation rows, so that these cannot be predicted.",
-                  i = "Give them to {.fun ensemble} with the {.arg measurements}, or ask for {.code use = \"calibrate\"}."), call = call)
+    abort_input(c(paste("The runs of this ensemble were made elsewhere, and none at the validation rows, so that",
+                        "these cannot be predicted."),
+                  i = paste("Give them to {.fun ensemble} with the {.arg measurements}, or ask for",
+                            "{.code use = \"calibrate\"}.")), call = call)
   }
   check_same_rows(held$hours, fit$measurements, "validate", call)
   held
@@ -39,7 +44,8 @@ runs_given <- function(fit, use) {
   runs[m$use %in% use & !is.na(m$y), , drop = FALSE]
 }
 
-# As predict() by the simulator, but by emulators at the draws `picked`; their standard deviations join that of the error.
+# As predict() by the simulator, but by emulators at the draws `picked`; their standard deviations join that of the
+# error.
 predict_given <- function(fit, picked, rows, use, discrepancy, seed, threads, call = rlang::caller_env()) {
   m <- fit$measurements
   values <- fit$values[rep_len(picked, 200), , drop = FALSE]
@@ -64,11 +70,13 @@ check_given <- function(models, measurements, call = rlang::caller_env()) {
     model <- models[[name]]
     if (!inherits(model, "amiss_ensemble")) next
     if (!is.null(model$simulator)) {
-      abort_input(c("The ensemble {.val {name}} knows its simulator.", i = "Give the simulator itself: it is run where the loop needs it."), call = call)
+      abort_input(c("The ensemble {.val {name}} knows its simulator.",
+                    i = "Give the simulator itself: it is run where the loop needs it."), call = call)
     }
     rows <- length(used_rows(measurements, "calibrate"))
     if (nrow(model$outputs) != rows) {
-      abort_input(c("The runs of {.val {name}} have {nrow(model$outputs)} steps and the measurements {rows} calibration rows.",
+      abort_input(c(paste("The runs of {.val {name}} have {nrow(model$outputs)} steps and the measurements {rows}",
+                          "calibration rows."),
                     i = "Make the ensemble with these {.arg measurements}."), call = call)
     }
     check_same_rows(model$hours, measurements, call = call)

@@ -5,9 +5,9 @@
 #'
 #' @param name Short name.
 #' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared
-#'   by [free()]: an edit of a [zone()], or [with_parameters()]. Of a model that is an [ensemble()] of given runs, another ensemble,
-#'   of runs with the mechanism, or a function of the present ensemble that returns one. An ensemble is tried while it has
-#'   the parameters of all that was adopted before it.
+#'   by [free()]: an edit of a [zone()], or [with_parameters()]. Of a model that is an [ensemble()] of given runs, another
+#'   ensemble, of runs with the mechanism, or a function of the present ensemble that returns one. An ensemble is tried
+#'   while it has the parameters of all that was adopted before it.
 #' @param boundary Names of the boundary conditions that drive the mechanism.
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
 #' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class `amiss_catalogue`.
@@ -62,11 +62,13 @@ extend <- function(simulator, mechanism, adopted = character(), call = rlang::ca
     abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"), call = call)
   })
   if (!inherits(extended, class(simulator)[1])) {
-    abort_input(c("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not a simulator.",
+    abort_input(c(paste("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not",
+                        "a simulator."),
                   i = "The model that it extends is of class {.cls {class(simulator)}}."), call = call)
   }
   if (!is.null(simulator$held_out) && is.null(extended$held_out)) {
-    abort_input(c("The runs of mechanism {.val {mechanism$name}} are not known at the validation rows, those of the model are.",
+    abort_input(c(paste("The runs of mechanism {.val {mechanism$name}} are not known at the validation rows, those of",
+                        "the model are."),
                   i = "Give {.fun ensemble} its runs there too."), call = call)
   }
   lost <- setdiff(adopted, names(free_parameters(extended)))

@@ -136,7 +136,8 @@ print.amiss_function_simulator <- function(x, ...) {
 #' @param hold Values at which the target is held during warm-up, `NA` where it is free; a simulator that cannot be
 #'   held ignores it.
 #' @param threads Number of threads.
-#' @param ... What a method may use or ignore: `time` of each row and the number of the `segment`. Every method must have it.
+#' @param ... What a method may use or ignore: `time` of each row and the number of the `segment`. Every method must have
+#'   it.
 #' @return `free_parameters()`: named list of [free()]; `driver_names()`: names of the columns that it needs;
 #'   `simulate_runs()`: matrix with one row per interval and one column per run, `NaN` columns where a run failed.
 #' @keywords internal
@@ -184,7 +185,8 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
 check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()) {
   if (is.numeric(out) && length(out) == rows) return(invisible())
   seen <- trimws(utils::capture.output(utils::str(out, give.attr = FALSE)))[1]
-  abort_input(c("Run {m} of {.val {simulator$name}} returned {length(out)} value{?s} of class {.cls {class(out)}}; {rows} numbers were expected, one for each row of the drivers.",
+  abort_input(c(paste("Run {m} of {.val {simulator$name}} returned {length(out)} value{?s} of class",
+                      "{.cls {class(out)}}; {rows} numbers were expected, one for each row of the drivers."),
                 x = "At {point_words(point)} it returned: {seen}",
                 i = "Let the simulator return its output at every row."), call = call)
 }

@@ -15,9 +15,9 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their coarse Bayes factor;
 #' `candidates$screened` says which.
 #'
-#' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see [mechanism()].
-#' Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out, and held-out rows are
-#' predicted by emulators of the runs given there.
+#' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
+#' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out, and
+#' held-out rows are predicted by emulators of the runs given there.
 #'
 #' @param simulator The base model: a simulator, or an [ensemble()] of given runs.
 #' @param measurements The [measurements()].
@@ -40,7 +40,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' \donttest{
 #' table <- data.frame(hour = 1:120, Te = 5 + 3 * sin(1:120 / 4), Gv = pmax(0, 100 * cos(1:120 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.02 * table$Gv + 0.1 * sin(61 * (1:120)^2)
-#' house <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1, validate = table$hour > 90)
+#' house <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                       validate = table$hour > 90)
 #' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 1)), boundary = "Te")
 #' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
@@ -54,8 +55,9 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' design <- cbind(gain = lhs::randomLHS(40, 1)[, 1], sun = 0.1 * lhs::randomLHS(40, 1)[, 1])
 #' runs <- 20 + tcrossprod(table$Te, design[, "gain"])
 #' sunny <- runs + tcrossprod(table$Gv, design[, "sun"])
-#' given <- ensemble(design[, "gain", drop = FALSE], runs, list(free("gain", uniform(0, 1))), measurements = house)
-#' with_sun <- ensemble(design, sunny, list(free("gain", uniform(0, 1)), free("sun", uniform(0, 0.1))), measurements = house)
+#' parameters <- list(free("gain", uniform(0, 1)), free("sun", uniform(0, 0.1)))
+#' given <- ensemble(design[, "gain", drop = FALSE], runs, parameters[1], measurements = house)
+#' with_sun <- ensemble(design, sunny, parameters, measurements = house)
 #' upgrade_model(given, house, catalogue(mechanism("sun", with_sun, "Gv", "Sun enters.")), control = quick, seed = 1,
 #'               quiet = TRUE)
 #' }
