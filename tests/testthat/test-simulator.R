@@ -23,7 +23,7 @@ test_that("a function is given what it asks for", {
 
 test_that("functions of two arguments go on working, others are refused with a word", {
   run <- function(f) simulate_runs(function_simulator(f, gain), cbind(gain = c(0.5, 1)), drivers, step_h = 1)
-  expect_equal(run(function(v, d) v[["gain"]] * d[, "Te"]), cbind(drivers[, "Te"] / 2, drivers[, "Te"]), ignore_attr = TRUE)
+  expect_equal(run(function(v, d) v[["gain"]] * d[, "Te"]), unname(cbind(drivers[, "Te"] / 2, drivers[, "Te"])))
   expect_equal(run(function(v, d, scale = 3) scale * v[["gain"]] * d[, 1])[, 2], 3 * drivers[, 1])
   expect_equal(run(function(values, drivers, ...) rep(list(...)$info$step_h, 4))[, 1], rep(1, 4))
   expect_error(run(function(v) 1), "values and drivers", class = "amiss_error_input")
@@ -47,7 +47,8 @@ test_that("what a function returned is shown, and for which values", {
 })
 
 test_that("edits with a base stack in any order", {
-  model <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, 1], gain, boundary = "Te")
+  # What it is given are its drivers alone.
+  model <- function_simulator(function(values, drivers) values[["gain"]] * rowSums(drivers), gain, boundary = "Te")
   sun <- function(model) {
     with_parameters(model, free("sun", uniform(0, 1)), boundary = "Gv",
                     f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
