@@ -213,7 +213,7 @@ place_runs <- function(outputs, validation, measurements, time, call = rlang::ca
   held <- used_rows(measurements, "validate")
   list(calibrate = record[used_rows(measurements, "calibrate"), , drop = FALSE],
        hours = row_hours(measurements, "calibrate"),
-       held_out = if (length(held) && !all(is.na(record[held, 1]))) {
+       held_out = if (length(held) && !all(is.na(record[held, ]))) {
          list(outputs = record[held, , drop = FALSE], hours = row_hours(measurements, "validate"))
        })
 }
