@@ -84,6 +84,7 @@ emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
     abort_input(c("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have {length(rows)} calibration rows.",
                   i = "Train it on runs at exactly these rows."), call = call)
   }
+  check_same_rows(emulator$hours, measurements, call = call)
   rows
 }
 

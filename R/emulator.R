@@ -61,6 +61,7 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
       abort_input(c("The runs have {nrow(ensemble$outputs)} steps and the measurements {length(rows)} calibration rows.",
                     i = "Give the runs at exactly these rows."))
     }
+    check_same_rows(ensemble$hours, noise_sd)
     noise_sd <- noise_sd$noise_sd
   }
   check_input(checkmate::check_number(noise_sd, lower = 0, finite = TRUE), "noise_sd")
@@ -83,6 +84,7 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
                  unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
                  left_out = list(error = trained$coefficients - trained$loo_mean, variance = trained$loo_variance), selection = selection,
                  diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble), control = control,
+                 hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
                  noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
 }
 

@@ -1,7 +1,7 @@
 #' Design and runs: an ensemble of simulations
 #'
-#' `simulate_design()` draws a Latin hypercube over the priors and runs the simulator at each point.
-#' `ensemble()` takes a design and runs that were made elsewhere.
+#' Draws a Latin hypercube over the priors and runs the simulator at each point. Runs that were made elsewhere enter by
+#' [ensemble()].
 #'
 #' @param simulator A simulator: [zone()], [function_simulator()].
 #' @param measurements [measurements()]; the simulator is driven by them.
@@ -10,6 +10,12 @@
 #' @param threads Number of threads.
 #' @return An object of class `amiss_ensemble`: parameter values, their places in the unit cube and the outputs at
 #'   the calibration rows (one column per run).
+#' @examples
+#' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
+#' linear <- function_simulator(function(values, drivers) 18 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' simulate_design(linear, room, runs = 12, seed = 1)
 #' @export
 simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1) {
   check_simulator(simulator)
@@ -23,7 +29,7 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
   unit <- with_seed(seed, lhs::randomLHS(runs, length(parameters)))
   values <- unit_to_values(unit, parameters)
   outputs <- simulate_measured(simulator, values, measurements, "calibrate", threads)
-  new_ensemble(parameters, unit, values, outputs, simulator, seed)
+  new_ensemble(parameters, unit, values, outputs, simulator, seed, hours = row_hours(measurements, "calibrate"))
 }
 
 #' More runs where they matter
@@ -57,6 +63,7 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
     abort_input(c("{.arg fit} was made on {length(fit$rows)} rows, the runs of {.arg ensemble} have {nrow(ensemble$outputs)}.",
                   i = "Give the ensemble and the calibration of the same measurements."))
   }
+  check_same_rows(ensemble$hours, fit$measurements)
   regional_ensemble(ensemble, posterior_region(fit, if (isTRUE(fit$check$border > largest_border_share)) 1.5 else 1), fit, runs, threads)
 }
 
@@ -69,13 +76,13 @@ regional_ensemble <- function(ensemble, region, fit, runs, threads) {
   own <- utils::tail(which(in_region(region, ensemble$unit)), 40)
   new_ensemble(ensemble$parameters, rbind(ensemble$unit[own, , drop = FALSE], unit), rbind(ensemble$values[own, , drop = FALSE], values),
                cbind(ensemble$outputs[, own, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
-               without_simulator(emulator_over_priors(fit$emulator)))
+               without_simulator(emulator_over_priors(fit$emulator)), hours = ensemble$hours)
 }
 
 # The ensemble with more runs, of its own region.
 join_runs <- function(ensemble, unit, values, outputs) {
   new_ensemble(ensemble$parameters, rbind(ensemble$unit, unit), rbind(ensemble$values, values), cbind(ensemble$outputs, outputs),
-               ensemble$simulator, ensemble$seed, ensemble$region, ensemble$over_priors)
+               ensemble$simulator, ensemble$seed, ensemble$region, ensemble$over_priors, hours = ensemble$hours)
 }
 
 # The simulator is kept once.
@@ -84,53 +91,203 @@ without_simulator <- function(emulator) {
   emulator
 }
 
-#' @rdname simulate_design
+#' Runs that were made elsewhere
+#'
+#' A design and its runs as an ensemble. Given runs at the validation rows too, a calibration of them predicts held-out
+#' rows, and [upgrade_model()] judges mechanisms by them, each another set of runs.
+#'
+#' With the `measurements`, `outputs` may hold their calibration rows, calibration and validation rows in the order of
+#' the record, all rows, or all rows of the data before they were averaged: then the runs are averaged alike. With `time`
+#' rows may stand in any order, and what the measurements do not use may be there too. Either way the ensemble keeps the
+#' times of its rows, and is refused for measurements of others.
+#'
 #' @param design Matrix of parameter values, one run a row, named columns.
-#' @param outputs Matrix of outputs at the calibration rows of the measurements, one run a column.
+#' @param outputs Matrix of outputs, one run a column: at the calibration rows of the measurements, or as said below.
 #' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not given, each gets a
 #'   uniform prior over the range of its column.
+#' @param measurements The [measurements()] that the runs are compared with. Without them `outputs` are taken to be at
+#'   the calibration rows, and validation rows are not known.
+#' @param validation Matrix of outputs at the validation rows, one run a column, if `outputs` does not hold them.
+#' @param time Times of the rows of `outputs`, and then of `validation`: `POSIXct`, ISO 8601 text or hours, as in the
+#'   data.
+#' @return An object of class `amiss_ensemble`; `held_out` holds its runs at the validation rows.
+#' @seealso [read_calibro()]
+#' @examples
+#' table <- data.frame(hour = 1:72, Te = 5 + 3 * sin(1:72 / 4))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.1 * sin(61 * (1:72)^2)
+#' house <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+#'                       validate = table$hour > 48)
+#' design <- cbind(gain = seq(0.1, 0.9, 0.1))
+#' runs <- 20 + tcrossprod(table$Te, design)
+#' made <- ensemble(design, runs, list(free("gain", uniform(0, 1))), measurements = house)
+#' fit <- calibrate(train_emulator(made, house), house, seed = 1,
+#'                  control = list(ais = list(pilot_chains = 48, groups = 4)))
+#' head(predict(fit, use = "validate"))
 #' @export
-ensemble <- function(design, outputs, parameters = NULL) {
+ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL, time = NULL) {
   design <- as.matrix(design)
-  outputs <- as.matrix(outputs)
   check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"), "design")
-  check_input(checkmate::check_matrix(outputs, "numeric"), "outputs")
-  storage.mode(design) <- storage.mode(outputs) <- "double"
-  if (nrow(design) != ncol(outputs)) {
-    abort_input(c("{.arg design} has {nrow(design)} rows and {.arg outputs} {ncol(outputs)} columns; each row of the design needs its run.",
-                  i = "Give the outputs as one column per run."))
-  }
+  storage.mode(design) <- "double"
+  outputs <- check_runs(outputs, "outputs", nrow(design))
+  if (!is.null(validation)) validation <- check_runs(validation, "validation", nrow(design))
+  runs <- place_runs(outputs, validation, measurements, time)
   check_enough_runs(nrow(design), ncol(design))
   if (is.null(parameters)) {
     for (name in colnames(design)) check_varies(name, design[, name])
     parameters <- lapply(colnames(design), function(name) free(name, uniform(min(design[, name]), max(design[, name]))))
   }
-  names(parameters) <- vapply(parameters, `[[`, "", "name")
-  absent <- setdiff(names(parameters), colnames(design))
-  if (length(absent)) abort_input("{.arg design} lacks {cli::qty(absent)}column{?s} {.val {absent}}.")
+  check_input(checkmate::check_list(parameters), "parameters")
+  parameters <- named_parameters(parameters)
+  check_design_columns(colnames(design), names(parameters))
   values <- design[, names(parameters), drop = FALSE]
-  unit <- values
-  for (name in names(parameters)) {
-    prior <- parameters[[name]]$prior
-    outside <- which(values[, name] < prior$lower | values[, name] > prior$upper)
-    if (length(outside) == nrow(values)) {
-      abort_input(c("No run lies where the prior of {.val {name}} has mass: {format(prior)}, while the runs span {signif(min(values[, name]), 4)} to {signif(max(values[, name]), 4)}.",
-                    i = "Correct the prior or make runs inside it."))
-    }
-    if (length(outside)) {
-      abort_input(c("{length(outside)} run{?s} lie{?s/} outside the prior of {.val {name}}; the first is run {outside[1]} with value {values[outside[1], name]}.",
-                    i = "Widen the prior or leave these runs out."))
-    }
-    unit[, name] <- prior_cdf(prior, values[, name])
-    check_covered(name, prior, values[, name], unit[, name])
-  }
-  made <- new_ensemble(parameters, unname(unit), values, outputs, NULL, NA)
+  unit <- places_in_priors(values, parameters)
+  made <- new_ensemble(parameters, unname(unit), values, runs$calibrate, NULL, NA,
+                       hours = runs$hours, held_out = runs$held_out)
   uncovered <- uncovered_statement(made)
   if (!is.null(uncovered)) {
     warn_input(c("{toupper(substr(uncovered, 1, 1))}{substring(uncovered, 2)}.",
                  i = "The emulator extrapolates over the rest: add runs there or narrow the prior."))
   }
   made
+}
+
+check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
+  outputs <- as.matrix(outputs)
+  check_input(checkmate::check_matrix(outputs, "numeric", min.rows = 1), name, call = call)
+  storage.mode(outputs) <- "double"
+  if (runs != ncol(outputs)) {
+    abort_input(c(paste("{.arg design} has {runs} rows and {.arg {name}} {ncol(outputs)} columns; each row of the",
+                        "design needs its run."),
+                  i = "Give the outputs as one column per run."), call = call)
+  }
+  unname(outputs)
+}
+
+check_design_columns <- function(columns, parameters, call = rlang::caller_env()) {
+  absent <- setdiff(parameters, columns)
+  if (length(absent)) abort_input("{.arg design} lacks {cli::qty(absent)}column{?s} {.val {absent}}.", call = call)
+  unknown <- setdiff(columns, parameters)
+  if (length(unknown)) {
+    abort_input(c(paste("{.arg design} has {cli::qty(unknown)}column{?s} {.val {unknown}} without a parameter; the",
+                        "runs vary with {?it/them} nevertheless."),
+                  i = "Declare {cli::qty(unknown)}{?it/them} by {.fun free} in {.arg parameters}."), call = call)
+  }
+}
+
+# The design in the unit cube, all of it inside the priors.
+places_in_priors <- function(values, parameters, call = rlang::caller_env()) {
+  unit <- values
+  for (name in names(parameters)) {
+    prior <- parameters[[name]]$prior
+    outside <- which(values[, name] < prior$lower | values[, name] > prior$upper)
+    if (length(outside) == nrow(values)) {
+      abort_input(c("No run lies where the prior of {.val {name}} has mass: {format(prior)}, while the runs span {signif(min(values[, name]), 4)} to {signif(max(values[, name]), 4)}.",
+                    i = "Correct the prior or make runs inside it."), call = call)
+    }
+    if (length(outside)) {
+      abort_input(c(paste("{length(outside)} run{?s} lie{?s/} outside the prior of {.val {name}}, {format(prior)};",
+                          "the first is run {outside[1]} with value {values[outside[1], name]}."),
+                    i = "Widen the prior or leave these runs out."), call = call)
+    }
+    unit[, name] <- prior_cdf(prior, values[, name])
+    check_covered(name, prior, values[, name], unit[, name], call)
+  }
+  unit
+}
+
+# Runs by the use of their rows: list(calibrate, hours, held_out), the last list(outputs, hours) or NULL.
+place_runs <- function(outputs, validation, measurements, time, call = rlang::caller_env()) {
+  check_input(checkmate::check_class(measurements, "amiss_measurements", null.ok = TRUE), "measurements", call = call)
+  if (is.null(measurements)) {
+    if (!is.null(validation)) abort_input(paste("{.arg validation} needs {.arg measurements}, which say what its rows",
+                                                "are."), call = call)
+    hours <- if (!is.null(time)) row_times(time, nrow(outputs), call)
+    return(list(calibrate = outputs, hours = hours))
+  }
+  record <- if (is.null(time)) {
+    runs_by_count(outputs, validation, measurements, call)
+  } else {
+    runs <- rbind(outputs, validation)
+    runs_by_time(runs, row_times(time, nrow(runs), call), measurements, call)
+  }
+  held <- used_rows(measurements, "validate")
+  list(calibrate = record[used_rows(measurements, "calibrate"), , drop = FALSE],
+       hours = row_hours(measurements, "calibrate"),
+       held_out = if (length(held) && !all(is.na(record[held, ]))) {
+         list(outputs = record[held, , drop = FALSE], hours = row_hours(measurements, "validate"))
+       })
+}
+
+row_times <- function(time, rows, call) {
+  hours <- read_time(time, "time", call)
+  if (length(hours) != rows) abort_input(paste("{.arg time} has {length(hours)} value{?s}, the runs have {rows}",
+                                               "row{?s}."), call = call)
+  hours
+}
+
+row_hours <- function(measurements, use) measurements$hours[used_rows(measurements, use)]
+
+# Runs at each row of the (averaged) record, NA where there are none: what the rows are is told by how many there are.
+runs_by_count <- function(outputs, validation, measurements, call) {
+  m <- measurements
+  record <- matrix(NA_real_, length(m$y), ncol(outputs))
+  rows <- list(calibration = used_rows(m, "calibrate"), validation = used_rows(m, "validate"), record = seq_along(m$y))
+  if (!is.null(validation)) {
+    if (nrow(outputs) != length(rows$calibration) || nrow(validation) != length(rows$validation)) {
+      abort_input(c(paste("{.arg outputs} has {nrow(outputs)} rows and {.arg validation} {nrow(validation)}; the",
+                          "measurements have {length(rows$calibration)} calibration and {length(rows$validation)}",
+                          "validation rows."),
+                    i = "Give the runs at exactly these rows, or the {.arg time} of each."), call = call)
+    }
+    record[unlist(rows[1:2]), ] <- rbind(outputs, validation)
+    return(record)
+  }
+  if (m$per_step > 1 && nrow(outputs) == length(m$raw$hours)) return(averaged_runs(outputs, m))
+  kinds <- list(rows$calibration, sort(c(rows$calibration, rows$validation)), rows$record)
+  kind <- match(nrow(outputs), lengths(kinds))
+  if (is.na(kind)) {
+    abort_input(c(paste("The runs have {nrow(outputs)} rows; the measurements have {length(rows$calibration)}",
+                        "calibration and {length(rows$validation)} validation rows, of {length(m$y)} in",
+                        "all{if (m$per_step > 1) paste0(', and ', length(m$raw$hours), ' before they were averaged') else ''}."),
+                  i = paste("Give the runs at the calibration rows, at both, or at all; or the {.arg time} of each",
+                            "row.")), call = call)
+  }
+  record[kinds[[kind]], ] <- outputs
+  record
+}
+
+averaged_runs <- function(fine, measurements) unname(block_means(fine, measurements$block, measurements$per_step))
+
+runs_by_time <- function(runs, hours, measurements, call) {
+  m <- measurements
+  found <- function(wanted) match(round(wanted, 6), round(hours, 6))
+  rows <- found(m$hours)
+  raw <- found(m$raw$hours)
+  # Times before averaging where they are there: the end of an average is one of them.
+  fine <- m$per_step > 1 && !anyNA(raw)
+  for (use in c("calibrate", "validate")) {
+    wanted <- used_rows(m, use)
+    absent <- wanted[is.na(rows[wanted])]
+    if (!length(absent) || use == "validate" && length(absent) == length(wanted)) next
+    abort_input(c(paste("The runs lack {length(absent)} of the {length(wanted)} rows of the measurements that {use}; the",
+                        "first is at {format(m$time[absent[1]])}."),
+                  i = paste("The runs span {signif(min(hours), 8)} to {signif(max(hours), 8)} h and the measurements",
+                            "{signif(min(m$hours), 8)} to {signif(max(m$hours), 8)} h: check time zone and step.")), call = call)
+  }
+  if (fine) averaged_runs(runs[raw, , drop = FALSE], m) else runs[rows, , drop = FALSE]
+}
+
+# Whether the rows of runs are those of the measurements, where their times are known.
+check_same_rows <- function(hours, measurements, use = "calibrate", call = rlang::caller_env()) {
+  if (is.null(hours)) return(invisible())
+  expected <- row_hours(measurements, use)
+  same <- length(hours) == length(expected) && all(abs(hours - expected) < 1e-6)
+  if (same) return(invisible())
+  differs <- if (length(hours) == length(expected)) which(abs(hours - expected) >= 1e-6)[1] else 1
+  abort_input(c(paste("The runs were made at other rows than those of the measurements that {use}: row {differs} is",
+                      "at {signif(hours[differs], 8)} h in the runs, at {signif(expected[differs], 8)} h in the",
+                      "measurements."),
+                i = "Use the measurements that the ensemble was made with, or make the runs anew."), call = call)
 }
 
 check_varies <- function(name, values, call = rlang::caller_env()) {
@@ -178,29 +335,39 @@ unit_to_values <- function(unit, parameters) {
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
 }
 
-# `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do.
-new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL, over_priors = NULL, call = rlang::caller_env()) {
-  failed <- which(colSums(!is.finite(outputs)) > 0)
+# `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do; `hours`: times of the
+# rows, if known; `held_out`: given runs at the validation rows.
+new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL, over_priors = NULL,
+                         hours = NULL, held_out = NULL, call = rlang::caller_env()) {
+  everything <- rbind(outputs, held_out$outputs)
+  failed <- which(colSums(!is.finite(everything)) > 0)
   if (length(failed)) {
     left <- ncol(outputs) - length(failed)
+    row <- which(!is.finite(everything[, failed[1]]))[1]
+    first <- paste("The first is run {failed[1]} at {point_words(values[failed[1], , drop = FALSE])}: its row {row}",
+                   "is {everything[row, failed[1]]}.")
     if (left < max(5, length(parameters) + 2)) {
       abort_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable run{?s} {?is/are} too few.",
-                    x = "The first is run {failed[1]} at {paste(colnames(values), signif(values[failed[1], ], 4), sep = ' = ', collapse = ', ')}.",
-                    i = "Find out why the simulator fails there, or narrow the priors."), call = call)
+                    x = first, i = "Find out why the simulator fails there, or narrow the priors."), call = call)
     }
-    warn_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left out.",
-                 i = "The first is run {failed[1]} at {paste(colnames(values), signif(values[failed[1], ], 4), sep = ' = ', collapse = ', ')}."))
+    warn_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left",
+                       "out."), i = first))
     outputs <- outputs[, -failed, drop = FALSE]
+    if (!is.null(held_out)) held_out$outputs <- held_out$outputs[, -failed, drop = FALSE]
     unit <- unit[-failed, , drop = FALSE]
     values <- values[-failed, , drop = FALSE]
   }
   structure(list(format_version = format_version, parameters = parameters, unit = unit, values = values, outputs = outputs,
-                 simulator = simulator, failed = length(failed), seed = seed, region = region, over_priors = over_priors), class = "amiss_ensemble")
+                 simulator = simulator, failed = length(failed), seed = seed, region = region,
+                 over_priors = over_priors, hours = hours, held_out = held_out), class = "amiss_ensemble")
 }
 
 #' @export
 print.amiss_ensemble <- function(x, ...) {
   cli::cli_text("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over {length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}")
-  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}", if (!is.null(x$region)) c("*" = "in the region where a posterior lies"), ">" = "next: {.fun train_emulator}"))
+  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}",
+                     if (!is.null(x$region)) c("*" = "in the region where a posterior lies"),
+                     if (!is.null(x$held_out)) c("*" = "and at {nrow(x$held_out$outputs)} validation steps"),
+                     ">" = "next: {.fun train_emulator}"))
   invisible(x)
 }

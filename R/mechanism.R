@@ -5,16 +5,25 @@
 #'
 #' @param name Short name.
 #' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared
-#'   by [free()].
+#'   by [free()]: an edit of a [zone()], or [with_parameters()]. Of a model that is an [ensemble()] of given runs, another
+#'   ensemble, of runs with the mechanism, or a function of the present ensemble that returns one. An ensemble is tried
+#'   while it has the parameters of all that was adopted before it.
 #' @param boundary Names of the boundary conditions that drive the mechanism.
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
 #' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class `amiss_catalogue`.
 #' @examples
-#' mechanism("steady loss", edit = function(model) model, boundary = "Te", sentence = "Heat leaves that the model keeps.")
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
+#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' })
+#' leaks <- mechanism("leaks", boundary = "Te", sentence = "Air enters.", edit = function(zone) {
+#'   add_component(zone, infiltration("leaks", free("ach", uniform(0, 1), "1/h"), outside = "Te"))
+#' })
+#' catalogue(sun, leaks)
 #' @export
 mechanism <- function(name, edit, boundary, sentence) {
   check_input(checkmate::check_string(name, min.chars = 1), "name")
-  check_input(checkmate::check_function(edit, nargs = 1), "edit")
+  if (!inherits(edit, "amiss_ensemble")) check_input(checkmate::check_function(edit, nargs = 1), "edit")
   check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
   check_input(checkmate::check_string(sentence, min.chars = 1), "sentence")
   structure(list(name = name, edit = edit, boundary = boundary, sentence = sentence), class = "amiss_mechanism")
@@ -48,11 +57,19 @@ print.amiss_catalogue <- function(x, ...) {
 
 # The extended simulator. An edit may replace parameters of the base model, but not drop what was adopted.
 extend <- function(simulator, mechanism, adopted = character(), call = rlang::caller_env()) {
-  extended <- tryCatch(mechanism$edit(simulator), error = function(e) {
+  edit <- mechanism$edit
+  extended <- tryCatch(if (is.function(edit)) edit(simulator) else edit, error = function(e) {
     abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"), call = call)
   })
   if (!inherits(extended, class(simulator)[1])) {
-    abort_input("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not a simulator.", call = call)
+    abort_input(c(paste("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not",
+                        "a simulator."),
+                  i = "The model that it extends is of class {.cls {class(simulator)}}."), call = call)
+  }
+  if (!is.null(simulator$held_out) && is.null(extended$held_out)) {
+    abort_input(c(paste("The runs of mechanism {.val {mechanism$name}} are not known at the validation rows, those of",
+                        "the model are."),
+                  i = "Give {.fun ensemble} its runs there too."), call = call)
   }
   lost <- setdiff(adopted, names(free_parameters(extended)))
   if (length(lost)) {
@@ -60,6 +77,11 @@ extend <- function(simulator, mechanism, adopted = character(), call = rlang::ca
                   i = "Let its {.code edit} extend the model that it is given, instead of making it anew."), call = call)
   }
   extended
+}
+
+# Given runs cannot be extended: those that lack what was adopted can no longer be tried.
+applies <- function(mechanism, adopted) {
+  is.function(mechanism$edit) || all(adopted %in% names(free_parameters(mechanism$edit)))
 }
 
 # A mechanism whose driver is not analysed can be adopted, but no condition can speak for it.

@@ -1,9 +1,10 @@
 #' Predict with a calibrated simulator
 #'
 #' The simulator itself is run at draws of the posterior (no emulator error); errors as large
-#' as those that calibration left widen the band.
+#' as those that calibration left widen the band. Of an [ensemble()] made elsewhere, the emulator of its runs at the rows
+#' asked for predicts, and its own uncertainty widens the band too.
 #'
-#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator.
+#' @param object A calibration ([calibrate()], [calibrate_paper()]).
 #' @param use Which rows: `"calibrate"`, `"validate"` or both.
 #' @param draws Number of posterior draws.
 #' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as it was seen in calibration
@@ -26,14 +27,11 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
   }
   m <- object$measurements
   simulator <- object$emulator$simulator
-  if (is.null(simulator)) {
-    abort_input(c("The runs of this ensemble were made elsewhere, so that the simulator cannot be run again.",
-                  i = "Use {.fun predict} on the emulator for the calibration rows."))
-  }
   picked <- systematic_draws(object$weights[order(object$values[, 1])], draws)
   picked <- order(object$values[, 1])[picked]
   rows <- which(m$use %in% use & !is.na(m$y))
   if (!length(rows)) abort_input("The measurements have no row to {.val {use}}.")
+  if (is.null(simulator)) return(predict_given(object, picked, rows, use, discrepancy, seed, threads))
   runs <- simulate_measured(simulator, object$values[picked, , drop = FALSE], m, use, threads)
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
   if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
@@ -64,7 +62,8 @@ moves_at <- function(fit, use, threads) {
   w <- emulator$processes$coefficients
   last <- ncol(w)
   values <- unit_to_values(emulator$unit, emulator$parameters)
-  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, fit$measurements, use, threads))
+  runs <- if (is.null(fit$emulator$simulator)) runs_given(fit, use)
+          else suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, fit$measurements, use, threads))
   made <- colSums(!is.finite(runs)) == 0
   if (sum(made) < last) {
     abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")

@@ -3,27 +3,119 @@
 #' Any function of parameters and boundary conditions can be calibrated. The built-in [zone()] is another simulator;
 #' runs that were made elsewhere enter by [ensemble()].
 #'
+#' `with_parameters()` extends such a simulator by parameters of a mechanism: its function has the simulator before the
+#' edit as `base`, so that edits stack in any order. Make every [mechanism()] of a function in this way: an edit that
+#' writes the model anew would lose what was adopted before it.
+#'
 #' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with named columns, one row
-#'   per interval of one unbroken segment), returning one number per row.
-#' @param ... The parameters, each made by [free()].
-#' @param boundary Names of the driver columns that the function needs.
+#'   per interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is given a
+#'   list of `step_h` (length of an interval in hours), `time` (of each row, as in the data), `segment` (its number) and
+#'   `hold` (the target as measured in the rows that warm up, `NA` in the others).
+#'   `with_parameters()`: if it has an argument `base`, it is given the simulator before the edit, as a function of
+#'   `values` and, if they are to differ, `drivers` and `info`; `NULL` leaves the function as it is.
+#' @param ... The parameters, each made by [free()]. Those of `model` stay.
+#' @param boundary Names of the driver columns that the function needs; `with_parameters()`: beside those of `model`.
 #' @param name A name for people.
 #' @return An object of class `amiss_function_simulator`.
 #' @examples
 #' linear <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 2)), boundary = "Te")
+#'
+#' # Starts where the measurements stand, and forgets that at a rate per hour.
+#' decay <- function_simulator(function(values, drivers, info) {
+#'   start <- if (is.na(info$hold[1])) drivers[1, "Te"] else info$hold[1]
+#'   kept <- exp(-values[["rate"]] * info$step_h * seq_len(nrow(drivers)))
+#'   drivers[, "Te"] + kept * (start - drivers[1, "Te"])
+#' }, free("rate", uniform(0.01, 1), "1/h"), boundary = "Te")
+#'
+#' # Mechanisms that stack.
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters.", edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1)), boundary = "Gv",
+#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' })
+#' drift <- mechanism("drift", boundary = character(), sentence = "The sensor drifts.", edit = function(model) {
+#'   with_parameters(model, free("drift", normal(0, 0.1), "K/d"), f = function(values, drivers, info, base) {
+#'     base(values) + values[["drift"]] * info$step_h * seq_len(nrow(drivers)) / 24
+#'   })
+#' })
+#' drift$edit(sun$edit(linear))
 #' @export
 function_simulator <- function(f, ..., boundary = character(), name = "simulator") {
-  check_input(checkmate::check_function(f, nargs = 2), "f")
-  parameters <- list(...)
-  if (!length(parameters) || !all(vapply(parameters, inherits, TRUE, "amiss_free"))) {
-    abort_input(c("Every parameter must be made by {.fun free}; got {length(parameters)} argument{?s}.",
-                  i = "For example {.code free(\"gain\", uniform(0, 2))}."))
-  }
-  names(parameters) <- vapply(parameters, `[[`, "", "name")
-  if (anyDuplicated(names(parameters))) abort_input("Parameter {.val {names(parameters)[anyDuplicated(names(parameters))]}} is declared twice.")
+  check_run_function(f, "info")
+  parameters <- named_parameters(list(...))
+  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
   structure(list(format_version = format_version, name = name, f = f, parameters = parameters, boundary = boundary),
             class = "amiss_function_simulator")
+}
+
+#' @rdname function_simulator
+#' @param model The simulator to extend, made by `function_simulator()`.
+#' @export
+with_parameters <- function(model, ..., f = NULL, boundary = character(), name = model$name) {
+  check_input(checkmate::check_class(model, "amiss_function_simulator"), "model", "A {.fn zone} has edits of its own.")
+  if (!is.null(f)) check_run_function(f, c("info", "base"))
+  added <- named_parameters(list(...))
+  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
+  for (parameter in added[names(added) %in% names(model$parameters)]) {
+    if (identical(parameter$prior, model$parameters[[parameter$name]]$prior)) next
+    abort_input(c("Parameter {.val {parameter$name}} is in the model already, with another prior.",
+                  i = "Give the new one a name of its own; to share one, give both the same prior."))
+  }
+  edited <- model
+  edited$name <- name
+  edited$parameters[names(added)] <- added
+  edited$boundary <- union(model$boundary, boundary)
+  if (is.null(f)) return(edited)
+  edited$f <- function(values, drivers, info = NULL) {
+    call_run_function(f, values, drivers, info = info, base = as_base(model, drivers, info))
+  }
+  # What the function is made of, for keys of kept results.
+  edited$edit <- f
+  edited$base <- model
+  edited
+}
+
+# A simulator as a function of its parameters; what is not given is that of the call it is used in.
+as_base <- function(model, its_drivers, its_info) {
+  function(values, drivers = its_drivers, info = its_info) {
+    call_run_function(model$f, values[names(model$parameters)], drivers[, model$boundary, drop = FALSE], info = info)
+  }
+}
+
+# `f` with those of the further arguments that it has.
+call_run_function <- function(f, values, drivers, ...) {
+  further <- list(...)
+  known <- names(formals(args(f)))
+  if (!"..." %in% known) further <- further[names(further) %in% known]
+  do.call(f, c(list(values, drivers), further), quote = TRUE)
+}
+
+# A function of two arguments, and of those of `offered` that it names; any other must have a default.
+check_run_function <- function(f, offered, call = rlang::caller_env()) {
+  check_input(checkmate::check_function(f), "f", call = call)
+  arguments <- names(formals(args(f)))
+  needed <- arguments[vapply(formals(args(f)), rlang::is_missing, NA)]
+  unknown <- setdiff(needed, c(arguments[1:2], offered, "..."))
+  if (length(arguments) < 2 || any(arguments[1:2] %in% offered)) {
+    abort_input(c("{.arg f} has the argument{?s} {.arg {arguments}}; its first two must be values and drivers.",
+                  i = "Write {.code function(values, drivers) ...}; it may have {.arg {offered}} too."), call = call)
+  }
+  if (length(unknown)) {
+    abort_input(c("{.arg f} has {cli::qty(unknown)}argument{?s} {.arg {unknown}} that nothing is known to give to.",
+                  i = "Beside values and drivers it may have {.arg {offered}}; others need a default."), call = call)
+  }
+}
+
+# Parameters made by free(), under their names.
+named_parameters <- function(parameters, call = rlang::caller_env()) {
+  if (!length(parameters) || !all(vapply(parameters, inherits, TRUE, "amiss_free"))) {
+    abort_input(c("Every parameter must be made by {.fun free}; got {length(parameters)} argument{?s}.",
+                  i = "For example {.code free(\"gain\", uniform(0, 2))}."), call = call)
+  }
+  names(parameters) <- vapply(parameters, `[[`, "", "name")
+  twice <- unique(names(parameters)[duplicated(names(parameters))])
+  if (length(twice)) abort_input("Parameter {.val {twice}} is declared twice.", call = call)
+  parameters
 }
 
 #' @export
@@ -44,6 +136,8 @@ print.amiss_function_simulator <- function(x, ...) {
 #' @param hold Values at which the target is held during warm-up, `NA` where it is free; a simulator that cannot be
 #'   held ignores it.
 #' @param threads Number of threads.
+#' @param ... What a method may use or ignore: `time` of each row and the number of the `segment`. Every method must have
+#'   it.
 #' @return `free_parameters()`: named list of [free()]; `driver_names()`: names of the columns that it needs;
 #'   `simulate_runs()`: matrix with one row per interval and one column per run, `NaN` columns where a run failed.
 #' @keywords internal
@@ -56,7 +150,7 @@ driver_names <- function(simulator) UseMethod("driver_names")
 
 #' @rdname free_parameters
 #' @export
-simulate_runs <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L) UseMethod("simulate_runs")
+simulate_runs <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) UseMethod("simulate_runs")
 
 #' @export
 free_parameters.amiss_function_simulator <- function(simulator) simulator$parameters
@@ -65,21 +159,42 @@ free_parameters.amiss_function_simulator <- function(simulator) simulator$parame
 driver_names.amiss_function_simulator <- function(simulator) simulator$boundary
 
 #' @export
-simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L) {
+simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L,
+                                                   time = step_h * seq_len(nrow(drivers)), segment = 1L, ...) {
+  info <- list(step_h = step_h, time = time, segment = segment, hold = hold %||% rep(NA_real_, nrow(drivers)))
   runs <- matrix(NaN, nrow(drivers), nrow(values))
+  stopped <- list()
   for (m in seq_len(nrow(values))) {
-    out <- tryCatch(simulator$f(values[m, ], drivers), error = function(e) e)
+    point <- stats::setNames(values[m, ], colnames(values))
+    out <- tryCatch(call_run_function(simulator$f, point, drivers, info = info), error = function(e) e)
     if (inherits(out, "error")) {
-      warn_input("Run {m} of {.val {simulator$name}} stopped with an error: {conditionMessage(out)}")
+      stopped[[as.character(m)]] <- conditionMessage(out)
       next
     }
-    if (!is.numeric(out) || length(out) != nrow(drivers)) {
-      abort_input(c("Run {m} of {.val {simulator$name}} returned {length(out)} value{?s} of class {.cls {class(out)}}; {nrow(drivers)} numbers were expected, one for each row of the drivers.",
-                    i = "Let the simulator return its output at every row."))
-    }
+    check_run(out, nrow(drivers), simulator, point, m)
     runs[, m] <- out
   }
+  if (length(stopped)) {
+    first <- as.integer(names(stopped)[1])
+    warn_input(c("{length(stopped)} of {nrow(values)} run{?s} of {.val {simulator$name}} stopped with an error.",
+                 x = "Run {first} at {point_words(values[first, , drop = FALSE])}: {stopped[[1]]}"))
+  }
   runs
+}
+
+check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()) {
+  if (is.numeric(out) && length(out) == rows) return(invisible())
+  seen <- trimws(utils::capture.output(utils::str(out, give.attr = FALSE)))[1]
+  abort_input(c(paste("Run {m} of {.val {simulator$name}} returned {length(out)} value{?s} of class",
+                      "{.cls {class(out)}}; {rows} numbers were expected, one for each row of the drivers."),
+                x = "At {point_words(point)} it returned: {seen}",
+                i = "Let the simulator return its output at every row."), call = call)
+}
+
+# A point of the parameters' space, for messages.
+point_words <- function(point) {
+  names <- colnames(point) %||% names(point)
+  paste(names, signif(point, 4), sep = " = ", collapse = ", ")
 }
 
 #' @export
@@ -89,7 +204,7 @@ free_parameters.amiss_zone <- function(simulator) zone_parameters(simulator)
 driver_names.amiss_zone <- function(simulator) zone_boundary(simulator)
 
 #' @export
-simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L) {
+simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
   simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
 }
 
@@ -124,11 +239,16 @@ simulate_measured <- function(simulator, values, measurements, uses, threads, ca
       }
     }
     hold <- ifelse(raw$use[own] == "warmup", raw$y[own], NA_real_)
-    fine <- simulate_runs(simulator, values, raw$drivers[own, needed, drop = FALSE], raw$step_h, hold, threads)
-    block <- measurements$block[own]
-    whole <- !is.na(block)
-    averaged <- rowsum(fine[whole, , drop = FALSE], block[whole], reorder = TRUE) / measurements$per_step
+    fine <- simulate_runs(simulator, values, raw$drivers[own, needed, drop = FALSE], raw$step_h, hold, threads,
+                          time = raw$time[own], segment = segment)
+    averaged <- block_means(fine, measurements$block[own], measurements$per_step)
     out[as.integer(rownames(averaged)), ] <- averaged
   }
   out[rows, , drop = FALSE]
+}
+
+# Rows of the raw record averaged like the measurements; the names of the rows are those of the blocks.
+block_means <- function(fine, block, per_step) {
+  whole <- !is.na(block)
+  rowsum(fine[whole, , drop = FALSE], block[whole], reorder = TRUE) / per_step
 }

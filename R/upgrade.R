@@ -15,7 +15,11 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their coarse Bayes factor;
 #' `candidates$screened` says which.
 #'
-#' @param simulator The base model.
+#' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
+#' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out, and
+#' held-out rows are predicted by emulators of the runs given there.
+#'
+#' @param simulator The base model: a simulator, or an [ensemble()] of given runs.
 #' @param measurements The [measurements()].
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
@@ -32,12 +36,39 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #'   where something of its `doubts` speaks against it; or `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its
 #'   standard error): then it takes the place of something else. `confounded_with` names parameters that are correlated beyond
 #'   0.4 with those that it brought: other parts of the model that could do the same.
+#' @examples
+#' \donttest{
+#' table <- data.frame(hour = 1:120, Te = 5 + 3 * sin(1:120 / 4), Gv = pmax(0, 100 * cos(1:120 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.02 * table$Gv + 0.1 * sin(61 * (1:120)^2)
+#' house <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                       validate = table$hour > 90)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
+#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' })
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 19))
+#' upgrade_model(linear, house, catalogue(sun), runs = 30, control = quick, seed = 1, quiet = TRUE)
+#'
+#' # The same of runs that were made elsewhere, over all rows.
+#' design <- cbind(gain = lhs::randomLHS(40, 1)[, 1], sun = 0.1 * lhs::randomLHS(40, 1)[, 1])
+#' runs <- 20 + tcrossprod(table$Te, design[, "gain"])
+#' sunny <- runs + tcrossprod(table$Gv, design[, "sun"])
+#' parameters <- list(free("gain", uniform(0, 1)), free("sun", uniform(0, 0.1)))
+#' given <- ensemble(design[, "gain", drop = FALSE], runs, parameters[1], measurements = house)
+#' with_sun <- ensemble(design, sunny, parameters, measurements = house)
+#' upgrade_model(given, house, catalogue(mechanism("sun", with_sun, "Gv", "Sun enters.")), control = quick, seed = 1,
+#'               quiet = TRUE)
+#' }
 #' @export
 upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1, quiet = FALSE,
                           checkpoint = NULL) {
-  check_simulator(simulator)
+  given <- inherits(simulator, "amiss_ensemble")
+  if (!given) check_simulator(simulator)
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
   check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
+  check_given(c(if (given) list(base = simulator), lapply(catalogue, `[[`, "edit")), measurements)
   control <- merge_control(upgrade_control, control)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps")
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
@@ -46,7 +77,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin")
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
-  check_enough_runs(runs - round(control$refine * runs), length(free_parameters(simulator)), of = runs)
+  if (!given) check_enough_runs(runs - round(control$refine * runs), length(free_parameters(simulator)), of = runs)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   warn_absent_drivers(catalogue, measurements)
@@ -65,12 +96,17 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
       stopped <- "every mechanism of the catalogue has been adopted"
       break
     }
+    settings$adopted <- setdiff(names(current$fit$emulator$parameters), names(models[[1]]$fit$emulator$parameters))
+    left <- left[vapply(catalogue[left], applies, NA, settings$adopted)]
+    if (!length(left)) {
+      stopped <- "no runs that are left hold what has been adopted"
+      break
+    }
     if (length(models) > control$max_steps) {
       stopped <- sprintf("the limit of %d steps was reached", control$max_steps)
       break
     }
     ordered <- trial_order(catalogue[left], current$attribution)
-    settings$adopted <- setdiff(names(current$fit$emulator$parameters), names(models[[1]]$fit$emulator$parameters))
     trials <- try_mechanisms(current, catalogue[ordered], settings, say)
     candidates <- rbind(candidates, trials$table)
     best <- which.max(trials$table$log10_bf)
@@ -98,6 +134,7 @@ fit_model <- function(simulator, name, settings) {
 }
 
 first_runs <- function(simulator, runs, settings) {
+  if (inherits(simulator, "amiss_ensemble")) return(simulator)
   simulate_design(simulator, settings$measurements, runs, seed = settings$seed, threads = settings$threads)
 }
 
@@ -138,7 +175,9 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
   if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
   settings$keep(list("full", name, plain(simulator)), {
     first <- first %||% screen_model(simulator, name, settings)
-    fit <- if (isFALSE(first$fit$check$passed)) {
+    fit <- if (is.null(first$ensemble$simulator)) {
+      fit_runs(first$ensemble, settings)
+    } else if (isFALSE(first$fit$check$passed)) {
       control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
       refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
                            runs = regional_runs(first$ensemble$parameters, more), first = first)$fit
@@ -180,9 +219,9 @@ plain <- function(x) {
   x
 }
 
-measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(list("measured", name, plain(fit$emulator$simulator)), {
+measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(list("measured", name, plain(model_of(fit))), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)
-  prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)
+  prediction <- stats::predict(fit, use = predictable(fit), seed = settings$seed, threads = settings$threads)
   list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
        prediction = prediction, scores = prediction_scores(prediction))
 })
@@ -208,7 +247,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   coarse <- as_coarse(current$fit)
   fits <- screens <- list()
   for (name in names(catalogue)) {
-    trial <- extend(current$fit$emulator$simulator, catalogue[[name]], settings$adopted)
+    trial <- extend(model_of(current$fit), catalogue[[name]], settings$adopted)
     made <- rlang::try_fetch(if (screening) screen_model(trial, paste(current$name, "+", name), settings, hopeless(fits, coarse, settings$control))
                              else fit_fully(trial, paste(current$name, "+", name), settings),
                              amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
@@ -218,7 +257,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   }
   full <- if (screening) contenders(fits, coarse, settings$control) else names(fits)
   if (screening) for (name in full) {
-    fits[[name]] <- fit_fully(fits[[name]]$emulator$simulator, paste(current$name, "+", name), settings, first = screens[[name]])
+    fits[[name]] <- fit_fully(model_of(fits[[name]]), paste(current$name, "+", name), settings, first = screens[[name]])
     report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
   }
   list(fits = fits, table = trial_table(fits, current, full))

@@ -7,7 +7,101 @@ test_that("runs made elsewhere give the same as runs made here", {
   b <- calibrate(train_emulator(there, m), m, quick_ais, seed = 1)
   expect_equal(b$posterior$log_evidence, a$posterior$log_evidence, tolerance = 1e-6)
   expect_lt(abs(b$log_evidence - a$log_evidence), 0.05)  # corrected here by runs of the simulator, there by none
-  expect_error(predict(b), "made elsewhere", class = "amiss_error_input")
+})
+
+# A record of two days in use, one held out, and runs of the linear simulator over all of it.
+given_world <- function(...) {
+  data <- linear_data(96)
+  m <- linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60, warmup = 6, ...)
+  values <- simulate_design(linear_simulator(), m, runs = 20, seed = 3)$values
+  list(m = m, values = values, runs = simulate_runs(linear_simulator(), values, as.matrix(data["Te"]), step_h = 1),
+       parameters = linear_simulator()$parameters)
+}
+
+test_that("rows of given runs are told by their number or their times", {
+  w <- given_world()
+  make <- function(outputs, ..., m = w$m) ensemble(w$values, outputs, w$parameters, measurements = m, ...)
+  rows <- list(7:60, 61:96)
+  all <- make(w$runs)
+  expect_equal(all$outputs, w$runs[7:60, ])
+  expect_equal(all$hours, 7:60)
+  expect_equal(all$held_out, list(outputs = w$runs[61:96, ], hours = as.numeric(61:96)))
+  expect_equal(make(w$runs[7:96, ]), all)
+  expect_equal(make(w$runs[7:60, ], validation = w$runs[61:96, ]), all)
+  mixed <- c(96:1, 1)
+  expect_error(make(w$runs[mixed, ], time = mixed), "duplicated", class = "amiss_error_input")
+  expect_equal(make(w$runs, time = 1:96), all)
+  expect_equal(make(rbind(0, w$runs[5:96, ]), time = c(2, 5:96)), all)
+  expect_null(make(w$runs[7:60, ])$held_out)
+  expect_null(make(w$runs[7:60, ], time = 7:60)$held_out)
+  refused <- function(what, ...) expect_error(make(...), what, class = "amiss_error_input")
+  refused("50 rows; the measurements have 54 calibration and 36 validation rows, of 96", w$runs[1:50, ])
+  refused("lack 1 of the 54.*calibrate; the first is at 60", w$runs[-60, ], time = (1:96)[-60])
+  refused("lack 6 of the 36.*validate", w$runs[1:90, ], time = 1:90)
+  refused("90 values?, the runs have 96", w$runs, time = 1:90)
+  refused("54 calibration and 36", w$runs[7:60, ], validation = w$runs[1:5, ])
+  refused("each row of the design needs its run", w$runs[7:60, ], validation = w$runs[61:96, -1])
+  expect_error(ensemble(w$values, w$runs[7:60, ], validation = w$runs[61:96, ]), "needs `measurements`", class = "amiss_error_input")
+})
+
+test_that("runs at the step before averaging are averaged like the measurements", {
+  w <- given_world(average = 2)
+  here <- amiss:::simulate_measured(linear_simulator(), w$values, w$m, c("calibrate", "validate"), 1)
+  made <- ensemble(w$values, w$runs, w$parameters, measurements = w$m)
+  expect_equal(rbind(made$outputs, made$held_out$outputs), here)
+  expect_equal(ensemble(w$values, w$runs, w$parameters, measurements = w$m, time = 1:96), made)
+  expect_equal(ensemble(w$values, here, w$parameters, measurements = w$m, time = seq(8, 96, 2)), made)
+})
+
+test_that("runs of other rows are refused, even if as many", {
+  w <- given_world()
+  made <- ensemble(w$values, w$runs, w$parameters, measurements = w$m)
+  data <- linear_data(96)
+  later <- linear_measurements(data, calibrate = data$hour > 42, validate = data$hour <= 42)
+  expect_equal(sum(later$use == "calibrate"), 54)
+  expect_error(train_emulator(made, later), "other rows.*row 1 is at 7 h in the runs, at 43 h", class = "amiss_error_input")
+  expect_error(calibrate(train_emulator(made, w$m), later, quick_ais), "other rows", class = "amiss_error_input")
+  expect_error(train_emulator(simulate_design(linear_simulator(), w$m, runs = 20, seed = 1), later), "other rows", class = "amiss_error_input")
+  timed <- ensemble(w$values, w$runs[7:60, ], w$parameters, time = 7:60)
+  expect_error(train_emulator(timed, later), "other rows", class = "amiss_error_input")
+  expect_s3_class(train_emulator(timed, w$m), "amiss_emulator")
+})
+
+test_that("a calibration of given runs predicts held-out rows as the simulator would", {
+  w <- given_world()
+  made <- ensemble(w$values, w$runs, w$parameters, measurements = w$m)
+  fit <- calibrate(train_emulator(made, w$m), w$m, quick_ais, seed = 1)
+  expect_true(fit$check$passed)
+  given <- predict(fit)
+  fit$emulator$simulator <- linear_simulator()
+  run <- predict(fit)
+  expect_equal(given[c("time", "use", "observed")], run[c("time", "use", "observed")])
+  expect_lt(max(abs(given$mean - run$mean)), 0.02)  # a fifth of the noise
+  expect_lt(max(abs(given$upper95 - run$upper95)), 0.05)
+  fit$emulator["simulator"] <- list(NULL)
+  expect_equal(predict(fit, use = "validate")$mean, given$mean[given$use == "validate"])
+  carried <- predict(fit, discrepancy = TRUE)
+  expect_lt(max(abs(carried$mean - given$mean)), 0.15)  # nothing lacks
+  expect_equal(amiss:::runs_given(fit, c("calibrate", "validate")), w$runs[7:96, ])
+  # The emulator's own uncertainty widens the band.
+  wide <- fit
+  wide$emulator$basis$discarded_sd[] <- 1
+  expect_gt(mean(with(predict(wide, use = "calibrate"), upper95 - lower95)), 3)
+  fit$emulator$given["held_out"] <- list(NULL)
+  expect_error(predict(fit), "none at the validation rows", class = "amiss_error_input")
+  expect_equal(nrow(predict(fit, use = "calibrate")), 54)
+})
+
+test_that("designs that do not fit their parameters are refused", {
+  w <- given_world()
+  refused <- function(what, parameters, values = w$values) {
+    expect_error(ensemble(values, w$runs, parameters), what, class = "amiss_error_input")
+  }
+  refused("column \"gain\" without a parameter", w$parameters["offset"])
+  refused("lacks column \"slope\"", c(w$parameters, list(free("slope", uniform(0, 1)))))
+  refused("\"gain\" is declared twice", c(w$parameters, w$parameters["gain"]))
+  refused("made by", list(offset = uniform(10, 30), gain = uniform(0, 1)))
+  refused("lies? outside the prior of \"gain\"", list(w$parameters$offset, free("gain", uniform(0.1, 1))))
 })
 
 test_that("bad runs are refused or left out with a word", {

@@ -62,6 +62,27 @@ test_that("a loop whose second mechanism loses the first one stops with a reason
                "\"wall\" could not be tried|drops the parameter", class = "amiss_error_input")
 })
 
+test_that("two mechanisms of a function, adopted one after the other, are both kept", {
+  data <- linear_data(120)
+  data$Ws <- withr::with_seed(4, stats::rnorm(120))
+  data$Ti <- data$Ti + 0.01 * data$Gv - 0.5 * data$Ws
+  m <- linear_measurements(data, boundary = ~ Te + Gv + Ws)
+  added <- function(name, column, prior) {
+    mechanism(name, boundary = column, sentence = "It acts.", edit = function(model) {
+      with_parameters(model, free(name, prior), boundary = column,
+                      f = function(values, drivers, base) base(values) + values[[name]] * drivers[, column])
+    })
+  }
+  upgrade <- upgrade_model(linear_simulator(), m, catalogue(added("wind", "Ws", normal(0, 1)), added("sun", "Gv", uniform(0, 0.02))),
+                           runs = 30, seed = 1, quiet = TRUE,
+                           control = list(calibration = quick_ais, attribution = list(surrogates = 19)))
+  expect_setequal(vapply(upgrade$models[-1], `[[`, "", "mechanism"), c("sun", "wind"))
+  last <- upgrade$models[[3]]$fit
+  expect_setequal(names(last$emulator$parameters), c("offset", "gain", "sun", "wind"))
+  expect_equal(coef(last)[c("gain", "sun", "wind")], c(gain = 0.4, sun = 0.01, wind = -0.5), tolerance = 0.1)
+  expect_lt(upgrade$models[[3]]$scores$calibrate[["rmse"]], 0.12)  # the noise is 0.1
+})
+
 test_that("a driver that is not among the conditions is told", {
   m <- linear_measurements(boundary = ~Te)
   make <- function(name, boundary) mechanism(name, function(model) model, boundary, "It acts.")
