@@ -32,8 +32,10 @@ row_condition <- function(text, data, what, call = rlang::caller_env()) {
 
 row_value <- function(part, data, refuse) {
   if (is.symbol(part)) {
-    # A symbol is in the session's own encoding.
-    column <- match(as.character(part), enc2native(names(data)))
+    # The parser keeps the bytes of a name, and in other locales than UTF-8 forgets what they are.
+    name <- as.character(part)
+    if (validUTF8(name)) Encoding(name) <- "UTF-8"
+    column <- match(name, names(data))
     if (is.na(column)) refuse(part, "is not a column of the data")
     return(data[[column]])
   }

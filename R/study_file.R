@@ -10,10 +10,10 @@ read_study_file <- function(path, call = rlang::caller_env()) {
     abort_input(c("The study file {.file {path}} cannot be read as YAML.", x = "{why}"), call = call)
   }
   lines <- strsplit(text, "\r?\n")[[1]]
-  written <- grep("^\\s*(#|$)", lines, value = TRUE, invert = TRUE)
+  if (any(startsWith(lines, "%TAG"))) refuse("Tags cannot be declared in a study.")
+  written <- grep("^(%|\\s*(#|$))", lines, value = TRUE, invert = TRUE)
   marks <- grep("^(---|\\.\\.\\.)(\\s|$)", written)
   if (any(marks > 1 & !(marks == length(written) & startsWith(written[marks], "...")))) refuse("It holds several documents; give each its own file.")
-  if (any(startsWith(written, "%TAG"))) refuse("Tags cannot be declared in a study.")
   tags <- new.env()
   study <- tryCatch(yaml::yaml.load(text, eval.expr = FALSE, handlers = c(plain_words, noted_tags(text, tags))),
                     error = function(e) refuse(conditionMessage(e)))
