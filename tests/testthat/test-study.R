@@ -217,7 +217,6 @@ test_that("a study file is UTF-8, one document, without tags", {
   refuse("several documents", "---", "a: 1", "...", "b: 2")
   expect_equal(read("# note", "---", "a: 1", "..."), list(a = 1L))
   refuse("nested deeper", paste0("a: ", strrep("[", 20), strrep("]", 20)))
-  refuse("nested deeper", paste0(strrep("- ", 20000), "a"))
   levels <- letters[2:9]
   refuse("more than", "a: &a [1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1]",
          sprintf("%s: &%s [%s]", levels, levels, vapply(c("a", levels[-8]), function(l) paste(rep(paste0("*", l), 21), collapse = ","), "")))
