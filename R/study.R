@@ -4,6 +4,9 @@ study_fields <- list(
   comparison = c("models", "method", "truth"),
   optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "runs", "seed", "control", "title"))
 
+# Fields that name a file. All but the data are R files.
+file_fields <- c("data", "model", "catalogue", "models", "truth")
+
 #' Run a study from its file
 #'
 #' A study is a YAML file: what was measured, which rows calibrate and validate, what is to be done with which models
@@ -16,30 +19,39 @@ study_fields <- list(
 #'
 #' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
 #' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`, `average_h`,
-#' `warmup_h` (hours), `calibrate`, `validate` (expressions in the columns of the data), `runs`, `seed` and `control` (as in
+#' `warmup_h` (hours), `calibrate`, `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in
 #' [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
+#'
+#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical. Conditions are
+#' no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, `+ - * /` and `%in% c(...)`.
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It is
 #'   filled only when all is computed; until then its folder `stages` holds the finished models, and the same call goes on
-#'   from there if it was interrupted.
+#'   from there if it was interrupted, as long as the code of the study's R files is the same. What has these names before,
+#'   such as earlier results, is moved into a folder `earlier-` with the time. One run at a time can use the folder.
 #' @param seed Overrides the seed of the file.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
+#' @param trust Whether the R files that the study names may run, and files outside its folder be read: both can do whatever
+#'   you can. If not, such a study is refused, or you are asked at a terminal. Studies that ship with the package need no trust.
 #' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], invisibly; `read_study()`: a list of the
 #'   study's pieces.
 #' @examples
 #' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
 #' @export
-run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE) {
+run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE, trust = FALSE) {
   started <- proc.time()[["elapsed"]]
-  study <- read_study(path, quiet)
+  study <- read_study(path, quiet, trust)
+  seed <- pick_seed(seed %||% study$seed)
+  check_study_control(study)
+  stages <- NULL
   if (!is.null(out)) {
     check_report_tools()
-    check_out(out)
+    held <- hold_folder(out)
+    on.exit(release_folder(held))
+    stages <- file.path(out, "stages", study$code)
   }
-  seed <- pick_seed(seed %||% study$seed)
-  stages <- if (!is.null(out)) file.path(out, "stages")
   result <- if (is.null(study$models)) {
     upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
                   seed = seed, threads = threads, quiet = quiet, checkpoint = stages)
@@ -52,33 +64,45 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE)
   result$wall_s <- proc.time()[["elapsed"]] - started
   if (!is.null(out)) {
     write_study(result, out, quiet)
-    unlink(stages, recursive = TRUE)
+    remove_stages(file.path(out, "stages"))
   }
   invisible(result)
 }
 
 #' @rdname run_study
 #' @export
-read_study <- function(path, quiet = TRUE) {
+read_study <- function(path, quiet = TRUE, trust = FALSE) {
   check_input(checkmate::check_file_exists(path, access = "r"), "path")
-  study <- tryCatch(yaml::read_yaml(path), error = function(e) {
-    abort_input(c("The study file {.file {path}} cannot be read as YAML.", x = "{conditionMessage(e)}"))
-  })
+  check_input(checkmate::check_flag(trust), "trust")
+  study <- read_study_file(path)
   check_study_fields(study, path)
   folder <- dirname(normalizePath(path))
-  data <- study_data(study_path(study$data, folder, "data"))
+  files <- study_files(study, folder)
+  require_trust(files, folder, trust)
+  data <- study_data(files[["data"]])
+  rows <- function(field) row_condition(study[[field]], data, field)
   measure <- function() {
     measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
-                 noise_sd = study$noise_sd, average = study$average_h, calibrate = study$calibrate, validate = study$validate,
+                 noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"), validate = rows("validate"),
                  warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "")
   }
-  pieces <- if (is.null(study$models)) upgrade_pieces(study, folder) else comparison_pieces(study, folder)
+  pieces <- if (is.null(study$models)) upgrade_pieces(files) else comparison_pieces(files, study$method)
   c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150, control = study$control),
-    pieces, list(measurements = if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure()))
+    pieces, list(measurements = if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure(),
+                 code = content_hash(lapply(files[is_code(files)], study_code))))
+}
+
+# The options that can be checked before anything is computed.
+check_study_control <- function(study, call = rlang::caller_env()) {
+  control <- merge_control(if (is.null(study$models)) upgrade_control else comparison_control, study$control, call = call)
+  fill_emulator_control(control$emulator, call)
+  calibration <- if (identical(study$method, "paper")) paper_control else calibration_control
+  merge_control(calibration, control$calibration, "control$calibration", call = call)
+  merge_control(attribution_control, control$attribution, "control$attribution", call = call)
 }
 
 check_study_fields <- function(study, path, call = rlang::caller_env()) {
-  if (!is.list(study)) abort_input("The study file {.file {path}} holds no fields.", call = call)
+  if (!is.list(study) || is.null(names(study))) abort_input("The study file {.file {path}} holds no fields.", call = call)
   unknown <- setdiff(names(study), unlist(study_fields))
   if (length(unknown)) {
     abort_input(c("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",
@@ -96,33 +120,65 @@ check_study_fields <- function(study, path, call = rlang::caller_env()) {
     abort_input(c("The study file {.file {path}} lacks {cli::qty(absent)}field{?s} {.field {absent}}.",
                   i = if (any(absent %in% study_fields$upgrade)) "Or name {.field models}, to compare several."), call = call)
   }
+  for (field in c("study", "title", "unit", "time", "target")) {
+    check_input(checkmate::check_string(study[[field]], null.ok = field %in% c("title", "unit")), field,
+                "Numbers and dates are text in quotes only.", call = call)
+  }
+}
+
+# The files that a study names, by their fields.
+study_files <- function(study, folder, call = rlang::caller_env()) {
+  fields <- intersect(file_fields, names(study))
+  vapply(fields, function(field) study_path(study[[field]], folder, field, call), "")
+}
+
+# R files are code that their author asks to run.
+is_code <- function(files) names(files) != "data" | grepl("\\.[rR]$", files)
+
+# A study may read data in its folder, and what ships with the package; all else asks for trust.
+require_trust <- function(files, folder, trust, call = rlang::caller_env()) {
+  shipped <- normalizePath(system.file("studies", package = "amiss"))
+  outside <- !fs::path_has_parent(normalizePath(files), folder)
+  if (trust || folder == shipped || !any(is_code(files) | outside)) return(invisible())
+  code <- files[is_code(files)]
+  other <- files[outside & !is_code(files)]
+  if (rlang::is_interactive()) {
+    question <- paste0("The study asks to use these files, which can do whatever you can:\n", paste(c(code, other), collapse = "\n"), "\nTrust it?")
+    if (isTRUE(utils::askYesNo(question, default = FALSE))) return(invisible())
+  }
+  cli::cli_abort(c("The study asks for trust that was not given.",
+                   x = if (length(code)) "{cli::qty(code)}It runs the R code of {.file {code}}.",
+                   x = if (length(other)) "{cli::qty(other)}It reads {.file {other}}, outside its folder.",
+                   i = "If you trust its author, say {.code trust = TRUE}, or {.code --trust} on the command line."),
+                 class = c("amiss_error_trust", "amiss_error_input", "amiss_error"), call = short_call(call))
 }
 
 study_data <- function(path, call = rlang::caller_env()) {
-  if (grepl("\\.[rR]$", path)) {
+  if (is_code(c(data = path))) {
     data <- source_value(path, "data", call)
     check_input(checkmate::check_data_frame(data), "data", "Let the R file end with a data frame.", call = call)
     return(data)
   }
-  tryCatch(utils::read.csv(path, stringsAsFactors = FALSE, check.names = FALSE), error = function(e) {
+  text <- read_utf8(path, "data", call)
+  tryCatch(utils::read.csv(text = text, stringsAsFactors = FALSE, check.names = FALSE), error = function(e) {
     abort_input(c("The data file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
   })
 }
 
-upgrade_pieces <- function(study, folder, call = rlang::caller_env()) {
-  model <- source_value(study_path(study$model, folder, "model", call), "model", call)
+upgrade_pieces <- function(files, call = rlang::caller_env()) {
+  model <- source_value(files[["model"]], "model", call)
   check_simulator(model, call)
-  catalogue <- source_value(study_path(study$catalogue, folder, "catalogue", call), "catalogue", call)
+  catalogue <- source_value(files[["catalogue"]], "catalogue", call)
   check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue", call = call)
   list(model = model, catalogue = catalogue)
 }
 
-comparison_pieces <- function(study, folder, call = rlang::caller_env()) {
-  models <- source_value(study_path(study$models, folder, "models", call), "models", call)
+comparison_pieces <- function(files, method, call = rlang::caller_env()) {
+  models <- source_value(files[["models"]], "models", call)
   check_models(models, call)
-  method <- study$method %||% "paper"
+  method <- method %||% "paper"
   check_input(checkmate::check_choice(method, comparison_methods), "method", call = call)
-  truth <- if (!is.null(study$truth)) source_value(study_path(study$truth, folder, "truth", call), "truth", call)
+  truth <- if ("truth" %in% names(files)) source_value(files[["truth"]], "truth", call)
   check_truth(truth, call)
   list(models = models, method = method, truth = truth)
 }
@@ -147,39 +203,17 @@ source_value <- function(path, field, call = rlang::caller_env()) {
 }
 
 sys.source_value <- function(path) {
-  source(path, local = new.env(parent = new.env(parent = asNamespace("amiss"))), chdir = TRUE)$value
+  scope <- new.env(parent = new.env(parent = asNamespace("amiss")))
+  code <- study_code(path)
+  before <- setwd(dirname(path))
+  on.exit(setwd(before))
+  value <- NULL
+  for (expression in code) value <- eval(expression, scope)
+  value
 }
 
-check_out <- function(out, call = rlang::caller_env()) {
-  check_input(checkmate::check_string(out, min.chars = 1), "out", call = call)
-  made <- !dir.exists(out) && suppressWarnings(dir.create(out, recursive = TRUE))
-  probe <- file.path(out, "probe")
-  usable <- dir.exists(out) && suppressWarnings(file.create(probe))
-  unlink(if (made) out else probe, recursive = TRUE)
-  if (!usable) {
-    abort_input(c("{.arg out} = {.file {out}} is not a folder that can be written.", i = "Name another folder; it is made if it does not exist."), call = call)
-  }
-}
-
-# Everything is made elsewhere, copied into the folder and renamed when complete: nothing half-written stays.
-write_study <- function(result, out, quiet = FALSE) {
-  work <- tempfile("amiss-")
-  dir.create(file.path(work, "figures"), recursive = TRUE)
-  dir.create(out, recursive = TRUE, showWarnings = FALSE)
-  staging <- file.path(out, basename(work))
-  on.exit(unlink(c(work, staging), recursive = TRUE))
-  save_figures(result, file.path(work, "figures"))
-  saveRDS(result, file.path(work, "result.rds"))
-  jsonlite::write_json(result_list(result), file.path(work, "result.json"), auto_unbox = TRUE, digits = NA,
-                       null = "null", na = "null", pretty = TRUE)
-  report(result, file.path(work, "report.html"))
-  if (!file.copy(work, out, recursive = TRUE)) abort_input("The results could not be copied into {.file {out}}.")
-  for (name in dir(work)) {
-    unlink(file.path(out, name), recursive = TRUE)
-    if (!file.rename(file.path(staging, name), file.path(out, name))) abort_input("{.file {name}} could not be moved into {.file {out}}.")
-  }
-  if (!quiet) cli::cli_alert_success("Written to {.file {out}}: report.html, figures/, result.rds, result.json")
-}
+# The parsed expressions of an R file: its comments and layout make no difference.
+study_code <- function(path) as.list(parse(text = read_utf8(path, "code"), keep.source = FALSE, encoding = "UTF-8"))
 
 # The result as plain lists, with the fields of result.json.
 result_list <- function(x) UseMethod("result_list")

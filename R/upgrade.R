@@ -193,32 +193,6 @@ progress <- function(quiet) {
   if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
 }
 
-# A function that returns a value kept under a key, or evaluates and keeps it. What is kept belongs to one set of
-# arguments only: its hash is part of the file's name.
-checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
-  if (is.null(folder)) return(function(name, value) value)
-  check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
-  if (!dir.exists(folder) && !dir.create(folder, recursive = TRUE, showWarnings = FALSE)) {
-    abort_input("The folder {.file {folder}} for {.arg checkpoint} cannot be made.", call = call)
-  }
-  key <- rlang::hash(list(plain(arguments), utils::packageVersion("amiss")))
-  function(name, value) {
-    file <- file.path(folder, paste0(rlang::hash(list(key, name)), ".rds"))
-    if (file.exists(file)) return(readRDS(file))
-    part <- tempfile("part-", folder)
-    saveRDS(value, part)
-    file.rename(part, file)
-    value
-  }
-}
-
-# Functions as their text: the same in every session, which closures and their byte code are not.
-plain <- function(x) {
-  if (is.function(x)) return(deparse(x))
-  if (is.list(x)) return(lapply(unclass(x), plain))
-  x
-}
-
 measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(list("measured", name, plain(model_of(fit))), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)
   prediction <- stats::predict(fit, use = predictable(fit), seed = settings$seed, threads = settings$threads)

@@ -1,0 +1,116 @@
+# Finished work kept in files, so that an interrupted run goes on where it stopped.
+
+# A function that returns a value kept under a key, or evaluates and keeps it. What is kept belongs to one set of
+# arguments only: its hash is the file's name. What cannot be kept or read again costs time, never the run.
+checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
+  if (is.null(folder)) return(function(name, value) value)
+  check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
+  if (file.exists(folder) && !dir.exists(folder)) {
+    abort_input("{.arg checkpoint} = {.file {folder}} is a file, not a folder.", call = call)
+  }
+  key <- list(plain(arguments), as.character(utils::packageVersion("amiss")))
+  function(name, value) {
+    id <- content_hash(list(key, name))
+    file <- file.path(folder, paste0("amiss-", id, ".rds"))
+    kept <- read_kept(file, id)
+    if (!is.null(kept)) return(kept$value)
+    force(value)
+    keep_value(value, file, id)
+    value
+  }
+}
+
+# NULL if there is none, or none that is whole and of this key.
+read_kept <- function(file, id) {
+  if (!file.exists(file)) return(NULL)
+  kept <- tryCatch(suppressWarnings(unpack(readRDS(file), id)), error = function(e) NULL)
+  if (is.null(kept)) cli::cli_inform(c("!" = "The kept file {.file {file}} is damaged or not from this package; its work is done again."), class = "amiss_message_kept")
+  kept
+}
+
+# The value as bytes beside their hash: a change of any of them is seen.
+pack <- function(value, id) {
+  bytes <- serialize(value, NULL)
+  list(amiss = "kept", id = id, hash = rlang::hash(bytes), bytes = bytes)
+}
+
+unpack <- function(packed, id) {
+  whole <- is.list(packed) && identical(packed$amiss, "kept") && identical(packed$id, id) && identical(packed$hash, rlang::hash(packed$bytes))
+  if (whole) list(value = unserialize(packed$bytes))
+}
+
+# Written under a name of its own, read back, then renamed: under its name a file is whole.
+keep_value <- function(value, file, id, write = saveRDS) {
+  folder <- dirname(file)
+  dir.create(folder, recursive = TRUE, showWarnings = FALSE)
+  part <- tempfile("amiss-part-", folder)
+  on.exit(unlink(part))
+  packed <- pack(value, id)
+  done <- tryCatch(suppressWarnings({
+    write(packed, part)
+    identical(readRDS(part), packed) && file.rename(part, file)
+  }), error = function(e) FALSE)
+  if (!done) cli::cli_inform(c("!" = "A finished model could not be kept in {.file {folder}}; the run goes on without it.", i = "Is the disk full?"), class = "amiss_message_kept")
+}
+
+# Removes what a keeper made in a folder, and the folder if nothing else is in it.
+remove_kept <- function(folder) {
+  unlink(dir(folder, "^amiss-([0-9a-f]{32}[.]rds|part-[0-9a-f]+)$", full.names = TRUE))
+  remove_empty(folder)
+}
+
+# The same in the folders of a study, which are named by a hash.
+remove_stages <- function(stages) {
+  for (folder in dir(stages, "^[0-9a-f]{32}$", full.names = TRUE)) remove_kept(folder)
+  remove_empty(stages)
+}
+
+remove_empty <- function(folder) {
+  if (dir.exists(folder) && !length(dir(folder, all.files = TRUE, no.. = TRUE))) unlink(folder, recursive = TRUE)
+}
+
+# The same for equal contents in every session: version 2 knows no compact forms of vectors.
+content_hash <- function(x) rlang::hash(serialize(x, NULL, version = 2))
+
+# A value as plain lists that are equal where it would work alike: functions as their text and all that they capture, by value,
+# environments as their contents. Packages are their version, and of the global environment only what a function names.
+plain <- function(x, seen = new.env()) {
+  if (is.environment(x)) return(plain_environment(x, seen))
+  if (is.primitive(x)) return(deparse(x))
+  if (is.function(x)) return(list(code(x), plain(environment(x), seen), named_globals(x, seen)))
+  if (is.symbol(x)) return(as.character(x))
+  attributes <- attributes(x)
+  attributes <- attributes[setdiff(names(attributes), c("names", "srcref", "srcfile", "wholeSrcref"))]
+  values <- if (is.language(x)) code(x) else if (is.list(x)) lapply(unclass(x), plain, seen) else x
+  if ((is.language(x) || is.list(x)) && length(attributes)) list(values, lapply(attributes, plain, seen)) else values
+}
+
+code <- function(x) deparse(x, control = c("keepNA", "keepInteger", "niceNames", "digits17"))
+
+plain_environment <- function(x, seen) {
+  if (isNamespace(x)) return(c("package", getNamespaceName(x), as.character(getNamespaceVersion(x))))
+  name <- environmentName(x)
+  if (name %in% c("R_GlobalEnv", "R_EmptyEnv", "base") || startsWith(name, "package:")) return(name)
+  address <- rlang::obj_address(x)
+  if (!is.null(seen[[address]])) return(list("seen", seen[[address]]))
+  seen[[address]] <- length(seen) + 1
+  list(bindings(x, ls(x, all.names = TRUE, sorted = FALSE), seen), plain(parent.env(x), seen))
+}
+
+# What a function takes from the global environment, each once.
+named_globals <- function(f, seen) {
+  if (isNamespace(environment(f))) return(list())
+  names <- intersect(unlist(lapply(as.list(f), all.names)), ls(globalenv(), all.names = TRUE))
+  names <- names[!vapply(paste("global", names), exists, NA, envir = seen, inherits = FALSE)]
+  for (name in names) seen[[paste("global", name)]] <- length(seen) + 1
+  bindings(globalenv(), names, seen)
+}
+
+bindings <- function(x, names, seen) {
+  names <- sort(names, method = "radix")
+  value <- function(name) {
+    if (rlang::env_binding_are_active(x, name)) return("active")
+    tryCatch(plain(get(name, x, inherits = FALSE), seen), error = function(e) "none")
+  }
+  stats::setNames(lapply(names, value), names)
+}

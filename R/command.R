@@ -1,0 +1,66 @@
+# The command line of exec/amiss. Exit status: 0 done, 1 failed, 2 bad usage.
+
+command_parser <- function() {
+  option <- function(name, help, ...) optparse::make_option(paste0("--", name), help = help, ...)
+  switch <- function(name, help) option(name, help, action = "store_true", default = FALSE)
+  optparse::OptionParser(usage = "usage: amiss run STUDY.yml --out DIR [options]\n       amiss --help | --version", add_help_option = FALSE, option_list = list(
+    option("out", "folder for report.html, figures/, result.rds and result.json", metavar = "DIR"),
+    option("threads", "threads to use (1); results do not depend on it", default = "1", metavar = "N"),
+    option("seed", "seed of the random numbers; overrides that of the study", metavar = "N"),
+    switch("trust", "run the R files that the study names, and read files outside its folder"),
+    switch("quiet", "no progress on stderr"),
+    switch("version", "the version, and nothing else"),
+    optparse::make_option(c("-h", "--help"), help = "this text, and nothing else", action = "store_true", default = FALSE)),
+    description = "\nRuns the study and writes its results into DIR.")
+}
+
+run_command <- function(words) {
+  parser <- command_parser()
+  help <- utils::capture.output(optparse::print_help(parser))
+  asked <- tryCatch(read_command(words, parser), error = identity)
+  if (inherits(asked, "error")) {
+    message(paste(c(paste("amiss:", conditionMessage(asked)), help), collapse = "\n"))
+    return(2)
+  }
+  told <- if (asked$help) help else if (asked$version) paste("amiss", utils::packageVersion("amiss"))
+  if (!is.null(told)) {
+    writeLines(told)
+    return(0)
+  }
+  tryCatch({
+    result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads, quiet = asked$quiet, trust = asked$trust)
+    if (!asked$quiet) print(result)
+    0
+  }, error = function(e) {
+    message("amiss: ", conditionMessage(e))
+    1
+  }, interrupt = function(e) {
+    message("amiss: interrupted; the same command goes on where it stopped")
+    1
+  })
+}
+
+# What is asked for; an error says what is wrong with the usage.
+read_command <- function(words, parser) {
+  parsed <- optparse::parse_args(parser, words, print_help_and_exit = FALSE, positional_arguments = TRUE)
+  asked <- parsed$options
+  names <- parsed$args
+  if (identical(names, "help")) asked$help <- TRUE
+  if (asked$help || asked$version) return(asked)
+  if (!length(names)) stop("no command given")
+  if (names[1] != "run") stop("unknown command '", names[1], "'")
+  if (length(names) != 2) stop("one study file is needed, not ", length(names) - 1)
+  if (is.null(asked$out)) stop("'--out DIR' is needed")
+  if (!file.exists(names[2])) stop("the study file '", names[2], "' does not exist")
+  asked$study <- names[2]
+  asked$threads <- whole_number(asked$threads, "threads", 1)
+  if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0)
+  asked
+}
+
+whole_number <- function(text, option, least) {
+  number <- suppressWarnings(as.numeric(text))
+  whole <- checkmate::test_number(number, lower = least, upper = 2^53, finite = TRUE) && number == round(number)
+  if (!whole) stop("'--", option, "' needs a whole number of at least ", least, ", not '", text, "'")
+  number
+}

@@ -1,0 +1,72 @@
+# The folder of a study's results: one run at a time, whole results or none, and nothing of anybody else's removed.
+
+# Makes the folder if need be and holds it until release_folder(). The lock is the operating system's: it ends with the
+# process that holds it, however that ends.
+hold_folder <- function(out, call = rlang::caller_env()) {
+  check_input(checkmate::check_string(out, min.chars = 1), "out", call = call)
+  made <- !dir.exists(out) && suppressWarnings(dir.create(out, recursive = TRUE))
+  held <- list(out = out, made = made, holder = file.path(out, ".amiss-holder"))
+  lock <- tryCatch(suppressWarnings(list(filelock::lock(file.path(out, ".amiss-lock"), timeout = 0))), error = function(e) NULL)
+  if (is.null(lock)) {
+    abort_input(c("{.arg out} = {.file {out}} is not a folder that can be written.",
+                  i = "Name another folder; it is made if it does not exist."), call = call)
+  }
+  if (is.null(lock[[1]])) {
+    holder <- tryCatch(suppressWarnings(readLines(held$holder)), error = function(e) "another process")
+    abort_input(c("The folder {.file {out}} is in use by {holder}.", i = "Wait until it has ended, or name another folder."), call = call)
+  }
+  writeLines(sprintf("process %d on %s since %s", Sys.getpid(), Sys.info()[["nodename"]], format(Sys.time(), "%Y-%m-%d %H:%M:%S %Z")), held$holder)
+  c(held, lock = lock)
+}
+
+# What interrupted runs left half-written goes too: nobody else writes here now.
+release_folder <- function(held) {
+  unlink(dir(held$out, "^amiss-new-[0-9a-f]+$", full.names = TRUE), recursive = TRUE)
+  unlink(c(held$holder, file.path(held$out, ".amiss-lock")))
+  filelock::unlock(held$lock)
+  if (held$made) remove_empty(held$out)
+}
+
+# Everything is made elsewhere and copied beside its place; then what has these names is moved aside as a whole and the new
+# moved in. Results of two runs never stand side by side.
+write_study <- function(result, out, quiet = FALSE) {
+  work <- tempfile("amiss-new-")
+  on.exit(unlink(work, recursive = TRUE))
+  dir.create(file.path(work, "figures"), recursive = TRUE)
+  save_figures(result, file.path(work, "figures"))
+  saveRDS(result, file.path(work, "result.rds"))
+  jsonlite::write_json(result_list(result), file.path(work, "result.json"), auto_unbox = TRUE, digits = NA,
+                       null = "null", na = "null", pretty = TRUE)
+  report(result, file.path(work, "report.html"))
+  staging <- copy_whole(work, out)
+  earlier <- intersect(dir(work), dir(out))
+  if (length(earlier)) {
+    aside <- tempfile(format(Sys.time(), "earlier-%Y-%m-%d-%H%M%S-"), out)
+    dir.create(aside)
+    move_files(earlier, out, aside)
+    if (!quiet) cli::cli_alert_info("What stood in {.file {out}} under the names of the results is in {.file {aside}}")
+  }
+  move_files(dir(work), staging, out)
+  if (!quiet) cli::cli_alert_success("Written to {.file {out}}: report.html, figures/, result.rds, result.json")
+}
+
+# A copy in the folder, under a name of its own, complete or refused.
+copy_whole <- function(work, out, copy = file.copy, call = rlang::caller_env()) {
+  sizes <- function(folder) file.size(file.path(folder, dir(work, recursive = TRUE)))
+  staging <- file.path(out, basename(work))
+  copied <- suppressWarnings(copy(work, out, recursive = TRUE))
+  if (!copied || !identical(sizes(staging), sizes(work))) {
+    unlink(staging, recursive = TRUE)
+    abort_input(c("The results could not be copied into {.file {out}}.", i = "Is the disk full? What was computed is kept: the same call goes on from it."),
+                call = call)
+  }
+  staging
+}
+
+move_files <- function(names, from, to, call = rlang::caller_env()) {
+  for (name in names) {
+    if (!suppressWarnings(file.rename(file.path(from, name), file.path(to, name)))) {
+      abort_input("{.file {file.path(from, name)}} could not be moved into {.file {to}}.", call = call)
+    }
+  }
+}

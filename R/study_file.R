@@ -1,0 +1,71 @@
+# A study file is data: UTF-8 whatever the locale, one YAML document, no tags, and of its words only true and false are
+# logical.
+
+deepest_study <- 8
+largest_study <- 10000
+
+read_study_file <- function(path, call = rlang::caller_env()) {
+  text <- read_utf8(path, "study", call)
+  refuse <- function(why) {
+    abort_input(c("The study file {.file {path}} cannot be read as YAML.", x = "{why}"), call = call)
+  }
+  lines <- strsplit(text, "\r?\n")[[1]]
+  if (any(startsWith(lines, "%TAG"))) refuse("Tags cannot be declared in a study.")
+  written <- grep("^(%|\\s*(#|$))", lines, value = TRUE, invert = TRUE)
+  marks <- grep("^(---|\\.\\.\\.)(\\s|$)", written)
+  if (any(marks > 1 & !(marks == length(written) & startsWith(written[marks], "...")))) refuse("It holds several documents; give each its own file.")
+  tags <- new.env()
+  study <- tryCatch(yaml::yaml.load(text, eval.expr = FALSE, handlers = c(plain_words, noted_tags(text, tags))),
+                    error = function(e) refuse(conditionMessage(e)))
+  if (length(tags)) refuse(paste("It has the tag", ls(tags)[1], "which is not known."))
+  check_study_size(study, refuse)
+  study
+}
+
+# YAML 1.1 takes yes, no, on, off, y and n for logical; here they stay text, so that a column may be called y.
+plain_words <- list(
+  "bool#yes" = function(word) if (tolower(word) == "true") TRUE else word,
+  "bool#no" = function(word) if (tolower(word) == "false") FALSE else word)
+
+# The parser drops tags that it does not know. A handler for every word that could be one notes those that are.
+noted_tags <- function(text, tags) {
+  words <- unique(regmatches(text, gregexpr("![^][:space:],{}[]+", text))[[1]])
+  names <- sub("^!<?!?(tag:yaml.org,2002:)?([^>]*)>?$", "\\2", words)
+  foreign <- !names %in% c("", "str", "int", "float", "bool", "null", "seq", "map")
+  note <- function(word) function(value) assign(word, TRUE, tags)
+  stats::setNames(lapply(words[foreign], note), names[foreign])
+}
+
+# Aliases can make a short text a huge tree: the walk stops at the first value too many.
+check_study_size <- function(study, refuse) {
+  values <- 0
+  walk <- function(x, depth) {
+    values <<- values + length(x)
+    if (depth > deepest_study) refuse(paste("It is nested deeper than", deepest_study, "levels."))
+    if (values > largest_study) refuse(paste("It holds more than", largest_study, "values."))
+    if (is.list(x)) for (part in x) walk(part, depth + 1)
+  }
+  walk(study, 1)
+}
+
+# The text of a regular file, marked as UTF-8, without a byte-order mark.
+read_utf8 <- function(path, field, call = rlang::caller_env()) {
+  if (!fs::is_file(path, follow = TRUE)) {
+    abort_input(c("The {.field {field}} file {.file {path}} is not a regular file.", i = "Name a file that can be read from its start to its end."),
+                call = call)
+  }
+  bytes <- tryCatch(suppressWarnings(readBin(path, "raw", file.size(path))), error = function(e) {
+    abort_input(c("The {.field {field}} file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
+  })
+  mark <- as.raw(c(0xef, 0xbb, 0xbf))
+  if (identical(utils::head(bytes, 3), mark)) bytes <- bytes[-(1:3)]
+  line_of <- function(byte) 1 + sum(bytes[seq_len(byte)] == as.raw(10))
+  invalid <- function(line) {
+    abort_input(c("The {.field {field}} file {.file {path}} is not UTF-8 text: line {line}.", i = "Save it with the encoding UTF-8."), call = call)
+  }
+  if (any(bytes == as.raw(0))) invalid(line_of(which(bytes == as.raw(0))[1]))
+  text <- rawToChar(bytes)
+  if (!validUTF8(text)) invalid(which(!validUTF8(strsplit(text, "\n", fixed = TRUE, useBytes = TRUE)[[1]]))[1])
+  Encoding(text) <- "UTF-8"
+  text
+}
