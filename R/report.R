@@ -101,7 +101,11 @@ power_of_ten <- function(x) ifelse(x < 4.5, format_each_comma(signif(10^x, 2)), 
 
 format_each_comma <- function(x) vapply(x, format, "", big.mark = ",", scientific = FALSE)
 
-odds <- function(x) paste(power_of_ten(abs(x)), if (x >= 0) "to 1 in favour" else "to 1 against")
+odds <- function(x) {
+  size <- power_of_ten(abs(x))
+  if (size == "1") return("1 to 1, neither for nor against")
+  paste(size, if (x >= 0) "to 1 in favour" else "to 1 against")
+}
 
 evidence_sentence <- function(row) {
   sprintf("The evidence for %s is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf), odds_interval(c(row$lower95, row$upper95)))
@@ -321,7 +325,7 @@ method_table <- function(upgrade) {
 #' Markdown templates are also offered by RStudio (*Diagnosis of a simulation*, *Comparison of models*).
 #'
 #' @param x An upgrade ([upgrade_model()]) or a comparison ([compare_models()]).
-#' @param file Name of the HTML file; its folder must exist. The file appears only when it is complete.
+#' @param file Name of the HTML file, ending in `.html`; its folder must exist. The file appears only when it is complete.
 #' @param quiet No messages of R Markdown.
 #' @return `file`, invisibly.
 #' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the figures alone.
@@ -345,12 +349,16 @@ report <- function(x, file, quiet = TRUE) {
 
 # ---- what the templates are written with
 
-# Text as it is: nothing in it is markup, but 10^3 is set as a power. Brackets as entities: a backslash before one opens
-# a formula.
+# Text as it is: nothing in it is markup, but 10^3 is set as a power. Entities, as pandoc reads them after everything that
+# could be markup: a colon makes a bare address a link, a number with a point at the beginning makes a list.
 markdown_text <- function(x) {
-  plain <- gsub("([\\\\`*_{}$^~|@#<>&])", "\\\\\\1", x, perl = TRUE)
-  plain <- gsub("]", "&#93;", gsub("[", "&#91;", plain, fixed = TRUE), fixed = TRUE)
-  gsub("([0-9]) %", "\\1\u00a0%", gsub("10\\\\\\^(-?[0-9]+)", "10^\\1^", plain, perl = TRUE))
+  plain <- gsub("&", "&#38;", trimws(gsub("[[:space:]]+", " ", x)), fixed = TRUE)
+  for (sign in strsplit("\\`*_{}[]$^~|@<>:()\"'+=-!", "")[[1]]) {
+    plain <- gsub(sign, sprintf("&#%d;", utf8ToInt(sign)), plain, fixed = TRUE)
+  }
+  plain <- sub("^#", "&#35;", sub("^([0-9A-Za-z]+)\\.", "\\1&#46;", plain))
+  plain <- gsub("10&#94;((&#45;)?[0-9]+)", "10^\\1^", plain)
+  gsub("([0-9]) %", "\\1\u00a0%", plain)
 }
 
 markdown_items <- function(x) cat("\n", paste0("- ", markdown_text(x), "\n"), "\n", sep = "")
@@ -358,7 +366,7 @@ markdown_items <- function(x) cat("\n", paste0("- ", markdown_text(x), "\n"), "\
 markdown_paragraphs <- function(x) cat("\n", paste0(markdown_text(x), "\n\n"), sep = "")
 
 html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
-  cell <- function(x, tag) paste0("<", tag, ">", htmltools::htmlEscape(as.character(x)), "</", tag, ">", collapse = "")
+  cell <- function(x, tag) paste0("<", tag, ">", html_text(x), "</", tag, ">", collapse = "")
   rows <- vapply(seq_len(nrow(table)), function(i) {
     paste0("<tr", if (bold[i]) " class=\"adopted\"", ">", cell(unlist(lapply(table[i, ], as.character)), "td"), "</tr>")
   }, "")
@@ -366,7 +374,12 @@ html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
       "\n</tbody></table></div>\n```\n", sep = "")
 }
 
-html_tile <- function(value, words) paste0("<div><b>", htmltools::htmlEscape(value), "</b>", words, "</div>")
+html_tile <- function(value, words) paste0("<div><b>", html_text(value), "</b>", words, "</div>")
+
+# Three backticks would end the raw block that holds it.
+html_text <- function(x) {
+  gsub("`", "&#96;", htmltools::htmlEscape(gsub("[[:space:]]+", " ", as.character(x))), fixed = TRUE)
+}
 
 check_report_file <- function(file, call = rlang::caller_env()) {
   check_input(checkmate::check_string(file, min.chars = 1), "file", call = call)
@@ -375,6 +388,10 @@ check_report_file <- function(file, call = rlang::caller_env()) {
     abort_input(c("The folder {.file {folder}} of {.arg file} = {.file {file}} does not exist.", i = "Make it with {.fun dir.create}, or choose another."), call = call)
   }
   if (dir.exists(file)) abort_input(c("{.arg file} = {.file {file}} is a folder.", i = "Give the name of the HTML file in it."), call = call)
+  if (!grepl("\\.html?$", file, ignore.case = TRUE)) {
+    abort_input(c("{.arg file} = {.file {file}} does not end in {.code .html}: a report is written as HTML only.",
+                  i = "Give a name that ends in {.code .html}; a browser prints it to PDF."), call = call)
+  }
   if (file.access(folder, 2) != 0) abort_input("The folder {.file {folder}} cannot be written.", call = call)
 }
 

@@ -114,6 +114,24 @@ test_that("odds are written out while they can be read", {
   expect_identical(odds(3.924), "8,400 to 1 in favour")
   expect_identical(odds(168.2), "10^168 to 1 in favour")
   expect_identical(odds(-17), "10^17 to 1 against")
+  expect_identical(odds(0.01), "1 to 1, neither for nor against")
+})
+
+test_that("text from data is never markup", {
+  skip_without_pandoc()
+  hostile <- c("javascript:alert(1)", "see http://a.b/c", "```\n\n# x", "1. a", "- a", "[a](b)", "![a](b)", "$a$ \\(b\\) 'c'",
+               "<script>alert(1)</script>", "&lt;b&gt;", "{.a} *b* _c_", "# h", ": d", "a | b", "~~s~~ @k", "`r stop()`")
+  file <- withr::local_tempfile(fileext = ".md")
+  html <- withr::local_tempfile(fileext = ".html")
+  for (text in hostile) {
+    writeLines(markdown_text(text), file)
+    rmarkdown::pandoc_convert(file, "html", "markdown+autolink_bare_uris+tex_math_single_backslash", html)
+    expect_identical(paste(readLines(html), collapse = "\n"),
+                     paste0("<p>", gsub("\\s+", " ", htmltools::htmlEscape(text)), "</p>"), info = text)
+  }
+  sheet <- utils::capture.output(html_sheet(data.frame(unit = "```\n<b>")))
+  expect_length(grep("```", sheet), 2)
+  expect_match(sheet, "&#96;&#96;&#96; &lt;b&gt;", all = FALSE, fixed = TRUE)
 })
 
 test_that("a report is one file that names the cause and needs nothing from outside", {
@@ -134,6 +152,7 @@ test_that("a report is refused with a reason, and nothing half-written stays", {
   folder <- withr::local_tempdir()
   expect_error(report(small_upgrade(), file.path(folder, "absent", "a.html")), "does not exist", class = "amiss_error_input")
   expect_error(report(small_upgrade(), folder), "is a folder", class = "amiss_error_input")
+  expect_error(report(small_upgrade(), file.path(folder, "a.pdf")), "HTML only", class = "amiss_error_input")
   expect_error(report(list(), file.path(folder, "a.html")), "amiss_upgrade", class = "amiss_error_input")
   skip_without_pandoc()
   broken <- small_upgrade()
