@@ -17,7 +17,7 @@
 #'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
 #' })
 #' leaks <- mechanism("leaks", boundary = "Te", sentence = "Air enters.", edit = function(zone) {
-#'   add_component(zone, infiltration("leaks", free("ach", uniform(0, 1), "1/h"), outside = "Te"))
+#'   add_component(zone, zone_infiltration("leaks", free("ach", uniform(0, 1), "1/h"), outside = "Te"))
 #' })
 #' catalogue(sun, leaks)
 #' @export
