@@ -3,10 +3,11 @@
 #' What R's users expect of a fitted model; of an upgrade it is that of its last model.
 #'
 #' @section The likelihood:
-#' `logLik()` is an error, and with it `AIC()` and `BIC()`: the discrepancy is integrated out and its settings are shares and
-#' grids with priors, so that no number of free parameters goes with a greatest likelihood. The evidence, `log_evidence` of
-#' the fit, is what models are compared by ([bayes_factor()]; `logml()` and `bf()` of the package `bridgesampling` give it as
-#' well). AIC and BIC of the simulator fitted by least squares are among the criteria of [compare_models()].
+#' `logLik()` is an error, and with it `AIC()` and `BIC()`: the discrepancy is integrated out and its settings are
+#' shares and grids with priors, so that no number of free parameters goes with a greatest likelihood. The evidence,
+#' `log_evidence` of the fit, is what models are compared by ([bayes_factor()]; `logml()` and `bf()` of the package
+#' `bridgesampling` give it as well). AIC and BIC of the simulator fitted by least squares are among the criteria of
+#' [compare_models()].
 #'
 #' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or, but for `update()`, an upgrade
 #'   ([upgrade_model()]).
@@ -14,13 +15,13 @@
 #' @param newdata As in [predict.amiss_fit()].
 #' @param emulator,measurements What is calibrated; by default the same again.
 #' @param control Options that change; the others stay as they were given.
-#' @param ... Not used, but in `augment()` with `newdata`, where [predict.amiss_fit()] takes them: an argument that is not
-#'   known is an error.
+#' @param ... Not used, but in `augment()` with `newdata`, where [predict.amiss_fit()] takes them: an argument that is
+#'   not known is an error.
 #' @inheritParams calibrate
-#' @return `fitted()`, `residuals()`: the posterior mean of the simulation at the calibration rows, without the discrepancy,
-#'   and what it leaves. `nobs()`: the number of these rows. `glance()`: a data frame of one row. `augment()`: the record
-#'   with `.fitted` and `.resid`; with `newdata` its prediction, with `.lower` and `.upper` too. `update()`: a new calibration
-#'   by the same emulator (one that was refined for its region is not refined again).
+#' @return `fitted()`, `residuals()`: the posterior mean of the simulation at the calibration rows, without the
+#'   discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a data frame of one row.
+#'   `augment()`: the record with `.fitted` and `.resid`; with `newdata` its prediction, with `.lower` and `.upper` too.
+#'   `update()`: a new calibration by the same emulator (one that was refined for its region is not refined again).
 #' @name fit
 NULL
 
@@ -48,7 +49,8 @@ nobs.amiss_fit <- function(object, ...) {
 #' @rdname fit
 #' @export
 logLik.amiss_fit <- function(object, ...) {
-  abort_input(c("A calibration has no greatest likelihood with a number of free parameters: its discrepancy is integrated out.",
+  abort_input(c("A calibration has no greatest likelihood with a number of free parameters.",
+                x = "Its discrepancy is integrated out.",
                 i = "Compare models by the evidence: {.fun bayes_factor}, or {.code $log_evidence} of the fit.",
                 i = "AIC and BIC of the least-squares fit are among the criteria of {.fun compare_models}."))
 }
@@ -59,7 +61,8 @@ update.amiss_fit <- function(object, emulator = object$emulator, measurements = 
                              seed = object$seed, threads = 1, ...) {
   rlang::check_dots_empty()
   again <- if (inherits(object, "amiss_paper_calibration")) calibrate_paper else calibrate
-  again(emulator, measurements, utils::modifyList(given_control(object), as.list(control)), seed = seed, threads = threads)
+  again(emulator, measurements, utils::modifyList(given_control(object), as.list(control)),
+        seed = seed, threads = threads)
 }
 
 # The options that differ from what they would be if none were given. The others may follow from the measurements.
@@ -80,8 +83,9 @@ changed <- function(options, defaults) {
 #' @export
 glance.amiss_fit <- function(x, ...) {
   rlang::check_dots_empty()
-  data.frame(log10_evidence = x$log_evidence / log(10), lower95 = x$interval[1] / log(10), upper95 = x$interval[2] / log(10),
-             trusted = x$trust$trusted, emulator_error = x$check$ratio %||% NA_real_, sigma = error_sd(x),
+  decades <- c(x$log_evidence, x$interval) / log(10)
+  data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
+             emulator_error = x$check$ratio %||% NA_real_, sigma = error_sd(x),
              nobs = length(x$rows), vectors = ncol(x$emulator$basis$vectors), runs = nrow(x$emulator$processes$inputs))
 }
 
@@ -115,7 +119,8 @@ augment_prediction <- function(fit, prediction) {
 #' @param object A calibration ([calibrate()], [calibrate_paper()]).
 #' @param x Its summary.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), `reach`, `check` and `trust` in words.
+#' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), `reach`, `check` and `trust` in
+#'   words.
 #' @export
 summary.amiss_fit <- function(object, ...) {
   rlang::check_dots_empty()
@@ -129,10 +134,13 @@ summary.amiss_fit <- function(object, ...) {
 print.summary.amiss_fit <- function(x, ...) {
   shown <- utils::head(x$parameters[names(x$parameters) != "label"], 6)
   on_stdout(x, {
-    cli::cli_text("{.strong Calibration} on {x$glance$nobs} rows of {.val {x$name}}, residual {signif(x$glance$sigma, 3)} {x$unit}")
+    cli::cli_text("{.strong Calibration} on {x$glance$nobs} rows of {.val {x$name}}, ",
+                  "residual {signif(x$glance$sigma, 3)} {x$unit}")
     cli::cli_text("log10 evidence {round(x$glance$log10_evidence, 2)}, {x$trust}")
     say_table(shown)
-    if (nrow(x$parameters) > nrow(shown)) cli::cli_text("{nrow(x$parameters) - nrow(shown)} more parameter{?s}: see {.fun tidy}")
-    cli::cli_bullets(c("*" = x$reach, "*" = x$check, ">" = "next: {.fun predict}, {.fun confint} or {.fun attribute_discrepancy}"))
+    more <- nrow(x$parameters) - nrow(shown)
+    if (more) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
+    cli::cli_bullets(c("*" = x$reach, "*" = x$check,
+                       ">" = "next: {.fun predict}, {.fun confint} or {.fun attribute_discrepancy}"))
   })
 }

@@ -30,16 +30,16 @@ parameter_table <- function(fit) {
 
 #' The posterior of the parameters
 #'
-#' What R's users expect of a fitted model, from the weighted draws of a calibration; of an upgrade it is that of its last
-#' model.
+#' What R's users expect of a fitted model, from the weighted draws of a calibration; of an upgrade it is that of its
+#' last model.
 #'
 #' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]).
 #' @param parm Names or numbers of parameters; all by default.
 #' @param level,conf.level Probability that the intervals hold; their ends cut off equal tails.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return `coef()`: the posterior medians. `confint()`: a matrix of the ends of credible intervals. `vcov()`: the
-#'   covariance of the posterior. `tidy()`: a data frame with one row for each parameter: `term`, `label`, `unit`, `estimate`
-#'   (the median), `std.error` (the posterior's standard deviation), `conf.low`, `conf.high`.
+#'   covariance of the posterior. `tidy()`: a data frame with one row for each parameter: `term`, `label`, `unit`,
+#'   `estimate` (the median), `std.error` (the posterior's standard deviation), `conf.low`, `conf.high`.
 #' @seealso [as_draws][as.data.frame.amiss_fit] for the draws themselves.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
@@ -82,7 +82,8 @@ picked_parameters <- function(fit, parm, call = rlang::caller_env()) {
   if (is.null(parm)) return(names)
   ok <- if (is.numeric(parm)) all(parm %in% seq_along(names)) else all(parm %in% names)
   if (!ok) {
-    abort_input(c("{.arg parm} names what is no parameter of this model: {.val {setdiff(parm, c(names, seq_along(names)))}}.",
+    unknown <- setdiff(parm, c(names, seq_along(names)))
+    abort_input(c("{.arg parm} names what is no parameter of this model: {.val {unknown}}.",
                   i = "Its parameters: {.val {names}}."), call = call)
   }
   if (is.numeric(parm)) names[parm] else parm
@@ -102,20 +103,21 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
   check_level(conf.level, "conf.level")
   ends <- stats::confint(x, level = conf.level)
   declared <- x$emulator$parameters[rownames(ends)]
-  data.frame(term = rownames(ends), label = vapply(declared, `[[`, "", "label"), unit = vapply(declared, `[[`, "", "unit"),
-             estimate = unname(stats::coef(x)), std.error = unname(sqrt(diag(stats::vcov(x)))), conf.low = unname(ends[, 1]),
-             conf.high = unname(ends[, 2]), row.names = NULL)
+  data.frame(term = rownames(ends), label = vapply(declared, `[[`, "", "label"),
+             unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
+             std.error = unname(sqrt(diag(stats::vcov(x)))),
+             conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]), row.names = NULL)
 }
 
 #' Posterior draws as other packages take them
 #'
-#' The draws of a calibration carry importance weights; here they are resampled to equal weights by a systematic rule and
-#' stand in an order that says nothing, as one chain: what `posterior` and `bayesplot` take. Draws of more weight than one of
-#' `draws` are repeated, so that the effective number of draws that `posterior` states is too large, and R-hat means nothing:
-#' whether the sampler can be trusted is `trust` of the fit.
+#' The draws of a calibration carry importance weights; here they are resampled to equal weights by a systematic rule
+#' and stand in an order that says nothing, as one chain: what `posterior` and `bayesplot` take. Draws of more weight
+#' than one of `draws` are repeated, so that the effective number of draws that `posterior` states is too large, and
+#' R-hat means nothing: whether the sampler can be trusted is `trust` of the fit.
 #'
-#' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]), of which it is the last
-#'   model.
+#' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]), of which it is the
+#'   last model.
 #' @param draws Number of draws; by default as many as the fit has.
 #' @param row.names,optional As [as.data.frame()] has them; `optional` is not used.
 #' @param ... Not used: an argument that is not known is an error.

@@ -3,27 +3,29 @@
 #' The simulator itself is run at draws of the posterior (no emulator error); errors as large
 #' as those that calibration left widen the band.
 #'
-#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator, or an upgrade
-#'   ([upgrade_model()]), of which it is the last model.
-#' @param newdata A record of its own: [measurements()] with the same time step and boundary conditions; or a data frame of
-#'   equal steps, as long as those of the data that were given to [measurements()], with a column `time` and the columns that
-#'   drive the simulator, one row for each interval. Its
-#'   target, if it has that column, is compared with the prediction, and nothing is learned from it. A data frame has no
-#'   warm-up: begin it before the rows that count. By default the record that was calibrated on.
+#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator, or an
+#'   upgrade ([upgrade_model()]), of which it is the last model.
+#' @param newdata A record of its own: [measurements()] with the same time step and boundary conditions; or a data frame
+#'   of equal steps, as long as those of the data that were given to [measurements()], with a column `time` and the
+#'   columns that drive the simulator, one row for each interval. Its target, if it has that column, is compared with
+#'   the prediction, and nothing is learned from it. A data frame has no warm-up: begin it before the rows that count.
+#'   By default the record that was calibrated on.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both; every row of a data frame.
 #' @param draws Number of posterior draws.
-#' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as it was seen in calibration
-#'   ([discrepancy()]). Where its reach is limited, the runs of the ensemble are made again at the rows asked for.
+#' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as it was seen in
+#'   calibration ([discrepancy()]). Where its reach is limited, the runs of the ensemble are made again at the rows
+#'   asked for.
 #' @param interval `"prediction"`, a band of new measurements, or `"confidence"`, one of the simulation (and the
 #'   discrepancy) alone.
 #' @param level Probability that the band holds.
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the number is `level`), and
-#'   `crps`, the continuous ranked probability score of each row.
+#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the number is `level`),
+#'   and `crps`, the continuous ranked probability score of each row.
 #' @export
 predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "validate"), draws = 40, discrepancy = FALSE,
-                              interval = c("prediction", "confidence"), level = 0.95, seed = object$seed, threads = 1, ...) {
+                              interval = c("prediction", "confidence"), level = 0.95, seed = object$seed,
+                              threads = 1, ...) {
   rlang::check_dots_empty()
   use <- match.arg(use, several.ok = TRUE)
   interval <- match.arg(interval)
@@ -70,7 +72,8 @@ prediction_record <- function(m, newdata, call = rlang::caller_env()) {
   check_input(checkmate::check_class(newdata, "amiss_measurements"), "newdata",
               "Give a data frame or {.fun measurements}; rows of the record itself are chosen by {.arg use}.", call = call)
   if (!isTRUE(all.equal(newdata$step_h, m$step_h)) || !identical(newdata$conditions, m$conditions)) {
-    abort_input(c("{.arg newdata} must have steps of {signif(m$step_h, 3)} h and the boundary conditions {.val {m$conditions}}.",
+    abort_input(c("{.arg newdata} must have the record's time step and boundary conditions.",
+                  i = "The record has steps of {signif(m$step_h, 3)} h and {.val {m$conditions}}.",
                   x = "It has steps of {signif(newdata$step_h, 3)} h and {.val {newdata$conditions}}."), call = call)
   }
   newdata
@@ -91,8 +94,8 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   drivers <- as.matrix(data[numeric_columns])
   require_complete(drivers, terms$name, hours, data$time, call)
   observed <- if (m$target %in% names(data)) as.numeric(data[[m$target]]) else rep(NA_real_, nrow(data))
-  raw <- list(time = data$time, hours = hours, step_h = step, segment = rep(1L, nrow(data)), use = rep("new", nrow(data)),
-              y = observed, drivers = drivers)
+  raw <- list(time = data$time, hours = hours, step_h = step, segment = rep(1L, nrow(data)),
+              use = rep("new", nrow(data)), y = observed, drivers = drivers)
   columns <- boundary_columns(drivers, terms)
   coarse <- average_rows(raw, m$step_h, columns$values, call)
   c(list(raw = raw, observed = coarse$y, condition = columns$condition, conditions = columns$names),
@@ -103,7 +106,8 @@ new_record <- function(m, data, call = rlang::caller_env()) {
 carried_response <- function(fit, use, threads, record = fit$measurements) {
   rows <- rows_used(record, use)
   responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
-  moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads, record) else matrix(0, length(rows), nrow(fit$withheld))
+  moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads, record)
+           else matrix(0, length(rows), nrow(fit$withheld))
   left <- stats::residuals(fit) - rowMeans(seen_response(fit))
   list(response = lacking_response(fit, responses, moves),
        sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
@@ -148,7 +152,8 @@ summarise_prediction <- function(m, rows, runs, sd, interval, level) {
   spread <- as.numeric(sorted %*% (2 * seq_len(n) - n - 1)) / n^2
   tails <- c((1 - level) / 2, (1 + level) / 2)
   band <- apply(if (interval == "prediction") sorted else runs, 1, stats::quantile, tails)
-  ends <- stats::setNames(data.frame(band[1, ], band[2, ]), paste0(c("lower", "upper"), format(100 * level, digits = 4)))
+  ends <- data.frame(band[1, ], band[2, ])
+  names(ends) <- paste0(c("lower", "upper"), format(100 * level, digits = 4))
   data.frame(time = m$time[rows], use = m$use[rows], observed = y, mean = rowMeans(runs), ends,
              crps = rowMeans(abs(samples - y)) - spread, segment = m$segment[rows], row.names = NULL)
 }
@@ -165,19 +170,19 @@ prediction_scores <- function(prediction) {
 
 #' Simulate the record that a calibration expects
 #'
-#' Draws of the calibration record from the posterior: for checks of the model, as `bayesplot` makes them. Each is a run of the
-#' simulator at a posterior draw and a new error. Of [calibrate()], the discrepancy of that draw is added (its mean given the
-#' draw), and the error has the draw's variance and autocorrelation; of [calibrate_paper()], errors are independent and as
-#' large as those that calibration left.
+#' Draws of the calibration record from the posterior: for checks of the model, as `bayesplot` makes them. Each is a run
+#' of the simulator at a posterior draw and a new error. Of [calibrate()], the discrepancy of that draw is added (its
+#' mean given the draw), and the error has the draw's variance and autocorrelation; of [calibrate_paper()], errors are
+#' independent and as large as those that calibration left.
 #'
-#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator, or an upgrade
-#'   ([upgrade_model()]), of which it is the last model.
-#' @param nsim Number of records. The draws of a calibration's discrepancy (`error_draws` of [calibrate()]) serve again where
-#'   there are fewer.
+#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator, or an
+#'   upgrade ([upgrade_model()]), of which it is the last model.
+#' @param nsim Number of records. The draws of a calibration's discrepancy (`error_draws` of [calibrate()]) serve again
+#'   where there are fewer.
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ..., whose attribute `seed`
-#'   makes them again.
+#' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ..., whose attribute
+#'   `seed` makes them again.
 #' @export
 simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) {
   rlang::check_dots_empty()
@@ -209,7 +214,9 @@ drawn_errors <- function(fit, draws) {
   vapply(seq_along(draws), function(i) {
     sd <- sqrt(fit$posterior$variance[draws[i]])
     error <- sd * stats::rnorm(n)
-    for (k in which(ratios[i, ] > 0)) error <- error + sd * sqrt(ratios[i, k]) * ornstein_uhlenbeck(exp(-steps / fit$control$error_times[k]))
+    for (k in which(ratios[i, ] > 0)) {
+      error <- error + sd * sqrt(ratios[i, k]) * ornstein_uhlenbeck(exp(-steps / fit$control$error_times[k]))
+    }
     error
   }, numeric(n))
 }

@@ -57,7 +57,9 @@ predict.amiss_upgrade <- function(object, newdata = NULL, ...) stats::predict(la
 
 #' @rdname simulate.amiss_fit
 #' @export
-simulate.amiss_upgrade <- function(object, nsim = 1, seed = NULL, ...) stats::simulate(last_fit(object), nsim, seed, ...)
+simulate.amiss_upgrade <- function(object, nsim = 1, seed = NULL, ...) {
+  stats::simulate(last_fit(object), nsim, seed, ...)
+}
 
 #' @rdname as.data.frame.amiss_fit
 #' @export

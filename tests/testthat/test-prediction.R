@@ -192,3 +192,18 @@ test_that("simulated errors have their variance and memory, and forget it betwee
   errors <- withr::with_seed(2, amiss:::drawn_errors(fit, rep(1, 400)))
   expect_equal(mean(errors^2), 14 * fit$posterior$variance[1], tolerance = 0.05)
 })
+
+test_that("the discrepancy of a record of its own answers to its own conditions", {
+  fit <- lacking(Inf)
+  data <- linear_data(480)
+  data$Tn <- hidden
+  warmer <- transform(data, Tn = Tn + 1)
+  gain <- predict(fit, as_new(warmer), discrepancy = TRUE)$mean - predict(fit, as_new(data), discrepancy = TRUE)$mean
+  expect_equal(mean(gain), 0.3, tolerance = 0.15)  # what was made answers to Tn by 0.3
+})
+
+test_that("simulated errors are those of the draws whose discrepancy is known", {
+  fit <- lacking()
+  fit$posterior$variance[-(fit$kept + 1)] <- NA
+  expect_false(anyNA(simulate(fit, 32, seed = 1)))
+})
