@@ -118,15 +118,14 @@ significant_conditions <- function(table) {
 }
 
 #' @export
-print.amiss_attribution <- function(x, ...) {
+print.amiss_attribution <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Attribution} of the discrepancy ({x$surrogates} surrogates)")
-  print(x$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")], digits = 3, row.names = FALSE)
+  say_table(x$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")])
   named <- significant_conditions(x$table)
   cli::cli_bullets(c("*" = if (length(named)) "driven by {.field {named}}" else "no boundary condition is significant",
                      stats::setNames(group_words(x), rep("!", length(group_words(x)))),
                      ">" = "next: {.fun upgrade_model} with a {.fun catalogue}"))
-  invisible(x)
-}
+})
 
 # Which conditions cannot be told apart, and what would.
 group_words <- function(attribution) {
@@ -137,4 +136,7 @@ group_words <- function(attribution) {
 }
 
 #' @export
-tidy.amiss_attribution <- function(x, ...) x$table
+tidy.amiss_attribution <- function(x, ...) {
+  rlang::check_dots_empty()
+  x$table
+}

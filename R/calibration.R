@@ -59,7 +59,7 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
                         centre = result$centre, scale = result$scale,
                         reach = stats::setNames(result$reach, format(control$reach, trim = TRUE)),
                         log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
-                        interval = posterior$interval), class = "amiss_calibration")
+                        interval = posterior$interval), class = c("amiss_calibration", "amiss_fit"))
   checked <- checked_by_runs(fit, threads)
   checked$fit$trust <- fit_trust(checked$fit)
   checked
@@ -128,11 +128,6 @@ history_data <- function(emulator, measurements, rows, control) {
        time = measurements$hours[rows], new_segment = segment_starts(measurements, rows))
 }
 
-# n draws, each with equal weight, from weighted ones; deterministic.
-systematic_draws <- function(weights, n) {
-  findInterval((seq_len(n) - 0.5) / n, cumsum(weights / sum(weights)), left.open = TRUE) + 1L
-}
-
 # What a person should know before using it.
 fit_trust <- function(fit) {
   why <- c(if (!fit$posterior$trusted) fit$posterior$verdict, if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
@@ -141,14 +136,13 @@ fit_trust <- function(fit) {
 }
 
 #' @export
-print.amiss_calibration <- function(x, ...) {
+print.amiss_calibration <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Calibration} on {length(x$rows)} rows of {.val {x$measurements$name}}")
   cli::cli_text("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)}, {round(x$interval[2] / log(10), 2)}], {x$trust$verdict}")
-  print(parameter_table(x), digits = 3, row.names = FALSE)
+  say_parameters(x, 6)
   cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
   cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
-  invisible(x)
-}
+})
 
 # What the reach says of the model, in words.
 reach_words <- function(fit) {
@@ -159,39 +153,4 @@ reach_words <- function(fit) {
   if (free >= 0.9) return(sprintf("the discrepancy reaches into what the parameters can do (probability %.2f): the model is wrong where its parameters could hide it", free))
   if (free <= 0.1) return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))
   sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)
-}
-
-weighted_quantile <- function(x, w, probs) {
-  order <- order(x)
-  cumulative <- cumsum(w[order]) / sum(w)
-  stats::approx(cumulative, x[order], probs, rule = 2, ties = "ordered")$y
-}
-
-parameter_table <- function(fit) {
-  rows <- lapply(names(fit$emulator$parameters), function(n) {
-    q <- weighted_quantile(fit$values[, n], fit$weights, c(0.5, 0.025, 0.975))
-    data.frame(name = n, unit = fit$emulator$parameters[[n]]$unit, median = q[1], lower95 = q[2], upper95 = q[3])
-  })
-  do.call(rbind, rows)
-}
-
-#' @export
-coef.amiss_calibration <- function(object, ...) {
-  table <- parameter_table(object)
-  stats::setNames(table$median, table$name)
-}
-
-#' @export
-logLik.amiss_calibration <- function(object, ...) {
-  structure(object$log_evidence, df = length(object$emulator$parameters), nobs = length(object$rows), class = "logLik")
-}
-
-#' @export
-tidy.amiss_calibration <- function(x, ...) parameter_table(x)
-
-#' @export
-glance.amiss_calibration <- function(x, ...) {
-  data.frame(log10_evidence = x$log_evidence / log(10), lower95 = x$interval[1] / log(10), upper95 = x$interval[2] / log(10),
-             trusted = x$trust$trusted, emulator_error = x$check$ratio %||% NA_real_, n = length(x$rows), vectors = ncol(x$emulator$basis$vectors),
-             runs = nrow(x$emulator$processes$inputs))
 }

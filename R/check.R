@@ -26,9 +26,7 @@ default_exact <- function(fit) if (inherits(fit$emulator$simulator, "amiss_zone"
 # Runs of the simulator at n draws spread evenly over the posterior: list(draws, times, runs, failed), failed ones left
 # out. A draw of more weight than one of n is run once, and counts as often as it was drawn.
 posterior_runs <- function(fit, n, threads) {
-  # In the order of a coordinate, so that draws of equal weight cover the posterior evenly.
-  order <- order(fit$values[, 1])
-  drawn <- order[systematic_draws(fit$weights[order], n)]
+  drawn <- even_draws(fit, n)
   draws <- unique(drawn)
   times <- tabulate(match(drawn, draws))
   runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate", threads))
@@ -101,15 +99,14 @@ error_over_noise <- function(fit, error) {
 }
 
 # Variance of the autocorrelated parts of the error over that of its white part, at each draw.
-error_share <- function(fit) {
+error_share <- function(fit) rowSums(error_ratios_of(fit, seq_along(fit$posterior$setting)))
+
+# The same for each part (draws x parts).
+error_ratios_of <- function(fit, draws) {
   ratios <- fit$control$error_ratios
-  left <- fit$posterior$setting
-  share <- 0
-  for (component in seq_along(fit$control$error_times)) {
-    share <- share + ratios[left %% length(ratios) + 1]
-    left <- left %/% length(ratios)
-  }
-  share
+  parts <- seq_along(fit$control$error_times)
+  digit <- function(part) fit$posterior$setting[draws] %/% length(ratios)^(part - 1) %% length(ratios)
+  matrix(vapply(parts, function(part) ratios[digit(part) + 1], numeric(length(draws))), length(draws))
 }
 
 # Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior; with the simulator itself nothing is discarded.

@@ -243,7 +243,7 @@ evidence_sentences <- function(comparison) {
 }
 
 #' @export
-print.amiss_comparison <- function(x, ...) {
+print.amiss_comparison <- function(x, ...) on_stdout(x, {
   evidence <- x$tables$evidence
   criteria <- x$tables$criteria
   held_out <- !all(is.na(criteria$rmse_validation))
@@ -254,13 +254,12 @@ print.amiss_comparison <- function(x, ...) {
   table <- cbind(table, AIC = round(criteria$aic), BIC = round(criteria$bic), LR_p = p_value)
   cli::cli_text("{.strong Comparison} of {nrow(table)} model{?s} on {.val {x$measurements$name}} (method {x$method})")
   shown <- utils::head(order(evidence$rank), 6)
-  print(table[sort(shown), ], row.names = FALSE)
+  say_table(table[sort(shown), ])
   doubts <- length(doubt_sentences(x))
   told <- c(evidence_sentences(x), utils::head(disagreement_sentences(x), 1), if (doubts) paste0("Doubts: ", doubts, "; summary() tells them."))
   cli::cli_bullets(stats::setNames(gsub("([{}])", "\\1\\1", told), rep("*", length(told))))
   cli::cli_bullets(c(">" = "next: {.fun summary}, {.fun tidy}, {.fun plot} or {.fun report}"))
-  invisible(x)
-}
+})
 
 #' Tables of a comparison
 #'
@@ -270,6 +269,7 @@ print.amiss_comparison <- function(x, ...) {
 #' @return `tidy()`: a data frame; `glance()`: one row, about the model of highest evidence.
 #' @export
 tidy.amiss_comparison <- function(x, what = "evidence", ...) {
+  rlang::check_dots_empty()
   check_input(checkmate::check_choice(what, names(x$tables)), "what")
   x$tables[[what]]
 }
@@ -277,6 +277,7 @@ tidy.amiss_comparison <- function(x, what = "evidence", ...) {
 #' @rdname tidy.amiss_comparison
 #' @export
 glance.amiss_comparison <- function(x, ...) {
+  rlang::check_dots_empty()
   best <- x$tables$evidence[which.min(x$tables$evidence$rank), ]
   data.frame(best[c("model", "log10_evidence", "lower95", "upper95", "against", "log10_bf", "word", "probability", "trusted")],
              models = length(x$models), n = length(x$models[[1]]$fit$rows), disagreements = length(disagreements(x)) + nrow(ratio_disagreements(x)), row.names = NULL)

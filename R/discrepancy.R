@@ -79,19 +79,7 @@ simulated_mean <- function(fit) {
 }
 
 #' @export
-fitted.amiss_calibration <- function(object, ...) simulated_mean(object)
-
-#' @export
-residuals.amiss_calibration <- function(object, ...) object$measurements$y[object$rows] - simulated_mean(object)
-
-#' @export
-fitted.amiss_paper_calibration <- function(object, ...) simulated_mean(object)
-
-#' @export
-residuals.amiss_paper_calibration <- residuals.amiss_calibration
-
-#' @export
-print.amiss_discrepancy <- function(x, ...) {
+print.amiss_discrepancy <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Discrepancy} of {.field {x$target}} over {nrow(x$series)} steps: residual RMS {signif(sqrt(mean(x$series$residual^2)), 3)} {x$unit}, of which {signif(sqrt(mean(x$series$discrepancy^2)), 3)} answers to boundary conditions")
-  invisible(x)
-}
+  cli::cli_bullets(c(">" = "next: {.fun plot} or {.fun attribute_discrepancy}"))
+})

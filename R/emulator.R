@@ -153,7 +153,7 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
 }
 
 #' @export
-print.amiss_emulator <- function(x, ...) {
+print.amiss_emulator <- function(x, ...) on_stdout(x, {
   d <- x$diagnostics
   cli::cli_text("{.strong Emulator} of {nrow(x$processes$inputs)} runs: {ncol(x$basis$vectors)} basis vectors explain {round(100 * x$basis$explained, 3)} %; {x$trust$verdict}")
   cli::cli_bullets(c("*" = "left out: {signif(x$basis$discarded_rms, 2)} RMS beside a noise of {signif(x$noise_sd, 2)}",
@@ -166,11 +166,11 @@ print.amiss_emulator <- function(x, ...) {
     if (length(own) > 8) cli::cli_verbatim(sprintf("    %d more: see tidy()", length(own) - 8))
   }
   cli::cli_bullets(c(">" = "next: {.fun calibrate}"))
-  invisible(x)
-}
+})
 
 #' @export
 tidy.amiss_emulator <- function(x, ...) {
+  rlang::check_dots_empty()
   q <- nrow(x$processes$hyperparameters)
   p <- length(x$parameters)
   table <- data.frame(vector = rep(seq_len(q), each = p), parameter = rep(names(x$parameters), q),

@@ -363,11 +363,10 @@ new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, reg
 }
 
 #' @export
-print.amiss_ensemble <- function(x, ...) {
+print.amiss_ensemble <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over {length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}")
   cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}",
                      if (!is.null(x$region)) c("*" = "in the region where a posterior lies"),
                      if (!is.null(x$held_out)) c("*" = "and at {nrow(x$held_out$outputs)} validation steps"),
                      ">" = "next: {.fun train_emulator}"))
-  invisible(x)
-}
+})

@@ -10,7 +10,7 @@
 bayes_factor <- function(model, reference) {
   fits <- list(model = model, reference = reference)
   for (name in names(fits)) check_input(checkmate::check_multi_class(fits[[name]], c("amiss_calibration", "amiss_paper_calibration")), name)
-  if (class(model) != class(reference)) {
+  if (!identical(class(model)[1], class(reference)[1])) {
     abort_input(c("{.arg model} and {.arg reference} were calibrated by different methods; their evidences cannot be compared.",
                   i = "Use {.fun calibrate} for both, or {.fun calibrate_paper}."))
   }
@@ -29,4 +29,31 @@ evidence_word <- function(lower, upper) {
   word <- words[findInterval(lower, c(0, 0.5, 1, 2)) + 1]
   word[upper < 0] <- "negative"
   word
+}
+
+#' Evidence for bridgesampling
+#'
+#' `logml()` and `bf()` of the package `bridgesampling` for calibrations, whose evidence comes from annealed importance
+#' sampling. [bayes_factor()] gives the interval as well.
+#'
+#' @param x,x1,x2 Calibrations ([calibrate()], [calibrate_paper()]); two on the same measurements by the same method.
+#' @param log Whether the natural logarithm of the Bayes factor is given.
+#' @param ... Not used: an argument that is not known is an error.
+#' @return `logml()`: the natural logarithm of the evidence. `bf()`: the Bayes factor in favour of `x1`, of the class
+#'   `bf_bridge`.
+#' @name logml
+#' @exportS3Method bridgesampling::logml
+logml.amiss_fit <- function(x, ...) {
+  rlang::check_dots_empty()
+  x$log_evidence
+}
+
+#' @rdname logml
+#' @exportS3Method bridgesampling::bf
+bf.amiss_fit <- function(x1, x2, log = FALSE, ...) {
+  rlang::check_dots_empty()
+  check_input(checkmate::check_flag(log), "log")
+  value <- bayes_factor(x1, x2)$log10_bf * base::log(10)
+  structure(list(bf = if (log) value else exp(value), log = log), class = "bf_bridge",
+            model_names = c(deparse1(substitute(x1)), deparse1(substitute(x2))))
 }

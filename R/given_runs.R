@@ -46,7 +46,8 @@ runs_given <- function(fit, use) {
 
 # As predict() by the simulator, but by emulators at the draws `picked`; their standard deviations join that of the
 # error.
-predict_given <- function(fit, picked, rows, use, discrepancy, seed, threads, call = rlang::caller_env()) {
+predict_given <- function(fit, picked, rows, use, discrepancy, interval, level, seed, threads,
+                          call = rlang::caller_env()) {
   m <- fit$measurements
   values <- fit$values[rep_len(picked, 200), , drop = FALSE]
   mean <- sd <- matrix(0, length(rows), nrow(values))
@@ -61,7 +62,7 @@ predict_given <- function(fit, picked, rows, use, discrepancy, seed, threads, ca
     mean <- mean + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(mean)), drop = FALSE]
     left <- carried$sd
   }
-  with_seed(seed, summarise_prediction(m, rows, mean, sqrt(left^2 + sd^2)))
+  with_seed(seed, summarise_prediction(m, rows, mean, sqrt(left^2 + sd^2), interval, level))
 }
 
 # Ensembles among the models of a loop: of runs given, at the rows of the measurements.

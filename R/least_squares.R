@@ -70,9 +70,6 @@ start_of_search <- function(fit, lower, upper) {
   pmin(pmax(unit[which.min(distance), ], lower), upper)
 }
 
-# Posterior draws of the parameters in the unit cube.
-posterior_unit <- function(fit) (fit$posterior %||% fit$inside)$unit
-
 likelihood_criteria <- function(best) {
   n <- length(best$error)
   k <- length(best$values) + 1

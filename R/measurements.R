@@ -346,7 +346,7 @@ segment_starts <- function(measurements, rows) {
 }
 
 #' @export
-print.amiss_measurements <- function(x, ...) {
+print.amiss_measurements <- function(x, ...) on_stdout(x, {
   n <- table(factor(x$use, c("calibrate", "validate", "warmup")))
   cli::cli_text("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in {length(unique(x$segment))} segment{?s}")
   origin <- switch(x$noise$method, given = "", `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
@@ -355,5 +355,4 @@ print.amiss_measurements <- function(x, ...) {
                      "*" = "{n[['calibrate']]} calibrate, {n[['validate']]} validate, {n[['warmup']]} warm up",
                      "*" = "boundary conditions {.field {x$conditions}}",
                      ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
-  invisible(x)
-}
+})

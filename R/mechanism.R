@@ -43,17 +43,19 @@ catalogue <- function(...) {
 }
 
 #' @export
-print.amiss_mechanism <- function(x, ...) {
+print.amiss_mechanism <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$name}}, driven by {.field {x$boundary}}: {x$sentence}")
-  invisible(x)
-}
+  cli::cli_bullets(c(">" = "next: a {.fun catalogue} of mechanisms"))
+})
 
 #' @export
-print.amiss_catalogue <- function(x, ...) {
+print.amiss_catalogue <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Catalogue} of {length(x)} mechanism{?s}")
-  for (entry in x) cli::cli_bullets(c("*" = "{.strong {entry$name}} ({entry$boundary}): {entry$sentence}"))
-  invisible(x)
-}
+  shown <- utils::head(x, 10)
+  for (entry in shown) cli::cli_bullets(c("*" = "{.strong {entry$name}} ({entry$boundary}): {entry$sentence}"))
+  if (length(x) > length(shown)) cli::cli_bullets(c("*" = "{length(x) - length(shown)} more: {names(x)[-seq_along(shown)]}"))
+  cli::cli_bullets(c(">" = "next: {.fun upgrade_model}"))
+})
 
 # The extended simulator. An edit may replace parameters of the base model, but not drop what was adopted.
 extend <- function(simulator, mechanism, adopted = character(), call = rlang::caller_env()) {

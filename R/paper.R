@@ -38,8 +38,7 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #'   `hyperparameters` (draws of `alpha`, the fictitious condition last, `t2`, `lambda` and their weights), `lambda`
 #'   (draws of the precisions of equation 5), `index` (ranked table), `share` (draws of `R2`), `trust`, and `inside` and
 #'   `outside`, all that the sampler said of (5) and (6); `outside$approximation` tells the largest error among the
-#'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the last, and in the last by skeletons and directly. `tidy()` gives the table of the index, `coef()` the medians of
-#'   the parameters.
+#'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the last, and in the last by skeletons and directly. [tidy()][posterior] gives the table of the parameters.
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)
@@ -74,7 +73,7 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
                  interval = c(evidence$lower95[3], evidence$upper95[3]), log_jacobian = result$log_jacobian,
                  trust = paper_trust(outside, inside), index = index_table(result$index, conditions),
                  share = result$index$share,
-                 inside = inside, outside = outside), class = "amiss_paper_calibration")
+                 inside = inside, outside = outside), class = c("amiss_paper_calibration", "amiss_fit"))
 }
 
 # What a person should know before using it.
@@ -127,22 +126,12 @@ index_table <- function(index, conditions) {
 }
 
 #' @export
-print.amiss_paper_calibration <- function(x, ...) {
+print.amiss_paper_calibration <- function(x, ...) on_stdout(x, {
   ten <- log(10)
   cli::cli_text("{.strong Calibration as in the paper} on {length(x$rows)} rows of {.val {x$measurements$name}}")
   cli::cli_text("log10 evidence {round(x$log_evidence / ten, 2)} [{round(x$interval[1] / ten, 2)}, {round(x$interval[2] / ten, 2)}] = {round(x$evidence$log_evidence[1] / ten, 2)} (5) + {round(x$evidence$log_evidence[2] / ten, 2)} (6), {x$trust$verdict}")
-  print(parameter_table(x), digits = 3, row.names = FALSE)
+  say_parameters(x, 3)
   cli::cli_text("variance index of the boundary conditions over that of white noise")
-  print(x$index, digits = 3, row.names = FALSE)
+  say_table(utils::head(x$index, 4))
   cli::cli_bullets(c(">" = "next: {.fun calibrate} and {.fun attribute_discrepancy}, which know the history of the conditions"))
-  invisible(x)
-}
-
-#' @export
-coef.amiss_paper_calibration <- function(object, ...) coef.amiss_calibration(object, ...)
-
-#' @export
-logLik.amiss_paper_calibration <- function(object, ...) logLik.amiss_calibration(object, ...)
-
-#' @export
-tidy.amiss_paper_calibration <- function(x, ...) x$index
+})

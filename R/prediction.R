@@ -4,19 +4,33 @@
 #' as those that calibration left widen the band. Of an [ensemble()] made elsewhere, the emulator of its runs at the rows
 #' asked for predicts, and its own uncertainty widens the band too.
 #'
-#' @param object A calibration ([calibrate()], [calibrate_paper()]).
-#' @param use Which rows: `"calibrate"`, `"validate"` or both.
+#' @param object A calibration ([calibrate()], [calibrate_paper()]), or an upgrade ([upgrade_model()]), of
+#'   which it is the last model.
+#' @param newdata A record of its own: [measurements()] with the same time step and boundary conditions; or a data frame
+#'   of equal steps, as long as those of the data that were given to [measurements()], with a column `time` and the
+#'   columns that drive the simulator, one row for each interval. Its target, if it has that column, is compared with
+#'   the prediction, and nothing is learned from it. A data frame has no warm-up: begin it before the rows that count.
+#'   By default the record that was calibrated on.
+#' @param use Which rows: `"calibrate"`, `"validate"` or both; every row of a data frame.
 #' @param draws Number of posterior draws.
-#' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as it was seen in calibration
-#'   ([discrepancy()]). Where its reach is limited, the runs of the ensemble are made again at the rows asked for.
+#' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as it was seen in
+#'   calibration ([discrepancy()]). Where its reach is limited, the runs of the ensemble are made again at the rows
+#'   asked for.
+#' @param interval `"prediction"`, a band of new measurements, or `"confidence"`, one of the simulation (and the
+#'   discrepancy) alone.
+#' @param level Probability that the band holds.
 #' @inheritParams calibrate
-#' @param ... Not used.
-#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (band of new measurements), and
-#'   `crps`, the continuous ranked probability score of each row.
+#' @param ... Not used: an argument that is not known is an error.
+#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the number is `level`),
+#'   and `crps`, the continuous ranked probability score of each row.
 #' @export
-predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), draws = 40, discrepancy = FALSE, seed = object$seed, threads = 1, ...) {
+predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "validate"), draws = 40, discrepancy = FALSE,
+                              interval = c("prediction", "confidence"), level = 0.95, seed = object$seed,
+                              threads = 1, ...) {
   rlang::check_dots_empty()
   use <- match.arg(use, several.ok = TRUE)
+  interval <- match.arg(interval)
+  check_level(level, "level")
   check_input(checkmate::check_count(draws, positive = TRUE), "draws")
   threads <- check_threads(threads)
   seed <- pick_seed(seed)
@@ -25,45 +39,98 @@ predict.amiss_calibration <- function(object, use = c("calibrate", "validate"), 
     abort_input(paste("{.arg discrepancy} needs a fit of {.fun calibrate}:",
                       "that of the paper does not carry over to other rows."))
   }
-  m <- object$measurements
-  simulator <- object$emulator$simulator
-  picked <- systematic_draws(object$weights[order(object$values[, 1])], draws)
-  picked <- order(object$values[, 1])[picked]
-  rows <- which(m$use %in% use & !is.na(m$y))
+  record <- prediction_record(object$measurements, newdata)
+  if (is.data.frame(newdata)) use <- "new"
+  rows <- rows_used(record, use)
   if (!length(rows)) abort_input("The measurements have no row to {.val {use}}.")
-  if (is.null(simulator)) return(predict_given(object, picked, rows, use, discrepancy, seed, threads))
-  runs <- simulate_measured(simulator, object$values[picked, , drop = FALSE], m, use, threads)
+  picked <- even_draws(object, draws)
+  if (is.null(object$emulator$simulator) && is.null(newdata)) {
+    return(predict_given(object, picked, rows, use, discrepancy, interval, level, seed, threads))
+  }
+  require_simulator(object)
+  runs <- simulate_measured(object$emulator$simulator, object$values[picked, , drop = FALSE], record, use, threads)
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
   if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
   sd <- error_sd(object)
   if (discrepancy) {
-    carried <- carried_response(object, use, threads)
+    carried <- carried_response(object, use, threads, record)
     runs <- runs + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(runs)), drop = FALSE]
     sd <- carried$sd
   }
-  with_seed(seed, summarise_prediction(m, rows, runs, sd))
+  with_seed(seed, summarise_prediction(record, rows, runs, sd, interval, level))
+}
+
+require_simulator <- function(fit, call = rlang::caller_env()) {
+  if (is.null(fit$emulator$simulator)) {
+    abort_input(c("The runs of this ensemble were made elsewhere, so that the simulator cannot be run again.",
+                  i = "Use {.fun predict} on the emulator for the calibration rows."), call = call)
+  }
+}
+
+rows_used <- function(measurements, use) which(measurements$use %in% use & !is.na(measurements$y))
+
+# The record that is predicted: the fit's, one of its own, or one made of a data frame.
+prediction_record <- function(m, newdata, call = rlang::caller_env()) {
+  if (is.null(newdata)) return(m)
+  if (is.data.frame(newdata)) return(new_record(m, newdata, call))
+  check_input(checkmate::check_class(newdata, "amiss_measurements"), "newdata",
+              "Give a data frame or {.fun measurements}; rows of the record itself are chosen by {.arg use}.", call = call)
+  if (!isTRUE(all.equal(newdata$step_h, m$step_h)) || !identical(newdata$conditions, m$conditions)) {
+    abort_input(c("{.arg newdata} must have the record's time step and boundary conditions.",
+                  i = "The record has steps of {signif(m$step_h, 3)} h and {.val {m$conditions}}.",
+                  x = "It has steps of {signif(newdata$step_h, 3)} h and {.val {newdata$conditions}}."), call = call)
+  }
+  newdata
+}
+
+# All rows have the use "new". `y` marks the rows to simulate; `observed` is the target, NA where it is not known.
+new_record <- function(m, data, call = rlang::caller_env()) {
+  terms <- list(name = m$conditions, circular = tabulate(m$condition, length(m$conditions)) == 2)
+  require_columns(data, c("time", terms$name), call)
+  require_numeric(data, c(terms$name, intersect(m$target, names(data))), call)
+  hours <- read_time(data$time, "time", call)
+  step <- m$raw$step_h
+  if (length(hours) < 2 || any(abs(diff(hours) - step) > 0.01 * step)) {
+    abort_input(c("{.arg newdata} must have at least two rows, one for every {signif(step, 4)} h without a gap.",
+                  i = "Predict each part of a broken record on its own."), call = call)
+  }
+  numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, NA)], c("time", m$target))
+  drivers <- as.matrix(data[numeric_columns])
+  require_complete(drivers, terms$name, hours, data$time, call)
+  observed <- if (m$target %in% names(data)) as.numeric(data[[m$target]]) else rep(NA_real_, nrow(data))
+  raw <- list(time = data$time, hours = hours, step_h = step, segment = rep(1L, nrow(data)),
+              use = rep("new", nrow(data)), y = observed, drivers = drivers)
+  columns <- boundary_columns(drivers, terms)
+  coarse <- average_rows(raw, m$step_h, columns$values, call)
+  c(list(raw = raw, observed = coarse$y, condition = columns$condition, conditions = columns$names),
+    utils::modifyList(coarse, list(y = numeric(length(coarse$y)))))
 }
 
 # The lacking response at the rows of these uses (rows x kept draws), and what it leaves in calibration.
-carried_response <- function(fit, use, threads) {
-  m <- fit$measurements
-  rows <- which(m$use %in% use & !is.na(m$y))
-  responses <- filter_responses(m, fit$control$time_constants)
-  moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads) else matrix(0, length(rows), nrow(fit$withheld))
-  seen <- lacking_response(fit, responses[fit$rows, , drop = FALSE], simulator_moves(fit$emulator))
-  left <- stats::residuals(fit) - rowMeans(seen)
-  list(response = lacking_response(fit, responses[rows, , drop = FALSE], moves),
+carried_response <- function(fit, use, threads, record = fit$measurements) {
+  rows <- rows_used(record, use)
+  responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
+  moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads, record)
+           else matrix(0, length(rows), nrow(fit$withheld))
+  left <- stats::residuals(fit) - rowMeans(seen_response(fit))
+  list(response = lacking_response(fit, responses, moves),
        sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
 }
 
+# The lacking response at the calibration rows (rows x kept draws).
+seen_response <- function(fit) {
+  responses <- filter_responses(fit$measurements, fit$control$time_constants)
+  lacking_response(fit, responses[fit$rows, , drop = FALSE], simulator_moves(fit$emulator))
+}
+
 # simulator_moves() at other rows: the same combinations of the first ensemble's runs, without those that fail there.
-moves_at <- function(fit, use, threads) {
+moves_at <- function(fit, use, threads, record = fit$measurements) {
   emulator <- emulator_over_priors(fit$emulator)
   w <- emulator$processes$coefficients
   last <- ncol(w)
   values <- unit_to_values(emulator$unit, emulator$parameters)
   runs <- if (is.null(fit$emulator$simulator)) runs_given(fit, use)
-          else suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, fit$measurements, use, threads))
+          else suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
   made <- colSums(!is.finite(runs)) == 0
   if (sum(made) < last) {
     abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
@@ -80,17 +147,20 @@ error_sd <- function(fit) {
   sqrt(sum(r^2) / max(1, length(r) - length(fit$emulator$parameters)))
 }
 
-summarise_prediction <- function(m, rows, runs, sd) {
+summarise_prediction <- function(m, rows, runs, sd, interval, level) {
   n <- 200
   member <- rep_len(seq_len(ncol(runs)), n)
   samples <- runs[, member, drop = FALSE] + sd * stats::rnorm(length(rows) * n)
-  y <- m$y[rows]
+  y <- (m$observed %||% m$y)[rows]
   sorted <- t(apply(samples, 1, sort))
   # CRPS of an ensemble: mean |x - y| - 1/2 mean |x - x'| (Gneiting and Raftery 2007), by the sorted members.
   spread <- as.numeric(sorted %*% (2 * seq_len(n) - n - 1)) / n^2
-  data.frame(time = m$time[rows], use = m$use[rows], observed = y, mean = rowMeans(runs),
-             lower95 = apply(sorted, 1, stats::quantile, 0.025), upper95 = apply(sorted, 1, stats::quantile, 0.975),
-             crps = rowMeans(abs(samples - y)) - spread, segment = m$segment[rows])
+  tails <- c((1 - level) / 2, (1 + level) / 2)
+  band <- apply(if (interval == "prediction") sorted else runs, 1, stats::quantile, tails)
+  ends <- data.frame(band[1, ], band[2, ])
+  names(ends) <- paste0(c("lower", "upper"), format(100 * level, digits = 4))
+  data.frame(time = m$time[rows], use = m$use[rows], observed = y, mean = rowMeans(runs), ends,
+             crps = rowMeans(abs(samples - y)) - spread, segment = m$segment[rows], row.names = NULL)
 }
 
 prediction_scores <- function(prediction) {
@@ -103,6 +173,60 @@ prediction_scores <- function(prediction) {
   list(calibrate = score("calibrate"), validate = score("validate"))
 }
 
-#' @rdname predict.amiss_calibration
+#' Simulate the record that a calibration expects
+#'
+#' Draws of the calibration record from the posterior: for checks of the model, as `bayesplot` makes them. Each is a run
+#' of the simulator at a posterior draw and a new error. Of [calibrate()], the discrepancy of that draw is added (its
+#' mean given the draw), and the error has the draw's variance and autocorrelation; of [calibrate_paper()], errors are
+#' independent and as large as those that calibration left.
+#'
+#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator, or an
+#'   upgrade ([upgrade_model()]), of which it is the last model.
+#' @param nsim Number of records. The draws of a calibration's discrepancy (`error_draws` of [calibrate()]) serve again
+#'   where there are fewer.
+#' @inheritParams calibrate
+#' @param ... Not used: an argument that is not known is an error.
+#' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ..., whose attribute
+#'   `seed` makes them again.
 #' @export
-predict.amiss_paper_calibration <- predict.amiss_calibration
+simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) {
+  rlang::check_dots_empty()
+  check_input(checkmate::check_count(nsim, positive = TRUE), "nsim")
+  require_simulator(object)
+  threads <- check_threads(threads)
+  seed <- pick_seed(seed)
+  history <- inherits(object, "amiss_calibration")
+  pool <- if (history) object$kept + 1L else even_draws(object, max(nsim, 32))
+  records <- with_seed(seed, {
+    member <- rep_len(sample.int(length(pool)), nsim)
+    draws <- pool[member]
+    runs <- simulate_measured(object$emulator$simulator, object$values[draws, , drop = FALSE], object$measurements,
+                              "calibrate", threads)
+    if (history) runs + seen_response(object)[, member, drop = FALSE] + drawn_errors(object, draws)
+    else runs + error_sd(object) * stats::rnorm(length(runs))
+  })
+  colnames(records) <- paste0("sim_", seq_len(nsim))
+  structure(as.data.frame(records), seed = seed)
+}
+
+# Errors at the calibration rows (rows x draws) with the white and autocorrelated parts of these draws.
+drawn_errors <- function(fit, draws) {
+  m <- fit$measurements
+  n <- length(fit$rows)
+  steps <- c(Inf, diff(m$hours[fit$rows]))
+  steps[segment_starts(m, fit$rows)] <- Inf
+  ratios <- error_ratios_of(fit, draws)
+  vapply(seq_along(draws), function(i) {
+    sd <- sqrt(fit$posterior$variance[draws[i]])
+    error <- sd * stats::rnorm(n)
+    for (k in which(ratios[i, ] > 0)) {
+      error <- error + sd * sqrt(ratios[i, k]) * ornstein_uhlenbeck(exp(-steps / fit$control$error_times[k]))
+    }
+    error
+  }, numeric(n))
+}
+
+# Stationary, of variance one; `kept` is what each value keeps of the one before it.
+ornstein_uhlenbeck <- function(kept) {
+  Reduce(function(x, i) kept[i] * x + sqrt(1 - kept[i]^2) * stats::rnorm(1), seq_along(kept), 0, accumulate = TRUE)[-1]
+}

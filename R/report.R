@@ -23,14 +23,13 @@ summary.amiss_upgrade <- function(object, ...) {
 
 #' @rdname summary.amiss_upgrade
 #' @export
-print.summary.amiss_upgrade <- function(x, ...) {
+print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$tag}")
   cli::cli_text("{x$headline}")
   parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain, "What remains" = x$remains)
   for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
   cli::cli_bullets(c(">" = "next: {.fun report}"))
-  invisible(x)
-}
+})
 
 # The first step's trials, best first, and the probability that is left to no change.
 first_trials <- function(upgrade) {

@@ -21,13 +21,12 @@ summary.amiss_comparison <- function(object, ...) {
 
 #' @rdname summary.amiss_comparison
 #' @export
-print.summary.amiss_comparison <- function(x, ...) {
+print.summary.amiss_comparison <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$headline}")
   parts <- list("Evidence" = x$evidence, "What remains" = x$remains, "What practice would do" = x$practice, "Doubts" = x$doubts)
   for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
   cli::cli_bullets(c(">" = "next: {.fun report}"))
-  invisible(x)
-}
+})
 
 comparison_headline <- function(comparison) {
   table <- comparison$tables$evidence

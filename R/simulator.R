@@ -119,11 +119,11 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
 }
 
 #' @export
-print.amiss_function_simulator <- function(x, ...) {
+print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Simulator} {.val {x$name}} (an R function) with {length(x$parameters)} free parameter{?s}")
-  cli::cli_bullets(stats::setNames(vapply(x$parameters, format, ""), rep("*", length(x$parameters))))
-  invisible(x)
-}
+  cli::cli_bullets(stats::setNames(vapply(utils::head(x$parameters, 10), format, ""), rep("*", min(10, length(x$parameters)))))
+  cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
+})
 
 #' What a simulator needs and does
 #'

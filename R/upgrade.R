@@ -316,16 +316,18 @@ upgrade_gain <- function(models) {
 }
 
 #' @export
-print.amiss_upgrade <- function(x, ...) {
+print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   adopted <- adopted_models(x)
   cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(adopted)} mechanism{?s} adopted")
   cli::cli_bullets(c("*" = "{diagnosis_verdict(x)$tag}"))
-  for (model in utils::head(adopted, 4)) {
+  listed_alone <- if (length(adopted) > 8) 7 else length(adopted)
+  for (model in adopted[seq_len(listed_alone)]) {
     row <- x$candidates[x$candidates$from == model$parent & x$candidates$mechanism == model$mechanism, ]
     cli::cli_bullets(c("*" = "{model$verdict}: {.strong {model$mechanism}} ({x$catalogue[[model$mechanism]]$boundary}), log10 Bayes factor {round(row$log10_bf, 1)}"))
   }
+  others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")
+  if (length(others)) cli::cli_bullets(c("*" = "{others}"))
   g <- x$gain
   cli::cli_bullets(c("*" = "RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)} held out",
-                     "*" = "stopped because {x$stopped_because}", ">" = "next: {.fun report}"))
-  invisible(x)
-}
+                     "*" = "stopped because {x$stopped_because}", ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
+})

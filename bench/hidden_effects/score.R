@@ -93,8 +93,8 @@ parameter_covered <- function(world, upgrade) {
   if (is.null(first) || !first %in% world$kinds) return(NA)
   last <- amiss::tidy(upgrade$models[[length(upgrade$models)]]$fit)
   true <- world$effects[[first]]
-  own <- last[last$name == names(true)[1], ]
-  own$lower95 <= true[[1]] && true[[1]] <= own$upper95
+  own <- last[last$term == names(true)[1], ]
+  own$conf.low <= true[[1]] && true[[1]] <= own$conf.high
 }
 
 # What is done today: the residuals of the calibrated base model held against each condition. The lengthscales are fitted to

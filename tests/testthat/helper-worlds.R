@@ -43,7 +43,7 @@ rescaled <- function(emulator, factor) {
 twinhouse_study <- function(house) system.file("studies", sprintf("twinhouse_%s.yml", house), package = "amiss")
 
 # What print() says, in one line.
-printed <- function(x) gsub("\\s+", " ", paste(cli::cli_fmt(print(x)), collapse = " "))
+printed <- function(x) gsub("\\s+", " ", paste(utils::capture.output(print(x)), collapse = " "))
 
 # A world that bends: lag and strength hang on one parameter, the sun on another. Three vectors leave out a sixth
 # of the noise.

@@ -1,7 +1,7 @@
 test_that("calibration finds the parameters and says so", {
   fit <- linear_fit()
   table <- tidy(fit)
-  expect_true(all(table$lower95 < c(20, 0.4) & table$upper95 > c(20, 0.4)))
+  expect_true(all(table$conf.low < c(20, 0.4) & table$conf.high > c(20, 0.4)))
   expect_true(fit$trust$trusted)
   expect_equal(sd(residuals(fit)), 0.1, tolerance = 0.15)  # of 240 values: standard error 5 %
 })

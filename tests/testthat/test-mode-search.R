@@ -53,7 +53,7 @@ test_that("an ensemble far too coarse leads to a calibration that its check conf
   expect_true(fit$check$passed)
   expect_gte(fit$rounds, 1L)
   table <- tidy(fit)
-  expect_true(all(table$lower95 < truth[table$name] & truth[table$name] < table$upper95))
+  expect_true(all(table$conf.low < truth[table$term] & truth[table$term] < table$conf.high))
   # The same evidence from another design, within four standard errors.
   other <- calibrate_refined(simulate_design(simulator, m, 12, seed = 2), m, control = list(calibration = quick_ais), seed = 2)
   expect_lt(abs(fit$log_evidence - other$log_evidence), 4 * sqrt(fit$standard_error^2 + other$standard_error^2))

@@ -30,8 +30,8 @@ test_that("the discrepancy carried along lowers the error of held-out rows, and 
 test_that("the band with a discrepancy is not as wide as without", {
   fit <- lacking()
   width <- function(p) mean(p$upper95 - p$lower95)
-  with <- width(predict(fit, "validate", discrepancy = TRUE))
-  expect_lt(with, 0.5 * width(predict(fit, "validate")))
+  with <- width(predict(fit, use = "validate", discrepancy = TRUE))
+  expect_lt(with, 0.5 * width(predict(fit, use = "validate")))
   expect_gt(with, 2 * 1.96 * 0.1 * 0.9)  # no less than the noise
 })
 
@@ -40,8 +40,8 @@ test_that("only held-out measurements' conditions are used, not their values", {
   spoilt <- fit
   held <- spoilt$measurements$use == "validate"
   spoilt$measurements$y[held] <- 1e3
-  expect_identical(predict(spoilt, "validate", discrepancy = TRUE)$mean,
-                   predict(fit, "validate", discrepancy = TRUE)$mean)
+  expect_identical(predict(spoilt, use = "validate", discrepancy = TRUE)$mean,
+                   predict(fit, use = "validate", discrepancy = TRUE)$mean)
 })
 
 test_that("how the simulator moves at other rows is told by the same runs", {
@@ -100,9 +100,9 @@ test_that("each condition's response is told, and their sum is the discrepancy w
 test_that("where nothing lacks, nothing is carried", {
   data <- linear_data()
   fit <- linear_fit(linear_measurements(data, calibrate = data$hour <= 160, validate = data$hour > 160))
-  with <- predict(fit, "validate", discrepancy = TRUE)
+  with <- predict(fit, use = "validate", discrepancy = TRUE)
   # A sixth of the noise of 0.1 K.
-  expect_lt(max(abs(with$mean - predict(fit, "validate")$mean)), 0.1 / 6)
+  expect_lt(max(abs(with$mean - predict(fit, use = "validate")$mean)), 0.1 / 6)
 })
 
 test_that("what cannot be carried is refused", {
@@ -110,7 +110,100 @@ test_that("what cannot be carried is refused", {
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
   paper <- calibrate_paper(emulator, m, list(ais = list(pilot_chains = 24, groups = 4, chains = 12)), seed = 1)
   expect_error(predict(paper, discrepancy = TRUE), "needs a fit of `calibrate\\(\\)`", class = "amiss_error_input")
-  expect_s3_class(predict(paper, "calibrate"), "data.frame")
+  expect_s3_class(predict(paper, use = "calibrate"), "data.frame")
   expect_error(predict(lacking(), discrepancy = "yes"), "discrepancy", class = "amiss_error_input")
-  expect_error(predict(linear_fit(), "validate"), "no row", class = "amiss_error_input")
+  expect_error(predict(linear_fit(), use = "validate"), "no row", class = "amiss_error_input")
+})
+
+as_new <- function(data) data.frame(time = data$hour, data[setdiff(names(data), "hour")])
+
+test_that("a data frame is predicted as the rows of the record are", {
+  fit <- lacking()
+  data <- linear_data(480)
+  data$Tn <- hidden
+  data$Ti <- fit$measurements$y
+  for (discrepancy in c(FALSE, TRUE)) {
+    own <- predict(fit, as_new(data), discrepancy = discrepancy)
+    known <- predict(fit, discrepancy = discrepancy)
+    expect_equal(own[names(own) != "use"], known[names(known) != "use"], tolerance = 1e-8)
+  }
+  expect_identical(predict(fit, fit$measurements, use = "validate"), predict(fit, use = "validate"))
+  blind <- predict(fit, as_new(data[names(data) != "Ti"]))
+  expect_true(all(is.na(blind$observed)) && all(is.na(blind$crps)))
+  expect_identical(blind$mean, predict(fit, as_new(data))$mean)
+})
+
+test_that("averages and directions of a data frame are those of measurements()", {
+  data <- linear_data(240)
+  data$Wd <- (7 * data$hour) %% 360
+  m <- linear_measurements(data, boundary = ~ Te + circular(Wd), average = 2)
+  own <- amiss:::new_record(m, as_new(data))
+  for (field in c("boundary", "condition", "conditions", "hours", "block", "segment")) {
+    expect_identical(own[[field]], m[[field]], info = field)
+  }
+  expect_identical(own$observed, m$y)
+  expect_error(amiss:::new_record(m, as_new(data[-5, ])), "without a gap", class = "amiss_error_input")
+  expect_error(amiss:::new_record(m, as_new(data[names(data) != "Te"])), "Te", class = "amiss_error_input")
+})
+
+test_that("bands hold what they should, and the simulation's own is that of its runs", {
+  fit <- lacking()
+  inside <- function(p) mean(p$observed >= p[[5]] & p$observed <= p[[6]])
+  # Of 160 held-out values: three standard errors of a share of a half.
+  half <- predict(fit, use = "validate", discrepancy = TRUE, level = 0.5)
+  expect_named(half[5:6], c("lower50", "upper50"))
+  expect_lt(abs(inside(half) - 0.5), 0.12)
+  own <- predict(fit, use = "validate", interval = "confidence", level = 0.8, draws = 60)
+  draws <- fit$values[amiss:::even_draws(fit, 60), ]
+  Te <- linear_data(480)$Te[321:480]
+  runs <- vapply(1:60, function(i) draws[i, "offset"] + draws[i, "gain"] * Te, Te)
+  expect_equal(own$lower80, apply(runs, 1, quantile, 0.1, names = FALSE), tolerance = 1e-10)
+  expect_equal(own$upper80, apply(runs, 1, quantile, 0.9, names = FALSE), tolerance = 1e-10)
+  expect_error(predict(fit, level = 95), "level", class = "amiss_error_input")
+  expect_error(predict(fit, "validate"), "chosen by `use`", class = "amiss_error_input")
+  expect_error(predict(fit, linear_measurements()), "boundary conditions", class = "amiss_error_input")
+})
+
+test_that("simulated records look like the record", {
+  fit <- lacking()
+  records <- simulate(fit, 100, seed = 4)
+  y <- fit$measurements$y[fit$rows]
+  expect_identical(dim(records), c(320L, 100L))
+  expect_identical(simulate(fit, 100, seed = attr(records, "seed")), records)
+  series <- discrepancy(fit)$series
+  # Errors of 0.1 K over 100 records: 0.01 K at each row.
+  expect_lt(sqrt(mean((rowMeans(records) - series$simulated - series$discrepancy)^2)), 0.02)
+  # 320 errors: 4 % of their standard deviation; those of a record in 95 % of them, and five more.
+  spread <- apply(records - rowMeans(records), 1, sd)
+  expect_equal(mean(spread), sd(y - series$simulated - series$discrepancy), tolerance = 0.2)
+})
+
+test_that("simulated errors have their variance and memory, and forget it between segments", {
+  kept <- c(0, 0.8, 0.8, 0, 0.5)
+  x <- withr::with_seed(1, replicate(4000, amiss:::ornstein_uhlenbeck(kept)))
+  expected <- diag(5)
+  for (i in 1:5) for (j in seq_len(i - 1)) expected[i, j] <- expected[j, i] <- prod(kept[(j + 1):i])
+  expect_lt(max(abs(cov(t(x)) - expected)), 5 * sqrt(2 / 4000))
+  # A draw whose error has parts of 3 and 10 times the white variance.
+  fit <- linear_fit()
+  ratios <- fit$control$error_ratios
+  fit$posterior$setting[1] <- (match(3, ratios) - 1) + length(ratios) * (match(10, ratios) - 1)
+  expect_identical(amiss:::error_ratios_of(fit, 1), matrix(c(3, 10), 1))
+  errors <- withr::with_seed(2, amiss:::drawn_errors(fit, rep(1, 400)))
+  expect_equal(mean(errors^2), 14 * fit$posterior$variance[1], tolerance = 0.05)
+})
+
+test_that("the discrepancy of a record of its own answers to its own conditions", {
+  fit <- lacking(Inf)
+  data <- linear_data(480)
+  data$Tn <- hidden
+  warmer <- transform(data, Tn = Tn + 1)
+  gain <- predict(fit, as_new(warmer), discrepancy = TRUE)$mean - predict(fit, as_new(data), discrepancy = TRUE)$mean
+  expect_equal(mean(gain), 0.3, tolerance = 0.15)  # what was made answers to Tn by 0.3
+})
+
+test_that("simulated errors are those of the draws whose discrepancy is known", {
+  fit <- lacking()
+  fit$posterior$variance[-(fit$kept + 1)] <- NA
+  expect_false(anyNA(simulate(fit, 32, seed = 1)))
 })

@@ -1,0 +1,146 @@
+#' Fitted values, evidence and repetition of a calibration
+#'
+#' What R's users expect of a fitted model; of an upgrade it is that of its last model.
+#'
+#' @section The likelihood:
+#' `logLik()` is an error, and with it `AIC()` and `BIC()`: the discrepancy is integrated out and its settings are
+#' shares and grids with priors, so that no number of free parameters goes with a greatest likelihood. The evidence,
+#' `log_evidence` of the fit, is what models are compared by ([bayes_factor()]; `logml()` and `bf()` of the package
+#' `bridgesampling` give it as well). AIC and BIC of the simulator fitted by least squares are among the criteria of
+#' [compare_models()].
+#'
+#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or, but for `update()`, an upgrade
+#'   ([upgrade_model()]).
+#' @param data Not used; the record is part of the fit.
+#' @param newdata As in [predict.amiss_fit()].
+#' @param emulator,measurements What is calibrated; by default the same again.
+#' @param control Options that change; the others stay as they were given.
+#' @param ... Not used, but in `augment()` with `newdata`, where [predict.amiss_fit()] takes them: an argument that is
+#'   not known is an error.
+#' @inheritParams calibrate
+#' @return `fitted()`, `residuals()`: the posterior mean of the simulation at the calibration rows, without the
+#'   discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a data frame of one row.
+#'   `augment()`: the record with `.fitted` and `.resid`; with `newdata` its prediction, with `.lower` and `.upper` too.
+#'   `update()`: a new calibration by the same emulator (one that was refined for its region is not refined again).
+#' @name fit
+NULL
+
+#' @rdname fit
+#' @export
+fitted.amiss_fit <- function(object, ...) {
+  rlang::check_dots_empty()
+  simulated_mean(object)
+}
+
+#' @rdname fit
+#' @export
+residuals.amiss_fit <- function(object, ...) {
+  rlang::check_dots_empty()
+  object$measurements$y[object$rows] - simulated_mean(object)
+}
+
+#' @rdname fit
+#' @export
+nobs.amiss_fit <- function(object, ...) {
+  rlang::check_dots_empty()
+  length(object$rows)
+}
+
+#' @rdname fit
+#' @export
+logLik.amiss_fit <- function(object, ...) {
+  abort_input(c("A calibration has no greatest likelihood with a number of free parameters.",
+                x = "Its discrepancy is integrated out.",
+                i = "Compare models by the evidence: {.fun bayes_factor}, or {.code $log_evidence} of the fit.",
+                i = "AIC and BIC of the least-squares fit are among the criteria of {.fun compare_models}."))
+}
+
+#' @rdname fit
+#' @export
+update.amiss_fit <- function(object, emulator = object$emulator, measurements = object$measurements, control = NULL,
+                             seed = object$seed, threads = 1, ...) {
+  rlang::check_dots_empty()
+  again <- if (inherits(object, "amiss_paper_calibration")) calibrate_paper else calibrate
+  again(emulator, measurements, utils::modifyList(given_control(object), as.list(control)),
+        seed = seed, threads = threads)
+}
+
+# The options that differ from what they would be if none were given. The others may follow from the measurements.
+given_control <- function(fit) {
+  n <- length(fit$rows)
+  paper <- inherits(fit, "amiss_paper_calibration")
+  defaults <- if (paper) fill_paper_control(NULL, n) else fill_calibration_control(NULL, fit$measurements, n)
+  given <- changed(fit$control, defaults)
+  if (!is.null(given$ais)) given$ais <- changed(given$ais, defaults$ais)
+  given
+}
+
+changed <- function(options, defaults) {
+  options[!vapply(names(options), function(n) identical(options[[n]], defaults[[n]]), NA)]
+}
+
+#' @rdname fit
+#' @export
+glance.amiss_fit <- function(x, ...) {
+  rlang::check_dots_empty()
+  decades <- c(x$log_evidence, x$interval) / log(10)
+  data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
+             emulator_error = x$check$ratio %||% NA_real_, sigma = error_sd(x),
+             nobs = length(x$rows), vectors = ncol(x$emulator$basis$vectors), runs = nrow(x$emulator$processes$inputs))
+}
+
+#' @rdname fit
+#' @export
+augment.amiss_fit <- function(x, data = NULL, newdata = NULL, ...) {
+  if (!is.null(data)) {
+    abort_input(c("{.arg data} is not used: the record is part of the fit.", i = "Another record is {.arg newdata}."))
+  }
+  if (!is.null(newdata)) return(augment_prediction(x, stats::predict(x, newdata, ...)))
+  rlang::check_dots_empty()
+  m <- x$measurements
+  conditions <- lapply(stats::setNames(nm = m$conditions), function(name) condition_values(m, name)[x$rows])
+  simulated <- simulated_mean(x)
+  out <- data.frame(time = m$time[x$rows], target = m$y[x$rows], conditions, .fitted = simulated,
+                    .resid = m$y[x$rows] - simulated, check.names = FALSE)
+  names(out)[2] <- m$target
+  out
+}
+
+augment_prediction <- function(fit, prediction) {
+  ends <- grep("^(lower|upper)", names(prediction), value = TRUE)
+  out <- data.frame(prediction[c("time", "observed")], .fitted = prediction$mean, .lower = prediction[[ends[1]]],
+                    .upper = prediction[[ends[2]]], .resid = prediction$observed - prediction$mean)
+  names(out)[2] <- fit$measurements$target
+  out
+}
+
+#' Summary of a calibration
+#'
+#' @param object A calibration ([calibrate()], [calibrate_paper()]).
+#' @param x Its summary.
+#' @param ... Not used: an argument that is not known is an error.
+#' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), `reach`, `check` and `trust` in
+#'   words.
+#' @export
+summary.amiss_fit <- function(object, ...) {
+  rlang::check_dots_empty()
+  structure(list(name = object$measurements$name, unit = object$measurements$unit, parameters = generics::tidy(object),
+                 glance = generics::glance(object), reach = if (!is.null(object$reach)) reach_words(object),
+                 check = object$check$verdict, trust = object$trust$verdict), class = "summary.amiss_fit")
+}
+
+#' @rdname summary.amiss_fit
+#' @export
+print.summary.amiss_fit <- function(x, ...) {
+  shown <- utils::head(x$parameters[names(x$parameters) != "label"], 6)
+  on_stdout(x, {
+    cli::cli_text("{.strong Calibration} on {x$glance$nobs} rows of {.val {x$name}}, ",
+                  "residual {signif(x$glance$sigma, 3)} {x$unit}")
+    cli::cli_text("log10 evidence {round(x$glance$log10_evidence, 2)}, {x$trust}")
+    say_table(shown)
+    more <- nrow(x$parameters) - nrow(shown)
+    if (more) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
+    cli::cli_bullets(c("*" = x$reach, "*" = x$check,
+                       ">" = "next: {.fun predict}, {.fun confint} or {.fun attribute_discrepancy}"))
+  })
+}

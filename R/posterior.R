@@ -1,0 +1,170 @@
+# Weighted draws of the parameters: their quantiles, equal ones from them, and their tables.
+
+# Posterior draws of the parameters in the unit cube.
+posterior_unit <- function(fit) (fit$posterior %||% fit$inside)$unit
+
+# n draws, each with equal weight, from weighted ones; deterministic.
+systematic_draws <- function(weights, n) {
+  findInterval((seq_len(n) - 0.5) / n, cumsum(weights / sum(weights)), left.open = TRUE) + 1L
+}
+
+# In the order of the first parameter, so that they cover the posterior evenly.
+even_draws <- function(fit, n) {
+  order <- order(fit$values[, 1])
+  order[systematic_draws(fit$weights[order], n)]
+}
+
+weighted_quantile <- function(x, w, probs) {
+  order <- order(x)
+  cumulative <- cumsum(w[order]) / sum(w)
+  stats::approx(cumulative, x[order], probs, rule = 2, ties = "ordered")$y
+}
+
+parameter_table <- function(fit) {
+  rows <- lapply(names(fit$emulator$parameters), function(n) {
+    q <- weighted_quantile(fit$values[, n], fit$weights, c(0.5, 0.025, 0.975))
+    data.frame(name = n, unit = fit$emulator$parameters[[n]]$unit, median = q[1], lower95 = q[2], upper95 = q[3])
+  })
+  do.call(rbind, rows)
+}
+
+#' The posterior of the parameters
+#'
+#' What R's users expect of a fitted model, from the weighted draws of a calibration; of an upgrade it is that of its
+#' last model.
+#'
+#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]).
+#' @param parm Names or numbers of parameters; all by default.
+#' @param level,conf.level Probability that the intervals hold; their ends cut off equal tails.
+#' @param ... Not used: an argument that is not known is an error.
+#' @return `coef()`: the posterior medians. `confint()`: a matrix of the ends of credible intervals. `vcov()`: the
+#'   covariance of the posterior. `tidy()`: a data frame with one row for each parameter: `term`, `label`, `unit`,
+#'   `estimate` (the median), `std.error` (the posterior's standard deviation), `conf.low`, `conf.high`.
+#' @seealso [as_draws][as.data.frame.amiss_fit] for the draws themselves.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
+#' m <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
+#' model <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+#'                             free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
+#' fit <- calibrate(train_emulator(simulate_design(model, m, runs = 30, seed = 1), m), m,
+#'                  control = list(ais = list(pilot_chains = 48, groups = 4)), seed = 1)
+#' confint(fit, "gain", level = 0.9)
+#' tidy(fit)
+#' @name posterior
+NULL
+
+#' @rdname posterior
+#' @export
+coef.amiss_fit <- function(object, ...) {
+  rlang::check_dots_empty()
+  table <- parameter_table(object)
+  stats::setNames(table$median, table$name)
+}
+
+#' @rdname posterior
+#' @export
+confint.amiss_fit <- function(object, parm = NULL, level = 0.95, ...) {
+  rlang::check_dots_empty()
+  check_level(level, "level")
+  names <- picked_parameters(object, parm)
+  tails <- c((1 - level) / 2, (1 + level) / 2)
+  ends <- vapply(names, function(n) weighted_quantile(object$values[, n], object$weights, tails), c(0, 0))
+  matrix(ends, ncol = 2, byrow = TRUE, dimnames = list(names, paste(format(100 * tails, trim = TRUE, digits = 3), "%")))
+}
+
+check_level <- function(level, name, call = rlang::caller_env()) {
+  check_input(checkmate::check_number(level, lower = 1e-6, upper = 1 - 1e-6), name, "It is a probability.", call = call)
+}
+
+picked_parameters <- function(fit, parm, call = rlang::caller_env()) {
+  names <- colnames(fit$values)
+  if (is.null(parm)) return(names)
+  ok <- if (is.numeric(parm)) all(parm %in% seq_along(names)) else all(parm %in% names)
+  if (!ok) {
+    unknown <- setdiff(parm, c(names, seq_along(names)))
+    abort_input(c("{.arg parm} names what is no parameter of this model: {.val {unknown}}.",
+                  i = "Its parameters: {.val {names}}."), call = call)
+  }
+  if (is.numeric(parm)) names[parm] else parm
+}
+
+#' @rdname posterior
+#' @export
+vcov.amiss_fit <- function(object, ...) {
+  rlang::check_dots_empty()
+  stats::cov.wt(object$values, object$weights / sum(object$weights), method = "ML")$cov
+}
+
+#' @rdname posterior
+#' @export
+tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
+  rlang::check_dots_empty()
+  check_level(conf.level, "conf.level")
+  ends <- stats::confint(x, level = conf.level)
+  declared <- x$emulator$parameters[rownames(ends)]
+  data.frame(term = rownames(ends), label = vapply(declared, `[[`, "", "label"),
+             unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
+             std.error = unname(sqrt(diag(stats::vcov(x)))),
+             conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]), row.names = NULL)
+}
+
+#' Posterior draws as other packages take them
+#'
+#' The draws of a calibration carry importance weights; here they are resampled to equal weights by a systematic rule
+#' and stand in an order that says nothing, as one chain: what `posterior` and `bayesplot` take. Draws of more weight
+#' than one of `draws` are repeated, so that the effective number of draws that `posterior` states is too large, and
+#' R-hat means nothing: whether the sampler can be trusted is `trust` of the fit.
+#'
+#' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]), of which it is the
+#'   last model.
+#' @param draws Number of draws; by default as many as the fit has.
+#' @param row.names,optional As [as.data.frame()] has them; `optional` is not used.
+#' @param ... Not used: an argument that is not known is an error.
+#' @return A data frame or matrix with one row for each draw and one column for each parameter; of `as_draws()`,
+#'   `as_draws_df()` and `as_draws_matrix()` of `posterior` the class of that name.
+#' @examplesIf requireNamespace("posterior", quietly = TRUE)
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
+#' m <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
+#' model <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+#'                             free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
+#' fit <- calibrate(train_emulator(simulate_design(model, m, runs = 30, seed = 1), m), m,
+#'                  control = list(ais = list(pilot_chains = 48, groups = 4)), seed = 1)
+#' posterior::summarise_draws(posterior::as_draws_df(fit), "mean", "sd")
+#' @export
+as.data.frame.amiss_fit <- function(x, row.names = NULL, optional = FALSE, draws = nrow(x$values), ...) {
+  rlang::check_dots_empty()
+  as.data.frame(equal_draws(x, draws), row.names = row.names)
+}
+
+#' @rdname as.data.frame.amiss_fit
+#' @export
+as.matrix.amiss_fit <- function(x, draws = nrow(x$values), ...) {
+  rlang::check_dots_empty()
+  equal_draws(x, draws)
+}
+
+#' @rdname as.data.frame.amiss_fit
+#' @exportS3Method posterior::as_draws_matrix
+as_draws_matrix.amiss_fit <- function(x, draws = nrow(x$values), ...) {
+  rlang::check_dots_empty()
+  posterior::as_draws_matrix(equal_draws(x, draws))
+}
+
+#' @rdname as.data.frame.amiss_fit
+#' @exportS3Method posterior::as_draws_df
+as_draws_df.amiss_fit <- function(x, draws = nrow(x$values), ...) {
+  rlang::check_dots_empty()
+  posterior::as_draws_df(posterior::as_draws_matrix(equal_draws(x, draws)))
+}
+
+#' @rdname as.data.frame.amiss_fit
+#' @exportS3Method posterior::as_draws
+as_draws.amiss_fit <- as_draws_df.amiss_fit
+
+# Halves of a chain that stood in the order of a parameter would disagree.
+equal_draws <- function(fit, n, call = rlang::caller_env()) {
+  check_input(checkmate::check_count(n, positive = TRUE), "draws", call = call)
+  fit$values[even_draws(fit, n)[with_seed(fit$seed, sample.int(n))], , drop = FALSE]
+}

@@ -1,0 +1,17 @@
+# What cli says in an expression, on standard output: there capture.output() and R Markdown find it.
+on_stdout <- function(x, said) {
+  cat(cli::cli_fmt(said), sep = "\n")
+  invisible(x)
+}
+
+# A data frame as a part of what cli says.
+say_table <- function(table) {
+  cli::cli_verbatim(utils::capture.output(print(table, digits = 3, row.names = FALSE)))
+}
+
+# The first parameters of a fit, and how many there are besides.
+say_parameters <- function(fit, most) {
+  table <- parameter_table(fit)
+  say_table(utils::head(table, most))
+  if (nrow(table) > most) cli::cli_text("{nrow(table) - most} more parameter{?s}: see {.fun tidy}")
+}

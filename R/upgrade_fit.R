@@ -1,0 +1,84 @@
+# An upgrade asked what a fitted model is asked: its last model answers.
+last_fit <- function(upgrade) upgrade$models[[length(upgrade$models)]]$fit
+
+#' @rdname posterior
+#' @export
+coef.amiss_upgrade <- function(object, ...) stats::coef(last_fit(object), ...)
+
+#' @rdname posterior
+#' @export
+confint.amiss_upgrade <- function(object, parm = NULL, level = 0.95, ...) {
+  stats::confint(last_fit(object), parm, level, ...)
+}
+
+#' @rdname posterior
+#' @export
+vcov.amiss_upgrade <- function(object, ...) stats::vcov(last_fit(object), ...)
+
+#' @rdname posterior
+#' @export
+tidy.amiss_upgrade <- function(x, conf.level = 0.95, ...) generics::tidy(last_fit(x), conf.level, ...)
+
+#' @rdname fit
+#' @export
+fitted.amiss_upgrade <- function(object, ...) stats::fitted(last_fit(object), ...)
+
+#' @rdname fit
+#' @export
+residuals.amiss_upgrade <- function(object, ...) stats::residuals(last_fit(object), ...)
+
+#' @rdname fit
+#' @export
+nobs.amiss_upgrade <- function(object, ...) stats::nobs(last_fit(object), ...)
+
+#' @rdname fit
+#' @export
+logLik.amiss_upgrade <- function(object, ...) stats::logLik(last_fit(object))
+
+#' @rdname fit
+#' @export
+augment.amiss_upgrade <- function(x, data = NULL, newdata = NULL, ...) {
+  generics::augment(last_fit(x), data = data, newdata = newdata, ...)
+}
+
+#' @rdname fit
+#' @export
+glance.amiss_upgrade <- function(x, ...) {
+  g <- x$gain
+  data.frame(generics::glance(last_fit(x), ...), adopted = length(x$models) - 1L,
+             named_cause = x$named_cause$mechanism %||% NA_character_, log10_bf = g$log10_bf,
+             rmse_before = g$rmse_calibration[1], rmse_after = g$rmse_calibration[2],
+             rmse_validation_before = g$rmse_validation[1], rmse_validation_after = g$rmse_validation[2])
+}
+
+#' @rdname predict.amiss_fit
+#' @export
+predict.amiss_upgrade <- function(object, newdata = NULL, ...) stats::predict(last_fit(object), newdata, ...)
+
+#' @rdname simulate.amiss_fit
+#' @export
+simulate.amiss_upgrade <- function(object, nsim = 1, seed = NULL, ...) {
+  stats::simulate(last_fit(object), nsim, seed, ...)
+}
+
+#' @rdname as.data.frame.amiss_fit
+#' @export
+as.data.frame.amiss_upgrade <- function(x, row.names = NULL, optional = FALSE, ...) {
+  as.data.frame(last_fit(x), row.names = row.names, ...)
+}
+
+#' @rdname as.data.frame.amiss_fit
+#' @export
+as.matrix.amiss_upgrade <- function(x, ...) as.matrix(last_fit(x), ...)
+
+#' @rdname as.data.frame.amiss_fit
+#' @exportS3Method posterior::as_draws_matrix
+as_draws_matrix.amiss_upgrade <- function(x, ...) posterior::as_draws_matrix(last_fit(x), ...)
+
+#' @rdname as.data.frame.amiss_fit
+#' @exportS3Method posterior::as_draws_df
+as_draws_df.amiss_upgrade <- function(x, ...) posterior::as_draws_df(last_fit(x), ...)
+
+#' @rdname as.data.frame.amiss_fit
+#' @exportS3Method posterior::as_draws
+as_draws.amiss_upgrade <- function(x, ...) posterior::as_draws_df(last_fit(x), ...)

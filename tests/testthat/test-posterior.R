@@ -1,0 +1,66 @@
+fit <- linear_fit()
+w <- fit$weights / sum(fit$weights)
+
+# The smallest value below which a share p of the weight lies, by a search.
+share_below <- function(x, at) sum(w[x <= at])
+
+test_that("intervals hold the share of the weight that they should", {
+  for (level in c(0.5, 0.95)) {
+    ends <- confint(fit, level = level)
+    for (name in rownames(ends)) {
+      # One draw more or less on each side.
+      expect_lte(abs(share_below(fit$values[, name], ends[name, 1]) - (1 - level) / 2), max(w) + 1e-12)
+      expect_lte(abs(share_below(fit$values[, name], ends[name, 2]) - (1 + level) / 2), max(w) + 1e-12)
+    }
+  }
+  expect_identical(colnames(confint(fit)), c("2.5 %", "97.5 %"))
+  expect_identical(confint(fit, "gain"), confint(fit)["gain", , drop = FALSE])
+  expect_identical(confint(fit, 2), confint(fit, "gain"))
+  expect_error(confint(fit, "slope"), "no parameter.*slope", class = "amiss_error_input")
+  expect_error(confint(fit, level = 95), "level", class = "amiss_error_input")
+})
+
+test_that("median and covariance are those of the weighted draws", {
+  for (name in names(coef(fit))) expect_lte(abs(share_below(fit$values[, name], coef(fit)[[name]]) - 0.5), max(w) + 1e-12)
+  centred <- sweep(fit$values, 2, colSums(w * fit$values))
+  expect_equal(vcov(fit), t(centred) %*% (w * centred), tolerance = 1e-10)
+})
+
+test_that("the tidy table carries labels, units and what the other methods say", {
+  table <- tidy(fit, conf.level = 0.9)
+  expect_named(table, c("term", "label", "unit", "estimate", "std.error", "conf.low", "conf.high"))
+  expect_identical(table$unit, c("K", ""))
+  expect_identical(table$label, c("offset", "gain"))
+  expect_identical(table$estimate, unname(coef(fit)))
+  expect_equal(table$std.error^2, unname(diag(vcov(fit))))
+  expect_identical(table$conf.high, unname(confint(fit, level = 0.9)[, 2]))
+})
+
+test_that("equal draws have the moments of the weighted ones, in an order that says nothing", {
+  mean <- colSums(w * fit$values)
+  sd <- sqrt(diag(vcov(fit)))
+  draws <- as.matrix(fit, draws = 2000)
+  # Systematic draws are off by less than independent ones, whose mean has an error of sd / sqrt(2000) = 0.022 sd.
+  expect_lt(max(abs(colMeans(draws) - mean) / sd), 0.022)
+  expect_equal(apply(draws, 2, stats::sd), sd, tolerance = 0.05)
+  # Of 2000 values in random order: five standard errors.
+  expect_lt(abs(cor(draws[-1, "offset"], draws[-2000, "offset"])), 5 / sqrt(2000))
+  expect_identical(as.matrix(fit, draws = 2000), draws)
+  expect_identical(as.data.frame(fit), as.data.frame(as.matrix(fit)))
+  expect_identical(dim(as.data.frame(fit, draws = 7)), c(7L, 2L))
+  expect_error(as.data.frame(fit, draws = 0), "draws", class = "amiss_error_input")
+})
+
+test_that("posterior takes the draws", {
+  skip_if_not_installed("posterior")
+  expect_s3_class(posterior::as_draws_df(fit), "draws_df")
+  expect_s3_class(posterior::as_draws(fit), "draws")
+  draws <- posterior::as_draws_matrix(fit, draws = 2000)
+  expect_s3_class(draws, "draws_matrix")
+  expect_identical(posterior::variables(draws), c("offset", "gain"))
+  expect_identical(posterior::nchains(draws), 1L)
+  told <- posterior::summarise_draws(draws, "mean", "rhat")
+  expect_lt(max(abs(told$mean - colSums(w * fit$values)) / sqrt(diag(vcov(fit)))), 0.022)
+  expect_lt(max(told$rhat), 1.05)
+  expect_error(posterior::as_draws_df(fit, chains = 2), class = "rlib_error_dots_nonempty")
+})
