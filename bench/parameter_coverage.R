@@ -28,9 +28,9 @@ one_world <- function(seed, family, parts) {
   start <- proc.time()[[3]]
   fit <- calibrate_refined(runs, world$measurements, seed = 1)
   table <- tidy(fit)
-  table <- table[table$name %in% names(truth), ]
-  data.frame(family = family, seed = seed, name = table$name, mechanism = table$name %in% names(hidden),
-             held = table$lower95 <= truth[table$name] & truth[table$name] <= table$upper95,
+  table <- table[table$term %in% names(truth), ]
+  data.frame(family = family, seed = seed, name = table$term, mechanism = table$term %in% names(hidden),
+             held = table$conf.low <= truth[table$term] & truth[table$term] <= table$conf.high,
              passed = fit$check$passed, runs = fit$runs_made, seconds = proc.time()[[3]] - start)
 }
 

@@ -44,8 +44,8 @@ sampled <- function(value, error) list(value = value, error = error)
 medians <- function(fit) {
   table <- tidy(fit)
   effective <- 1 / sum(fit$weights^2)
-  sampled(stats::setNames(table$median, table$name),
-          1.25 * (table$upper95 - table$lower95) / 3.92 / sqrt(effective))
+  sampled(stats::setNames(table$estimate, table$term),
+          1.25 * table$std.error / sqrt(effective))
 }
 
 evidence <- function(fit) sampled(c(log_evidence = fit$log_evidence), fit$standard_error)
