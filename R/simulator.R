@@ -124,7 +124,9 @@ simulate_measured <- function(simulator, values, measurements, uses, threads, ca
       }
     }
     hold <- ifelse(raw$use[own] == "warmup", raw$y[own], NA_real_)
-    fine <- simulate_runs(simulator, values, raw$drivers[own, needed, drop = FALSE], raw$step_h, hold, threads)
+    drivers <- raw$drivers[own, needed, drop = FALSE]
+    if (inherits(simulator, "amiss_program_simulator")) drivers <- structure(drivers, hours = raw$hours[own], calendar = !is.numeric(raw$time))
+    fine <- simulate_runs(simulator, values, drivers, raw$step_h, hold, threads)
     block <- measurements$block[own]
     whole <- !is.na(block)
     averaged <- rowsum(fine[whole, , drop = FALSE], block[whole], reorder = TRUE) / measurements$per_step
