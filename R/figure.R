@@ -26,6 +26,11 @@ figure_height <- function(figure, width = canvas_width) {
   (attr(figure, "height_in") %||% 5) * columns / narrow_columns(columns, width) + 0.3 * max(0, canvas_width - width)
 }
 
+# Where there is nothing to draw, the title says so.
+figure_of_nothing <- function(title) with_height(ggplot2::ggplot() + figure_titles(title) + figure_theme(), 1.5)
+
+stage_lines <- function() ggplot2::scale_linetype_manual(values = c("before" = "longdash", "after" = "solid", "the model" = "solid"))
+
 title_size <- 1.13  # of the letters
 subtitle_size <- 0.9
 

@@ -19,7 +19,7 @@ candidates_title <- function(table, decisive) {
 }
 
 figure_candidates <- function(upgrade) {
-  if (is.null(upgrade$candidates)) return(with_height(ggplot2::ggplot() + figure_titles("No mechanism was tried") + figure_theme(), 1.5))
+  if (is.null(upgrade$candidates)) return(figure_of_nothing("No mechanism was tried"))
   decisive <- upgrade$control$decisive
   table <- candidate_table(upgrade)
   adopted <- c("no change", table$mechanism[table$adopted])
@@ -35,14 +35,14 @@ figure_candidates <- function(upgrade) {
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.1, show.legend = FALSE) +
     ggplot2::geom_point(ggplot2::aes(size = .data$state), fill = "white", stroke = 1.2) +
     ggplot2::scale_size_manual(values = c("adopted" = 6, "tried" = 3.4, "tried, estimate rough" = 3.4), drop = FALSE) +
-    ggplot2::geom_text(ggplot2::aes(x = pmax(.data$upper95, .data$log10_bf), label = paste0("   ", signed(.data$log10_bf))), hjust = 0, size = 4.4, show.legend = FALSE) +
+    ggplot2::geom_text(ggplot2::aes(x = Inf, label = paste0("  ", signed(.data$log10_bf))), hjust = 0, size = 4.4, show.legend = FALSE) +
     ggplot2::scale_colour_manual(values = c("adopted" = stage_colours[["after"]], "tried" = grey, "tried, estimate rough" = grey), drop = FALSE) +
     ggplot2::scale_shape_manual(values = c("adopted" = 18, "tried" = 19, "tried, estimate rough" = 21), drop = FALSE) +
     ggplot2::scale_y_discrete(labels = function(x) wrap_labels(0.36)(sub("^[0-9.]+ ", "", x))) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y", labeller = wrap_strips()) +
     axis +
     figure_titles(candidates_title(table, decisive),
-                  sprintf("Right of the dashed line (odds of %s to 1) a mechanism may be adopted, the best one first. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals.", format(10^decisive, big.mark = ",")),
+                  sprintf("Right of the dashed line (odds of %s to 1) a mechanism may be adopted, the best one first. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals; numbers: estimates.", format(10^decisive, big.mark = ",")),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), paste0("   ", signed(table$log10_bf)))

@@ -39,10 +39,10 @@ fit_to_canvas <- function(plot) {
     if (is.character(text)) wrap_measured(text, width, letter_points * scale * size, face, family) else text
   }
   inside <- inches[["width"]] - 2 * margin_points / 72.27
-  plot$labels$title <- wrap(plot$labels$title, inside, title_size, "bold")
-  plot$labels$subtitle <- wrap(plot$labels$subtitle, inside, subtitle_size)
-  plot$labels$x <- wrap(plot$labels$x, 0.55 * inside, 1)
-  plot$labels$y <- wrap(plot$labels$y, 0.5 * inches[["height"]], 1)
+  plot$labels["title"] <- list(wrap(plot$labels$title, inside, title_size, "bold"))
+  plot$labels["subtitle"] <- list(wrap(plot$labels$subtitle, inside, subtitle_size))
+  plot$labels["x"] <- list(wrap(plot$labels$x, 0.55 * inside, 1))
+  plot$labels["y"] <- list(wrap(plot$labels$y, 0.5 * inches[["height"]], 1))
   plot$layers <- lapply(plot$layers, fit_text_layer, scale, family)
   plot$facet <- fit_columns(plot$facet, inches[["width"]])
   right <- margin_points + 72.27 * end_label_width(plot, scale, family)
@@ -54,7 +54,7 @@ fit_to_canvas <- function(plot) {
 }
 
 fit_text_layer <- function(layer, scale, family) {
-  if (!inherits(layer$geom, "GeomText") && !inherits(layer$geom, "GeomTextRepel")) return(layer)
+  if (!inherits(layer$geom, "GeomText")) return(layer)
   fitted <- list(size = (layer$aes_params$size %||% 4.4) * scale, family = family)
   ggplot2::ggproto(NULL, layer, aes_params = utils::modifyList(layer$aes_params, fitted))
 }

@@ -73,11 +73,12 @@ figure_criteria <- function(comparison) {
     ggplot2::geom_text(ggplot2::aes(label = format(.data$rank), colour = .data$first), size = 5.2, fontface = "bold") +
     ggplot2::scale_fill_manual(values = c("first" = "#0072B2", "not first" = "grey92")) +
     ggplot2::scale_colour_manual(values = c("first" = "white", "not first" = "grey20")) +
-    ggplot2::scale_x_discrete(NULL, position = "top", labels = function(x) wrap_labels(0.62 / length(criteria))(x)) +
+    ggplot2::scale_x_discrete(NULL, position = "top") +
     figure_titles(title, "Rank of each model by each criterion; blue is first.", y = NULL) +
     figure_theme() +
-    ggplot2::theme(legend.position = "none", panel.grid = ggplot2::element_blank())
-  with_height(figure, 2.2 + 0.5 * nlevels(table$model))
+    ggplot2::theme(legend.position = "none", panel.grid = ggplot2::element_blank(),
+                   axis.text.x.top = ggplot2::element_text(angle = 90, hjust = 0, vjust = 0.5))
+  with_height(figure, 3.2 + 0.5 * nlevels(table$model))
 }
 
 attribution_words <- function(comparison) {

@@ -73,3 +73,22 @@ figure_response <- function(upgrade, classes = 10) {
     figure_theme()
   with_height(figure, 5)
 }
+
+# The response that the model lacks, of each of the leading conditions, in the unit of the target.
+figure_missing <- function(discrepancy, most = 4) {
+  responses <- discrepancy$responses
+  size <- sqrt(colMeans(responses^2))
+  shown <- names(sort(size, decreasing = TRUE))[seq_len(min(most, length(size)))]
+  table <- data.frame(time = rep(clock(discrepancy$series$time), length(shown)), value = as.numeric(responses[, shown]),
+                      panel = factor(rep(shown, each = nrow(responses)), shown), part = rep(discrepancy$segment, length(shown)))
+  figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, .data$value, group = .data$part)) +
+    ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
+    ggplot2::geom_line(colour = stage_colours[["the model"]], linewidth = 0.9) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, labeller = wrap_strips()) +
+    figure_titles(sprintf("What the model lacks is mostly a response to %s, typically %s %s", shown[1], short(size[[shown[1]]]),
+                          pretty_unit(discrepancy$unit)),
+                  "How the target answers to each boundary condition, present and past, beyond what the model says. Above zero the model is too low, below it too high.",
+                  x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +
+    time_axis(table$time) + figure_theme()
+  with_height(figure, 2 + 1.2 * length(shown))
+}

@@ -1,4 +1,5 @@
-figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day")
+figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day", "priors",
+                  "moved", "steps", "missing", "emulator", "sampler")
 
 # Okabe and Ito's colours: told apart by colour-blind readers and in print.
 stage_colours <- c("before" = "#D55E00", "after" = "#0072B2", "the model" = "#0072B2")
@@ -10,7 +11,10 @@ stage_colours <- c("before" = "#D55E00", "after" = "#0072B2", "the model" = "#00
 #' @param x,object An object of this package.
 #' @param which Which figure of an upgrade: `"fit"` (measured and simulated), `"attribution"` (what the error answers
 #'   to), `"candidates"` (mechanisms tried), `"parameters"`, `"discrepancy"` (over time), `"response"` (error against
-#'   the leading boundary condition), `"gain"` (scores before and after) or `"mean_day"`. Of a comparison: `"evidence"`,
+#'   the leading boundary condition), `"gain"` (scores before and after), `"mean_day"`, `"priors"` (against posteriors),
+#'   `"moved"` (parameters that moved between the models, and what they trade off with), `"steps"` (what each mechanism
+#'   brought), `"missing"` (the response that the first model lacks, by boundary condition), `"emulator"` (its errors on
+#'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`,
 #'   `"criteria"` (ranks by each), `"attribution"`, `"fit"` (measured and simulated), `"discrepancy"` (over time), `"parameters"`,
 #'   `"heat_loss"` (of zones) or `"held_out"` (where rows validate).
 #' @param ... Not used.
@@ -39,6 +43,10 @@ plot.amiss_calibration <- function(x, ...) draw(figure_parameters(list("the mode
 
 #' @rdname figures
 #' @export
+plot.amiss_ais <- function(x, ...) draw(figure_sampler(list("the model" = x)))
+
+#' @rdname figures
+#' @export
 plot.amiss_measurements <- function(x, ...) draw(figure_measurements(x))
 
 #' @rdname figures
@@ -56,6 +64,10 @@ autoplot.amiss_discrepancy <- function(object, ...) figure_discrepancy(list("the
 #' @rdname figures
 #' @export
 autoplot.amiss_calibration <- function(object, ...) figure_parameters(list("the model" = object))
+
+#' @rdname figures
+#' @export
+autoplot.amiss_ais <- function(object, ...) figure_sampler(list("the model" = object))
 
 #' @rdname figures
 #' @export
@@ -77,7 +89,13 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
     discrepancy = figure_discrepancy(lapply(stages, function(s) discrepancy(s$fit)), leading_condition(upgrade)),
     response = figure_response(upgrade),
     gain = figure_gain(upgrade),
-    mean_day = figure_mean_day(upgrade))
+    mean_day = figure_mean_day(upgrade),
+    priors = figure_priors(lapply(stages, `[[`, "fit")),
+    moved = figure_moved(upgrade),
+    steps = figure_steps(upgrade),
+    missing = figure_missing(discrepancy(stages[[1]]$fit)),
+    emulator = figure_emulator(lapply(stages, `[[`, "fit")),
+    sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)))
 }
 
 # Names of the figures that an object has.
