@@ -18,7 +18,7 @@ figure_attribution <- function(attributions) {
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
     ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$log10_bf_dropped), linewidth = 1.1) +
     ggplot2::geom_point(ggplot2::aes(shape = .data$significant), size = 4, fill = "white", stroke = 1.3) +
-    ggplot2::geom_text(ggplot2::aes(label = .data$label), hjust = 0, size = 4.6, show.legend = FALSE) +
+    ggplot2::geom_text(ggplot2::aes(label = .data$label), hjust = 0, size = 4.6, colour = "grey20", show.legend = FALSE) +
     ggplot2::scale_shape_manual(values = c("TRUE" = 19, "FALSE" = 21), labels = c("TRUE" = "significant", "FALSE" = "may be chance"),
                                 limits = c("TRUE", "FALSE")) +
     ggplot2::scale_y_continuous(NULL, breaks = seq_along(levels(table$boundary)), labels = levels(table$boundary)) +

@@ -1,5 +1,5 @@
-# A figure is fitted to its canvas when it is drawn: texts are wrapped by their measured width in the font of the device at
-# hand, letters shrink on a narrow canvas, panels go below each other, and there is room for labels at the ends of lines.
+# A figure is fitted to its canvas when it is drawn: texts are wrapped by their measured width in the font of the device
+# at hand, letters shrink on a narrow canvas, panels go below each other, and labels at the ends of lines get room.
 
 canvas_width <- 9  # inches: here letters have their full size
 letter_points <- 15

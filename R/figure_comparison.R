@@ -31,7 +31,7 @@ comparison_figure <- function(comparison, which, call = rlang::caller_env()) {
     heat_loss = figure_heat_loss(comparison))
 }
 
-model_colours <- c("highest evidence" = "#0072B2", "other models" = "#D55E00")
+model_colours <- c("highest evidence" = "#0072B2", "other models" = "#E69F00")
 
 model_scales <- function() ggplot2::scale_colour_manual(values = model_colours, aesthetics = c("colour", "fill"), drop = FALSE)
 

@@ -71,7 +71,7 @@ figure_gain <- function(upgrade) {
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$use, .data$value, fill = .data$stage)) +
     ggplot2::geom_col(position = dodge, width = 0.74) +
     ggplot2::geom_text(ggplot2::aes(label = .data$label, vjust = ifelse(.data$score == "coverage95", 3, -0.35),
-                                    colour = ifelse(.data$score == "coverage95", "white", "black")), position = dodge, size = 4.3) +
+                                    colour = ifelse(.data$score == "coverage95" & .data$stage != "before", "white", "black")), position = dodge, size = 4.3) +
     ggplot2::scale_colour_identity() +
     ggplot2::geom_hline(ggplot2::aes(yintercept = .data$value), target, linetype = "dashed", colour = "grey20") +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 3, labeller = wrap_strips(3)) +

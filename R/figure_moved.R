@@ -11,7 +11,7 @@ posterior_points <- function(values, weights, from, to) {
   data.frame(value = d$x, density = d$y)
 }
 
-# Densities of prior and posterior of each parameter of one calibration, each over the greater of its two heights.
+# Densities of prior and posterior of each parameter of one calibration, each over its greatest value.
 density_table <- function(fit) {
   rows <- parameter_rows(fit)
   tables <- lapply(seq_len(nrow(rows)), function(k) {
@@ -39,13 +39,14 @@ figure_priors <- function(fits) {
   title <- if (length(loose)) paste("The measurements say little about", listed(loose))
            else "The measurements narrow every parameter"
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$value, colour = .data$stage, linetype = .data$stage)) +
-    ggplot2::geom_area(ggplot2::aes(y = .data$prior), table[!duplicated(table[c("panel", "value")]), ], fill = "grey85",
-                       colour = NA, show.legend = FALSE) +
+    ggplot2::geom_ribbon(ggplot2::aes(ymin = 0, ymax = .data$prior, group = .data$stage), fill = "grey85", colour = NA,
+                         show.legend = FALSE) +
     ggplot2::geom_line(ggplot2::aes(y = .data$posterior), linewidth = 1.1) +
     ggplot2::scale_x_continuous(n.breaks = 4, labels = short_axis, guide = apart) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 3, scales = "free_x", labeller = wrap_strips(3)) +
     stage_scales() + stage_lines() +
-    figure_titles(title, "Grey: what was thought possible (prior). Lines: what the measurements leave of it; each at its own height.") +
+    figure_titles(title, paste("Grey: what was thought possible (prior). Lines: what the measurements leave of it;",
+                               "each at its own height.")) +
     figure_theme() +
     ggplot2::theme(axis.text.y = ggplot2::element_blank(), panel.grid.major.y = ggplot2::element_blank(),
                    strip.text = ggplot2::element_text(size = ggplot2::rel(0.83)))
@@ -79,12 +80,14 @@ figure_moved <- function(upgrade) {
   long$state <- factor(ifelse(long$clear, "beyond its former 95 % interval", "within it"),
                        c("beyond its former 95 % interval", "within it"))
   gone <- as.character(table$label[table$clear])
-  title <- if (length(gone)) sprintf("With the change, %d of %d parameters leave their former 95 %% intervals", length(gone), nrow(table))
+  title <- if (length(gone)) sprintf("With the change, %d of %d parameters leave their former 95 %% intervals",
+                                     length(gone), nrow(table))
            else "With the change, no parameter leaves its former 95 % interval"
-  figure <- ggplot2::ggplot(long[!is.na(long$value), ], ggplot2::aes(.data$value, .data$label, shape = .data$state)) +
+  figure <- ggplot2::ggplot(long[!is.na(long$value), ],
+                            ggplot2::aes(.data$value, .data$label, shape = .data$state)) +
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
-    ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$value), colour = stage_colours[["after"]], linewidth = 1.1,
-                            show.legend = FALSE) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$value), colour = stage_colours[["after"]],
+                            linewidth = 1.1, show.legend = FALSE) +
     ggplot2::geom_point(colour = stage_colours[["after"]], fill = "white", size = 3.6, stroke = 1.2) +
     ggplot2::scale_shape_manual(values = c(19, 21), drop = FALSE) +
     ggplot2::scale_x_continuous(n.breaks = 4, guide = apart) +

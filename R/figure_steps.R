@@ -22,8 +22,8 @@ figure_steps <- function(upgrade) {
   drop <- -diff(shown$rmse)
   best <- which.max(drop)
   title <- if (drop[best] <= 0) "No step lowers the error"
-           else sprintf("%s brings most: the typical error (%s) %s", sub("^\\+ ", "", as.character(shown$step[best + 1])),
-                        use[length(use)], change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
+           else sprintf("%s brings most: the typical error (%s) %s",
+                        sub("^\\+ ", "", as.character(shown$step[best + 1])), use[length(use)], change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$rmse, .data$step, colour = .data$use, shape = .data$use)) +
     ggplot2::geom_vline(xintercept = m$noise_sd, linetype = "dashed", colour = "grey20") +
     ggplot2::geom_path(ggplot2::aes(group = .data$use), linewidth = 0.8) +
@@ -32,7 +32,8 @@ figure_steps <- function(upgrade) {
     ggplot2::scale_shape_manual(values = stats::setNames(c(19, 17), use_names)) +
     ggplot2::scale_x_continuous(limits = c(0, NA), guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.3)) +
-    figure_titles(title, "Each row adds one mechanism to the row above. Dashed: the stated noise, below which there is nothing left to gain.",
+    figure_titles(title, paste("Each row adds one mechanism to the row above. Dashed: the stated noise, below which",
+                               "there is nothing left to gain."),
                   x = axis_label("typical error, RMSE", m$unit)) +
     figure_theme()
   with_height(figure, 2.6 + 0.6 * nlevels(table$step))

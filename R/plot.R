@@ -1,8 +1,8 @@
 figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day", "priors",
                   "moved", "steps", "missing", "emulator", "sampler")
 
-# Okabe and Ito's colours: told apart by colour-blind readers and in print.
-stage_colours <- c("before" = "#D55E00", "after" = "#0072B2", "the model" = "#0072B2")
+# Okabe and Ito's colours: told apart by colour-blind readers and, one light and one dark, in grey.
+stage_colours <- c("before" = "#E69F00", "after" = "#0072B2", "the model" = "#0072B2")
 
 #' Figures
 #'

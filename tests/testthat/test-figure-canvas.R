@@ -10,7 +10,8 @@ skip_without_devices <- function() {
 
 # TRUE where nothing is drawn along the edges of the canvas: text that runs out of it crosses them.
 edges_blank <- function(figure, width, res = 120) {
-  captured <- ragg::agg_capture(width = width, height = figure_height(figure, width / res) * res, units = "px", res = res, background = "white")
+  captured <- ragg::agg_capture(width = width, height = figure_height(figure, width / res) * res, units = "px",
+                                res = res, background = "white")
   withr::defer(grDevices::dev.off())
   print(figure)
   pixels <- captured(native = FALSE)
@@ -66,7 +67,8 @@ test_that("a figure keeps its whole title, and builds without a device", {
 test_that("figures look as they did", {
   skip_on_cran()
   skip_if_not_installed("vdiffr")
-  skip_if_not(utils::packageVersion("ggplot2") >= "3.4.1" && utils::packageVersion("ggplot2") < "3.5", "drawn with ggplot2 3.4")
+  version <- utils::packageVersion("ggplot2")
+  skip_if_not(version >= "3.4.1" && version < "3.5", "drawn with ggplot2 3.4")
   m <- measurements(data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4)), time = "hour", target = "Ti",
                     boundary = ~Te, noise_sd = 0.1, warmup = 6, unit = "K", name = "a room")
   vdiffr::expect_doppelganger("measurements", ggplot2::autoplot(m))
