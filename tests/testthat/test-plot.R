@@ -47,7 +47,7 @@ test_that("stages have figures of their own", {
 test_that("figures are saved, one PNG each", {
   folder <- withr::local_tempdir()
   paths <- save_figures(small_upgrade(), folder, dpi = 40)
-  expect_setequal(basename(paths), paste0(c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day"), ".png"))
+  expect_setequal(basename(paths), paste0(figure_names, ".png"))
   expect_true(all(file.size(paths) > 1000))
 })
 
@@ -64,13 +64,4 @@ test_that("a circular condition is shown in degrees", {
   table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Wd = (1:48 * 15) %% 360)
   m <- measurements(table, time = "hour", target = "Ti", boundary = ~ circular(Wd), noise_sd = 0.1, warmup = 6)
   expect_equal(condition_values(m, "Wd"), table$Wd)
-})
-
-test_that("lines of a title do not begin with a per cent sign", {
-  for (width in 1:12) {
-    long <- paste(c(strrep("x", width), rep("word", 12), "97 % of it lie inside"), collapse = " ")
-    lines <- strsplit(figure_titles(long)$title, "\n")[[1]]
-    expect_identical(paste(lines, collapse = " "), long)
-    expect_false(any(grepl("^%", lines)))
-  }
 })

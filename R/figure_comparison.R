@@ -31,7 +31,7 @@ comparison_figure <- function(comparison, which, call = rlang::caller_env()) {
     heat_loss = figure_heat_loss(comparison))
 }
 
-model_colours <- c("highest evidence" = "#0072B2", "other models" = "#D55E00")
+model_colours <- c("highest evidence" = "#0072B2", "other models" = "#E69F00")
 
 model_scales <- function() ggplot2::scale_colour_manual(values = model_colours, aesthetics = c("colour", "fill"), drop = FALSE)
 
@@ -44,18 +44,19 @@ mark_models <- function(table, comparison) {
 
 figure_evidence <- function(comparison) {
   table <- mark_models(comparison$tables$evidence, comparison)
-  table$label <- paste0("   ", sprintf("%.1f", table$log10_evidence), ", probability ", percent(table$probability), ifelse(table$trusted, "", " (rough)"))
+  told <- paste0(table$model, ": ", sprintf("%.1f", table$log10_evidence), ", probability ", percent(table$probability), ifelse(table$trusted, "", " (rough)"))
+  names(told) <- table$model
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$log10_evidence, .data$model, colour = .data$standing)) +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.4) +
     ggplot2::geom_point(size = 4) +
-    ggplot2::geom_text(ggplot2::aes(label = .data$label, x = pmax(.data$log10_evidence, .data$upper95)), hjust = 0, size = 4.6, show.legend = FALSE) +
-    ggplot2::scale_x_continuous("log10 evidence", expand = ggplot2::expansion(mult = c(0.05, 0.6))) +
-    ggplot2::scale_y_discrete(NULL, limits = rev) +
+    ggplot2::scale_x_continuous(guide = apart) +
+    ggplot2::scale_y_discrete(limits = rev, labels = function(x) wrap_labels(0.36)(told[x])) +
     model_scales() +
     figure_titles(sub(":.*", "", evidence_sentences(comparison)[1]),
-                  "How well each model predicts the record before it is seen, with the price of its freedom. Lines: 95 % intervals. 2 more: 100 times more probable.") +
+                  "How well each model predicts the record before it is seen, with the price of its freedom. Lines: 95 % intervals. 2 more: 100 times more probable.",
+                  x = "log10 evidence") +
     figure_theme()
-  with_height(figure, 2 + 0.45 * nrow(table))
+  with_height(figure, 2.2 + 0.6 * nrow(table))
 }
 
 figure_criteria <- function(comparison) {
@@ -72,11 +73,12 @@ figure_criteria <- function(comparison) {
     ggplot2::geom_text(ggplot2::aes(label = format(.data$rank), colour = .data$first), size = 5.2, fontface = "bold") +
     ggplot2::scale_fill_manual(values = c("first" = "#0072B2", "not first" = "grey92")) +
     ggplot2::scale_colour_manual(values = c("first" = "white", "not first" = "grey20")) +
-    ggplot2::scale_x_discrete(NULL, position = "top", labels = function(x) gsub(" ", "\n", x)) +
+    ggplot2::scale_x_discrete(NULL, position = "top") +
     figure_titles(title, "Rank of each model by each criterion; blue is first.", y = NULL) +
     figure_theme() +
-    ggplot2::theme(legend.position = "none", panel.grid = ggplot2::element_blank())
-  with_height(figure, 2.2 + 0.5 * nlevels(table$model))
+    ggplot2::theme(legend.position = "none", panel.grid = ggplot2::element_blank(),
+                   axis.text.x.top = ggplot2::element_text(angle = 90, hjust = 0, vjust = 0.5))
+  with_height(figure, 3.2 + 0.5 * nlevels(table$model))
 }
 
 attribution_words <- function(comparison) {
@@ -92,7 +94,7 @@ condition_panels <- function(table, comparison, value) {
   ggplot2::ggplot(table, ggplot2::aes(.data[[value]], .data$boundary, colour = .data$standing, shape = .data$state)) +
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
     ggplot2::scale_shape_manual(values = c("significant" = 19, "may be chance" = 21)) +
-    ggplot2::facet_wrap(ggplot2::vars(.data$model), nrow = ceiling(nlevels(table$model) / 3)) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$model), ncol = min(3, nlevels(table$model)), labeller = wrap_strips(3)) +
     model_scales() + figure_theme()
 }
 
@@ -113,8 +115,9 @@ figure_dropped <- function(comparison) {
   figure <- condition_panels(table, comparison, "log10_bf_dropped") +
     ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$log10_bf_dropped), linewidth = 1.1, show.legend = FALSE) +
     ggplot2::geom_point(size = 3.2, fill = "white", stroke = 1.1) +
-    signed_log_axis("evidence lost when it is ignored (log10 Bayes factor)", table$log10_bf_dropped) +
-    figure_titles(attribution_words(comparison), "Each boundary condition, present and past: how much worse the discrepancy is explained without it.", y = NULL)
+    signed_log_axis(table$log10_bf_dropped) +
+    figure_titles(attribution_words(comparison), "Each boundary condition, present and past: how much worse the discrepancy is explained without it.",
+                  x = "evidence lost when it is ignored (log10 Bayes factor)")
   with_height(figure, panel_height(comparison))
 }
 
@@ -132,7 +135,7 @@ figure_models_in_time <- function(comparison, use) {
     ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$standing), alpha = 0.25) +
     ggplot2::geom_line(ggplot2::aes(y = .data$observed), colour = "grey15", linewidth = 0.9) +
     ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$standing), linewidth = 0.7) +
-    ggplot2::facet_grid(ggplot2::vars(.data$model), labeller = ggplot2::as_labeller(labels)) +
+    ggplot2::facet_grid(ggplot2::vars(.data$model), labeller = function(strip) lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
     model_scales() +
     figure_titles(title, "Black: measured. Coloured: simulated, with the band that should hold 95 % of the measurements. At the right: root mean squared error.",
                   x = time_label(table$time), y = axis_label(m$target, level_unit(m$unit, table$observed))) +
@@ -154,7 +157,7 @@ figure_discrepancies <- function(comparison) {
     ggplot2::geom_line(ggplot2::aes(y = .data$residual), colour = "grey65", linewidth = 0.5) +
     ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$standing), alpha = 0.3) +
     ggplot2::geom_line(ggplot2::aes(y = .data$discrepancy, colour = .data$standing), linewidth = 0.9) +
-    ggplot2::facet_grid(ggplot2::vars(.data$model), labeller = ggplot2::as_labeller(labels)) +
+    ggplot2::facet_grid(ggplot2::vars(.data$model), labeller = function(strip) lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
     model_scales() +
     figure_titles(title, "Grey: measured - simulated. Coloured: the discrepancy that answers to boundary conditions, with its 95 % band; at the right its root mean square.",
                   x = time_label(table$time), y = axis_label("error", m$unit)) +
@@ -184,13 +187,13 @@ figure_models_parameters <- function(comparison) {
     ggplot2::geom_point(ggplot2::aes(.data$median), size = 2.8) +
     ggplot2::geom_point(ggplot2::aes(.data$true, shape = "true value"), known, colour = "black", size = 3, stroke = 1.3) +
     ggplot2::scale_shape_manual(values = c("true value" = 4)) +
-    ggplot2::scale_x_continuous(n.breaks = 4, labels = short_axis) +
-    ggplot2::scale_y_discrete(NULL, limits = rev) +
-    ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 3, scales = "free", labeller = ggplot2::label_wrap_gen(30)) +
+    ggplot2::scale_x_continuous(n.breaks = 4, labels = short_axis, guide = apart) +
+    ggplot2::scale_y_discrete(NULL, limits = rev, labels = wrap_labels(0.25)) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 3, scales = "free", labeller = wrap_strips(3)) +
     model_scales() +
     figure_titles(title, paste("Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95 % intervals.",
                                if (nrow(known)) "Crosses: true values.")) +
-    figure_theme() + ggplot2::theme(strip.text = ggplot2::element_text(size = 12.5))
+    figure_theme() + ggplot2::theme(strip.text = ggplot2::element_text(size = ggplot2::rel(0.83)))
   rows <- tapply(as.character(table$model), table$panel, function(x) length(unique(x)))
   with_height(figure, 1.9 + ceiling(nlevels(table$panel) / 3) * (0.7 + 0.23 * max(rows)))
 }
@@ -218,7 +221,7 @@ figure_heat_loss <- function(comparison) {
     (if (!is.na(true)) ggplot2::geom_vline(xintercept = true, colour = "black", linetype = "dashed", linewidth = 0.9)) +
     ggplot2::geom_violin(alpha = 0.35, scale = "width", width = 0.8) +
     ggplot2::stat_summary(fun = mean, geom = "point", size = 3, show.legend = FALSE) +
-    ggplot2::scale_y_discrete(NULL, limits = rev) +
+    ggplot2::scale_y_discrete(NULL, limits = rev, labels = wrap_labels(0.25)) +
     model_scales() +
     figure_titles(title, paste("Shapes: the posterior, from the simulator at its draws, in the steady state and the mean wind of the calibration.",
                                "Points: means.", if (!is.na(true)) "Dashed: the truth."),

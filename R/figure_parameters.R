@@ -1,0 +1,41 @@
+# Parameters, before and after the measurements and from model to model.
+
+# Parameters of a calibration with their priors; `at_edge` where the median lies in the outer 5 % of the prior.
+parameter_rows <- function(fit) {
+  table <- parameter_table(fit)
+  declared <- fit$emulator$parameters[table$name]
+  side <- function(u, fallback) vapply(declared, function(p) {
+    limit <- prior_quantile(p$prior, u)
+    if (is.finite(limit)) limit else prior_quantile(p$prior, fallback)
+  }, 0)
+  cbind(table, label = vapply(declared, `[[`, "", "label"), prior_lower = side(0, 0.001), prior_upper = side(1, 0.999),
+        at_edge = unname(edge_of_prior(fit)[table$name]))
+}
+
+parameters_title <- function(table) {
+  count <- vapply(split(table$at_edge, table$stage), function(e) sprintf("%d of %d", sum(e), length(e)), "")
+  if (length(count) < 2) paste("At the edge of what was thought possible:", count, "parameters")
+  else sprintf("At the edge of what was thought possible: %s parameters before, %s after", count[1], count[2])
+}
+
+figure_parameters <- function(fits) {
+  table <- stage_table(fits, parameter_rows)
+  table$panel <- axis_label(table$label, table$unit)
+  table$panel <- factor(table$panel, unique(table$panel))
+  table$row <- factor(table$stage, rev(levels(table$stage)))
+  edge <- table[table$at_edge, ]
+  figure <- ggplot2::ggplot(table, ggplot2::aes(y = .data$row, colour = .data$stage)) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$prior_lower, xmax = .data$prior_upper), colour = "grey88", linewidth = 9) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.6) +
+    ggplot2::geom_point(ggplot2::aes(.data$median), size = 3.6) +
+    ggplot2::geom_point(ggplot2::aes(.data$median, shape = "at the edge of its prior"), edge, colour = "black", size = 6, stroke = 1.1) +
+    ggplot2::scale_shape_manual(values = c("at the edge of its prior" = 1)) +
+    ggplot2::scale_x_continuous(n.breaks = 4, labels = short_axis, guide = apart) +
+    ggplot2::coord_cartesian(clip = "off") +
+    ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free", labeller = wrap_strips(2)) +
+    stage_scales() +
+    figure_titles(parameters_title(table), "Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95 % intervals.") +
+    figure_theme() +
+    ggplot2::theme(panel.grid.major.y = ggplot2::element_blank(), axis.text.y = ggplot2::element_blank(), strip.text = ggplot2::element_text(size = ggplot2::rel(0.87)))
+  with_height(figure, 1.9 + 1.02 * ceiling(nlevels(table$panel) / 2))
+}
