@@ -27,7 +27,8 @@ TEST(LogSumExpRows, IsThatOfEachRow) {
   x.row(2) << 1000.0, 1000.0, -kInfinity;
   const VectorXd rows = log_sum_exp_rows(x);
   for (Index i = 0; i < 5; ++i) {
-    if (i != 1) EXPECT_NEAR(rows[i], log_sum_exp(x.row(i).transpose()), 1e-12 * std::abs(rows[i])) << i;
+    if (i == 1) continue;
+    EXPECT_NEAR(rows[i], log_sum_exp(x.row(i).transpose()), 1e-12 * std::abs(rows[i])) << i;
   }
   EXPECT_EQ(rows[1], -kInfinity);
   EXPECT_NEAR(rows[2], 1000.0 + std::log(2.0), 1e-10);
