@@ -5,8 +5,8 @@
 #' line of names; otherwise conditions are called `bc1`, `bc2`, ... and parameters `p1`, `p2`, ... or as in
 #' `parameters`.
 #'
-#' ESP-r puts a row of zeros, the base case, first in `inputs.csv`. It stays if it has its run and the others are
-#' relative to their ranges, of which it is the middle; otherwise it is no run of the design and is left out.
+#' ESP-r puts a row of zeros, the base case, first in `inputs.csv`. It stays if it has its run and lies between the
+#' others, as it does where values are relative to their ranges; otherwise it is no run of the design and is left out.
 #'
 #' @param folder The folder.
 #' @param parameters The [free()] parameters that the columns of `inputs.csv` are, in their order, in a list; if not
@@ -14,6 +14,7 @@
 #' @param relative `TRUE` if the values in `inputs.csv` go from -1 to 1, the lower and the upper limit of the
 #'   parameter's prior, as ESP-r writes them; this needs `parameters`.
 #' @param step_h Length of an interval in hours.
+#' @param files Names of the tables, where they differ: `obs`, `bc`, `inputs`, `sims`.
 #' @return A list: `data`, a data frame of `hour`, `target` and the conditions for [measurements()]; `boundary`, the
 #'   names of the conditions; `design` and `outputs` for [ensemble()].
 #' @examples
@@ -30,25 +31,28 @@
 #' files <- read_calibro(folder, gains, relative = TRUE)
 #' room <- measurements(files$data, "hour", "target", files$boundary, noise_sd = 0.1)
 #' ensemble(files$design, files$outputs, gains, measurements = room)
+#' @seealso [amiss()] calibrates what was read.
 #' @export
-read_calibro <- function(folder, parameters = NULL, relative = FALSE, step_h = 1) {
+read_calibro <- function(folder, parameters = NULL, relative = FALSE, step_h = 1, files = NULL) {
   call <- rlang::current_env()
   check_input(checkmate::check_directory_exists(folder), "folder")
   check_input(checkmate::check_flag(relative), "relative")
   check_input(checkmate::check_number(step_h, lower = 1e-9, finite = TRUE), "step_h")
-  files <- c(obs = "obs.csv", bc = "bc.csv", inputs = "inputs.csv", sims = "sims.csv")
-  tables <- lapply(files, function(file) read_numbers(file.path(folder, file), call))
-  check_calibro_steps(tables, folder)
-  runs <- without_base_case(tables$inputs, tables$sims, relative, folder)
+  files <- merge_control(calibro_files, as.list(files), "files")
+  for (name in names(files)) check_input(checkmate::check_string(files[[name]]), paste0("files$", name))
+  tables <- lapply(files, function(file) read_numbers(fs::path_abs(file, folder), call))
+  check_calibro_steps(tables, files)
+  runs <- without_base_case(tables$inputs, tables$sims, files)
   colnames(tables$bc) <- colnames(tables$bc) %||% paste0("bc", seq_len(ncol(tables$bc)))
   taken <- intersect(colnames(tables$bc), c("hour", "target"))
-  if (length(taken)) abort_input(paste("A boundary condition in {.file {file.path(folder, 'bc.csv')}} cannot be named",
-                                       "{.val {taken}}."))
+  if (length(taken)) abort_input("A boundary condition in {.file {files$bc}} cannot be named {.val {taken}}.")
   data <- data.frame(hour = step_h * seq_len(nrow(tables$obs)), target = tables$obs[, 1], tables$bc,
                      check.names = FALSE)
   list(data = data, boundary = colnames(tables$bc), design = calibro_design(runs$inputs, parameters, relative),
        outputs = unname(runs$sims))
 }
+
+calibro_files <- list(obs = "obs.csv", bc = "bc.csv", inputs = "inputs.csv", sims = "sims.csv")
 
 # A table of numbers with or without a line of names.
 read_numbers <- function(path, call) {
@@ -71,27 +75,29 @@ read_numbers <- function(path, call) {
   table
 }
 
-check_calibro_steps <- function(tables, folder, call = rlang::caller_env()) {
+check_calibro_steps <- function(tables, files, call = rlang::caller_env()) {
   steps <- vapply(tables[c("obs", "bc", "sims")], nrow, 0L)
   if (length(unique(steps)) > 1) {
-    abort_input(c(paste("The files in {.file {folder}} are of unequal length: obs.csv has {steps[['obs']]} rows,",
-                        "bc.csv {steps[['bc']]} and sims.csv {steps[['sims']]}."),
+    abort_input(c(paste("The tables are of unequal length: {files$obs} has {steps[['obs']]} rows, {files$bc}",
+                        "{steps[['bc']]} and {files$sims} {steps[['sims']]}."),
                   i = "Each needs one row for every step of the record."), call = call)
   }
-  if (ncol(tables$obs) != 1) abort_input(paste("{.file {file.path(folder, 'obs.csv')}} has {ncol(tables$obs)}",
-                                               "columns; one is expected, the target."), call = call)
+  if (ncol(tables$obs) != 1) abort_input(paste("{.file {files$obs}} has {ncol(tables$obs)} columns; one is expected,",
+                                               "the target."), call = call)
 }
 
-without_base_case <- function(inputs, sims, relative, folder, call = rlang::caller_env()) {
+without_base_case <- function(inputs, sims, files, call = rlang::caller_env()) {
   base <- nrow(inputs) > 1 && all(inputs[1, ] == 0)
   has_run <- ncol(sims) == nrow(inputs)
   if (!has_run && !(base && ncol(sims) == nrow(inputs) - 1)) {
-    abort_input(c(paste("{.file {file.path(folder, 'inputs.csv')}} has {nrow(inputs)} rows and sims.csv {ncol(sims)}",
-                        "columns; each row needs its run."),
+    abort_input(c(paste("{.file {files$inputs}} has {nrow(inputs)} rows and {files$sims} {ncol(sims)} columns; each",
+                        "row needs its run."),
                   i = "A first row of zeros, the base case, may be without."), call = call)
   }
-  if (!base || relative && has_run) return(list(inputs = inputs, sims = sims))
-  cli::cli_inform("The first row of inputs.csv, all zeros, is left out as the base case.",
+  if (!base) return(list(inputs = inputs, sims = sims))
+  ranges <- apply(inputs[-1, , drop = FALSE], 2, range)
+  if (has_run && all(ranges[1, ] <= 0 & ranges[2, ] >= 0)) return(list(inputs = inputs, sims = sims))
+  cli::cli_inform("The first row of {files$inputs}, all zeros, is left out as the base case.",
                   class = "amiss_message_base_case")
   list(inputs = inputs[-1, , drop = FALSE], sims = if (has_run) sims[, -1, drop = FALSE] else sims)
 }

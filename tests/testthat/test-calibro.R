@@ -33,6 +33,20 @@ test_that("the base case is left out where it is no run of the design", {
   expect_message(files <- read_calibro(write_folder(absolute, run(relative)), parameters), "base case")
   expect_equal(unname(files$design), absolute[-1, ])
   expect_equal(files$outputs, run(relative)[, -1])
+  expect_no_message(files <- read_calibro(write_folder(relative, run(relative))))
+  expect_equal(unname(files$design), unname(relative))
+})
+
+test_that("the files may have other names", {
+  folder <- write_folder(relative, run(relative))
+  file.rename(file.path(folder, "obs.csv"), file.path(folder, "room_obs.csv"))
+  elsewhere <- withr::local_tempfile(fileext = ".csv")
+  file.rename(file.path(folder, "sims.csv"), elsewhere)
+  files <- read_calibro(folder, files = list(obs = "room_obs.csv", sims = elsewhere))
+  expect_equal(files$outputs, run(relative))
+  expect_error(read_calibro(folder, files = list(observed = "obs.csv")), "unknown option.*observed",
+               class = "amiss_error_input")
+  expect_error(read_calibro(folder, files = list(obs = c("a", "b"))), "files\\$obs", class = "amiss_error_input")
 })
 
 test_that("tables that do not fit are refused", {
