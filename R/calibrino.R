@@ -160,5 +160,5 @@ data_results <- function(fit) {
 
 # One tag a line, as ESP-r reads it.
 write_calibro_json <- function(results, file = "calibro_report.json") {
-  jsonlite::write_json(results, file, pretty = TRUE, auto_unbox = TRUE, digits = I(8))
+  jsonlite::write_json(results, file, pretty = TRUE, auto_unbox = TRUE, digits = I(15))
 }

@@ -74,7 +74,7 @@ test_that("indices are printed, tidied and drawn", {
   expect_true(all(table$conf.low <= table$conf.high & table$conf.low >= 0 & table$conf.high <= 1))
   expect_identical(as.data.frame(indices), indices$table)
   figure <- ggplot2::autoplot(indices)
-  expect_match(figure$labels$title, "^x2 moves the simulation most: [0-9]+ % of its variance, [0-9]+ % by itself$")
+  expect_match(figure$labels$title, "^x2 moves the simulation most: [0-9]+ % of its variance by itself, [0-9]+ % with")
   expect_s3_class(ggplot2::ggplot_build(figure), "ggplot_built")
 })
 
