@@ -10,6 +10,7 @@
 #' @importFrom rlang %||% .data
 #' @importFrom generics tidy glance augment
 #' @importFrom ggplot2 autoplot
+#' @aliases amiss-package
 #' @keywords internal
 "_PACKAGE"
 

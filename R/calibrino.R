@@ -97,7 +97,7 @@ calibrino_fit <- function(asked) {
   }
   files <- read_calibro(".", step_h = asked$step,
                         files = list(obs = asked$obs, bc = asked$bc, inputs = asked$input, sims = asked$sim))
-  names(files$data)[2] <- tools::file_path_sans_ext(basename(asked$obs))
+  names(files$data)[2] <- as.character(fs::path_ext_remove(basename(asked$obs)))
   amiss(files$data, files$design, files$outputs, noise_sd = asked$noise, seed = asked$seed, threads = asked$threads)
 }
 
