@@ -97,7 +97,8 @@ calibrino_fit <- function(asked) {
   }
   files <- read_calibro(".", step_h = asked$step,
                         files = list(obs = asked$obs, bc = asked$bc, inputs = asked$input, sims = asked$sim))
-  names(files$data)[2] <- as.character(fs::path_ext_remove(basename(asked$obs)))
+  record <- as.character(fs::path_ext_remove(basename(asked$obs)))
+  if (!record %in% names(files$data)) names(files$data)[2] <- record
   amiss(files$data, files$design, files$outputs, noise_sd = asked$noise, seed = asked$seed, threads = asked$threads)
 }
 

@@ -54,15 +54,18 @@ test_that("functions drawn go through the runs and vary elsewhere as the emulato
   expect_lt(max(abs(rowMeans(drawn[41:44, ]) - known$mean[, 1]) / sqrt(known$variance[, 1])), 0.4)
 })
 
-test_that("a fit has the indices of its emulator over the priors, and R's generator stays as it was", {
+test_that("a fit and a refined emulator have the indices over the priors, and R's generator stays as it was", {
   m <- linear_measurements(linear_data(48))
-  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 1), m)
-  fit <- structure(list(emulator = c(emulator, list(over_priors = emulator)), measurements = m, rows = 1:48),
-                   class = c("amiss_calibration", "amiss_fit"))
+  made <- simulate_design(linear_simulator(), m, runs = 30, seed = 1)
+  emulator <- train_emulator(made, m)
+  fit <- calibrate(emulator, m, c(quick_ais, check = 0, exact = 0), seed = 1)
+  refined <- train_emulator(refine_ensemble(made, fit, runs = 20), m)
+  expect_false(is.null(refined$processes$region))
   small <- function(x) sobol_indices(x, points = 64, replicates = 4, seed = 3)$table
   set.seed(1)
   before <- .Random.seed
   expect_identical(small(fit), small(emulator))
+  expect_identical(small(refined), small(emulator))
   expect_identical(.Random.seed, before)
 })
 
