@@ -21,7 +21,7 @@ calibration_words <- function(fit, only) {
        tag = if (trusted) "Calibration" else "Calibration that is not to be trusted",
        headline = sprintf("The calibrated model's typical error is %s %s, %s times the stated noise.",
                           short(model$scores$calibrate[["rmse"]]), pretty_unit(fit$measurements$unit), short(left$ratio)),
-       sure = c(sprintf("Sampler: %s.", fit$posterior$verdict), if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
+       sure = c(sprintf("Sampler: %s.", (fit$posterior %||% fit$trust)$verdict), if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
        gain = gain_sentences(only),
        remains = c(if (left$large && !is.null(left$pattern)) sprintf("In the error that remains, %s.", left$pattern$what),
                    if (!is.null(fit$reach)) paste0(toupper(substr(reach_words(fit), 1, 1)), substring(reach_words(fit), 2), "."),

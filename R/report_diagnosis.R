@@ -363,7 +363,7 @@ score_tiles <- function(upgrade) {
                  paste("in the 95 % band,", if (held) "held-out" else "calibration")))
 }
 
-attribution_words <- function(table) {
+conditions_words <- function(table) {
   data.frame("boundary condition" = table$boundary, "log10 Bayes factor lost without it" = sprintf("%+.1f", table$log10_bf_dropped),
              "share of the error" = sprintf("%.0f %%", 100 * table$share), "p-value" = format(round(table$p_value, 3)),
              significant = ifelse(table$significant, "yes", "no"), estimate = ifelse(table$trusted, "sound", "rough"), check.names = FALSE)

@@ -50,15 +50,16 @@ comparison_inspections <- function(comparison) {
 
 trust_inspections <- function(fit, name) {
   runs <- nrow(fit$emulator$processes$inputs)
+  sampler <- fit$posterior %||% fit$trust  # of the paper's calibration
   more <- if (is.null(fit$emulator$simulator)) "give more runs where the posterior lies"
           else sprintf("make more runs (%d now)", runs)
   c(if (isFALSE(fit$check$passed)) {
       c(emulator = sprintf("The emulator of %s is not trusted (%s): %s before anything is read from its numbers.", name,
                            fit$check$verdict, more))
     },
-    if (!fit$posterior$trusted) {
+    if (!sampler$trusted) {
       c(sampler = sprintf("The sampler's result for %s is not trusted (%s): give it more chains (pilot_chains, %d now).", name,
-                          sub("^not trusted: ", "", fit$posterior$verdict), as.integer(fit$control$ais$pilot_chains)))
+                          sub("^not trusted: ", "", sampler$verdict), as.integer(fit$control$ais$pilot_chains)))
     })
 }
 
@@ -165,13 +166,13 @@ site_inspection <- function(upgrade, model) {
 
 # ---- what was not adopted
 
-# The best of the mechanisms left, where it is neither adopted nor out of the question.
+# The best of the mechanisms left, where the evidence for it is substantial but not decisive.
 nearest_inspection <- function(upgrade) {
   last <- upgrade$models[[length(upgrade$models)]]
   trials <- upgrade$candidates[upgrade$candidates$from == last$name, ]
   if (!NROW(trials)) return(NULL)
   best <- trials[which.max(trials$log10_bf), ]
-  if (best$probability < rival_probability) return(NULL)
+  if (best$probability < rival_probability || best$log10_bf < 0.5) return(NULL)
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   c(nearest = sprintf("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it, or a look for %s on site.",
                       best$mechanism, odds(best$log10_bf), paste(listed(drivers), if (length(drivers) > 1) "change" else "changes"),
@@ -255,7 +256,7 @@ remainder_inspection <- function(model, measurements) {
   left <- remaining_error(model, measurements)
   noise <- paste0(short(measurements$noise_sd), " ", pretty_unit(measurements$unit))
   if (left$large && is.null(left$pattern)) {
-    return(c(noise = sprintf("The remaining error is %s times the stated noise of %s: check that figure against the sensor's own, by a second sensor beside it.",
+    return(c(noise = sprintf("The remaining error is %s times the stated noise of %s: hold a second sensor beside the first; if that noise is right, something is still missing from the model.",
                              short(left$ratio), noise)))
   }
   if (left$large) return(c(pattern = sprintf("In the error that remains, %s. %s", left$pattern$what, left$pattern$where)))
@@ -283,6 +284,7 @@ separation_inspection <- function(comparison) {
   name <- names(which.max(abs(conditions)))
   at <- which.max(apart)
   c(separate = sprintf("Not told apart are %s and %s. Their simulations differ most (by %s %s) at %s, and the more so the %s %s is: measure under such conditions.",
-                       best$model, best$against, short(apart[at]), pretty_unit(m$unit), format(a$time[at]),
+                       best$model, best$against, short(apart[at]), pretty_unit(m$unit),
+                       paste0(if (is.numeric(a$time)) "hour ", format(a$time[at])),
                        if (conditions[[name]] > 0) "higher" else "lower", name))
 }

@@ -67,7 +67,8 @@ test_that("numbers that are not trusted come first", {
   upgrade$models[[2]]$fit$posterior[c("trusted", "verdict")] <- list(FALSE, "not trusted: chains stand still")
   told <- inspected(upgrade)
   expect_identical(names(told)[1:2], c("emulator", "sampler"))
-  expect_match(told[1], "emulator of base is not trusted \\(half of the noise\\): make more runs \\(30 now\\)")
+  runs <- nrow(upgrade$models[[1]]$fit$emulator$processes$inputs)
+  expect_match(told[1], sprintf("emulator of base is not trusted \\(half of the noise\\): make more runs \\(%d now\\)", runs))
   expect_match(told[2], "\\(chains stand still\\): give it more chains \\(pilot_chains, 24 now\\)")
   upgrade$models[[1]]$fit$emulator["simulator"] <- list(NULL)
   expect_match(inspected(upgrade)[1], "give more runs where the posterior lies")
@@ -121,7 +122,7 @@ test_that("models that are not told apart are so where their simulations differ 
   compared$models$b$prediction$mean <- compared$models$a$prediction$mean + c(data$Te / 10)
   told <- summary(compared)$inspect
   at <- which.max(data$Te)
-  expect_match(about(told, "separate"), sprintf("differ most \\(by %s K\\) at %s, and the more so the higher Te is", short(data$Te[at] / 10), data$hour[at]))
+  expect_match(about(told, "separate"), sprintf("differ most \\(by %s K\\) at hour %s, and the more so the higher Te is", short(data$Te[at] / 10), data$hour[at]))
   text <- knitr::knit(text = c("```{r}", "report_fragment(compared, \"summary\")", "```"), quiet = TRUE,
                       envir = list2env(list(compared = compared), parent = globalenv()))
   expect_match(text, "differ most")
