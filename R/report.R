@@ -20,7 +20,8 @@
 #'   `"summary"`, `"fit"`, `"parameters"`, `"lack"` and `"trust"`.
 #' @param level Level of the headings of the parts, 1 to 4.
 #' @return `report()`: `file`, invisibly. `report_fragment()`: text for knitr, which a chunk shows as it is.
-#' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the figures alone.
+#' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the
+#'   figures.
 #' @examples
 #' \dontrun{
 #' report(upgrade, "house.html")
@@ -51,8 +52,9 @@ report <- function(x, file, quiet = TRUE) {
 report_fragment <- function(x, parts = NULL, level = 2) {
   check_reported(x)
   check_input(checkmate::check_int(level, lower = 1, upper = 4), "level")
-  if (!requireNamespace("knitr", quietly = TRUE)) {
-    abort_input(c("A report needs the R package {.pkg knitr}.", i = "Run {.code install.packages(\"knitr\")}."))
+  if (!isTRUE(getOption("knitr.in.progress"))) {
+    abort_input(c("A fragment belongs in a chunk of a document that is being knit.",
+                  i = "{.fun report} writes a file of its own."))
   }
   all <- template_parts(x)
   parts <- parts %||% names(all)
@@ -98,7 +100,8 @@ check_report_tools <- function(call = rlang::caller_env()) {
   if (!rmarkdown::pandoc_available("2.0")) {
     abort_input(c("A report needs pandoc 2.0 or later, which was not found.",
                   i = paste("Install it (Debian: {.code apt-get install pandoc}; others:",
-                            "{.url https://pandoc.org/installing.html}), or work in RStudio, which brings it.")), call = call)
+                            "{.url https://pandoc.org/installing.html}), or work in RStudio, which brings it.")),
+                call = call)
   }
 }
 
@@ -106,7 +109,9 @@ report_path <- function(...) system.file("rmarkdown", ..., package = "amiss", mu
 
 # The parts of a template, each from its mark to the next.
 template_parts <- function(x) {
-  kind <- if (inherits(x, "amiss_upgrade")) "diagnosis" else if (inherits(x, "amiss_comparison")) "comparison" else "calibration"
+  kind <- if (inherits(x, "amiss_upgrade")) "diagnosis"
+          else if (inherits(x, "amiss_comparison")) "comparison"
+          else "calibration"
   text <- readLines(report_path("parts", paste0(kind, ".Rmd")), encoding = "UTF-8")
   mark <- "^<!-- part: (.*) -->$"
   starts <- grep(mark, text)

@@ -20,14 +20,17 @@ calibration_words <- function(fit, only) {
   list(title = fit$measurements$name, verdict = if (trusted) "named" else "likely",
        tag = if (trusted) "Calibration" else "Calibration that is not to be trusted",
        headline = sprintf("The calibrated model's typical error is %s %s, %s times the stated noise.",
-                          short(model$scores$calibrate[["rmse"]]), pretty_unit(fit$measurements$unit), short(left$ratio)),
-       sure = c(sprintf("Sampler: %s.", (fit$posterior %||% fit$trust)$verdict), if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
+                          short(model$scores$calibrate[["rmse"]]), pretty_unit(fit$measurements$unit),
+                          short(left$ratio)),
+       sure = c(sprintf("Sampler: %s.", (fit$posterior %||% fit$trust)$verdict),
+                if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
        gain = gain_sentences(only),
-       remains = c(if (left$large && !is.null(left$pattern)) sprintf("In the error that remains, %s.", left$pattern$what),
-                   if (!is.null(fit$reach)) paste0(toupper(substr(reach_words(fit), 1, 1)), substring(reach_words(fit), 2), "."),
+       remains = c(if (!is.null(left$pattern)) sprintf("In the error that remains, %s.", left$pattern$what),
+                   if (!is.null(fit$reach)) sub("^(.)(.*)$", "\\U\\1\\E\\2.", reach_words(fit), perl = TRUE),
                    if (length(edge)) sprintf("At the edge of what was thought possible: %s.", listed(edge))
                    else "No parameter is at the edge of its range."),
-       inspect = calibration_inspections(fit, model), parameters = parameters_words(fit), method = method_table(only), seed = fit$seed)
+       inspect = calibration_inspections(fit, model), parameters = parameters_words(fit),
+       method = method_table(only), seed = fit$seed)
 }
 
 #' @export

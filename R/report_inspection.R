@@ -20,7 +20,8 @@ upgrade_inspections <- function(upgrade) {
               c(steps = "Further causes were not looked for: raise control$max_steps and go on from here.")
             })
   if (length(told)) told
-  else c(nothing = "Nothing that this record could settle is open. The next test is a record of another season or another use.")
+  else c(nothing = paste("Nothing that this record could settle is open. The next test is a record of another",
+                         "season or another use."))
 }
 
 calibration_inspections <- function(fit, model = NULL) {
@@ -28,8 +29,8 @@ calibration_inspections <- function(fit, model = NULL) {
     if (!is.null(model)) held_out_inspection(model, fit$measurements),
     edge_inspections(fit), tied_inspections(fit), loose_inspections(fit),
     if (!is.null(model)) remainder_inspection(model, fit$measurements),
-    cause = paste("What its error answers to, and what may cause it, is not part of a calibration: attribute_discrepancy()",
-                  "asks the first, upgrade_model() with a catalogue of mechanisms the second."))
+    cause = paste("What its error answers to, and what may cause it, is not part of a calibration:",
+                  "attribute_discrepancy() asks the first, upgrade_model() with a catalogue of mechanisms the second."))
 }
 
 comparison_inspections <- function(comparison) {
@@ -58,7 +59,8 @@ trust_inspections <- function(fit, name) {
                            fit$check$verdict, more))
     },
     if (!sampler$trusted) {
-      c(sampler = sprintf("The sampler's result for %s is not trusted (%s): give it more chains (pilot_chains, %d now).", name,
+      c(sampler = sprintf(paste("The sampler's result for %s is not trusted (%s): give it more chains",
+                                "(pilot_chains, %d now)."), name,
                           sub("^not trusted: ", "", sampler$verdict), as.integer(fit$control$ais$pilot_chains)))
     })
 }
@@ -69,8 +71,8 @@ held_out_inspection <- function(model, measurements) {
   seen <- model$scores$calibrate[["rmse"]]
   held <- model$scores$validate[["rmse"]]
   if (is.na(held)) {
-    return(c(held_out = paste("No data were held out, so that no change could fail a test: keep some days from the calibration",
-                              "(argument validate of measurements()), or measure some more.")))
+    return(c(held_out = paste("No data were held out, so that no change could fail a test: keep some days from",
+                              "calibration (argument validate of measurements()), or measure some more.")))
   }
   if (held < 1.5 * max(seen, measurements$noise_sd)) return(NULL)
   beyond <- uncovered_conditions(measurements)
@@ -80,12 +82,13 @@ held_out_inspection <- function(model, measurements) {
   c(held_out = sprintf("On held-out data the error is %s times that in calibration: %s.", short(held / seen), where))
 }
 
-# Share of the held-out steps at which a condition lies outside of its range in calibration, where it is a tenth or more.
+# Share of the held-out steps at which a condition lies outside of its range in calibration, if a tenth or more.
 uncovered_conditions <- function(measurements) {
   share <- vapply(measurements$conditions, function(name) {
     value <- condition_values(measurements, name)
     seen <- range(value[measurements$use == "calibrate"], na.rm = TRUE)
-    mean(value[measurements$use == "validate"] < seen[1] | value[measurements$use == "validate"] > seen[2], na.rm = TRUE)
+    held <- value[measurements$use == "validate"]
+    mean(held < seen[1] | held > seen[2], na.rm = TRUE)
   }, 0)
   turning <- tabulate(measurements$condition, length(share)) == 2
   share[share >= 0.1 & !turning]
@@ -101,22 +104,25 @@ mechanism_inspections <- function(upgrade, model) {
   c(stats::setNames(told, rep("rival", length(told))),
     if (model$verdict == "stand-in") stand_in_inspection(model) else site_inspection(upgrade, model),
     if (any(grepl("drifting sensor", model$doubts))) {
-      c(drift = sprintf("Hold the sensor of %s beside a second one now and again later: a drift of it would explain as much as %s.",
+      c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: a drift of it would",
+                              "explain as much as %s."),
                         upgrade$measurements$target, model$mechanism))
     })
 }
 
-# What would tell two mechanisms apart: conditions that only one of them answers to, or what each asks to be found on site.
+# What would tell two mechanisms apart: conditions that only one answers to, or what each asks to be found on site.
 separating_words <- function(upgrade, trials, a, b) {
   drivers <- lapply(upgrade$catalogue[c(a, b)], `[[`, "boundary")
   only <- list(setdiff(drivers[[1]], drivers[[2]]), setdiff(drivers[[2]], drivers[[1]]))
   if (!length(unlist(only))) {
     called <- vapply(c(a, b), function(name) called_for(trials$parameters[[match(name, trials$mechanism)]]), "")
-    return(sprintf("Since %s and %s answer to the same conditions, only a look on site tells them apart: the one asks for %s, the other for %s.",
+    return(sprintf(paste("Since %s and %s answer to the same conditions, only a look on site tells them apart: the",
+                         "one asks for %s, the other for %s."),
                    a, b, called[1], called[2]))
   }
   together <- correlation_words(upgrade$measurements, drivers[[1]], drivers[[2]])
-  changing <- if (all(lengths(only))) sprintf("%s changes while %s does not, or the other way round", listed(only[[1]], "or"), listed(only[[2]], "or"))
+  either <- lapply(only, listed, "or")
+  changing <- if (all(lengths(only))) sprintf("%s changes while %s does not, or vice versa", either[[1]], either[[2]])
               else sprintf("%s changes and nothing else does", listed(unlist(only), "or"))
   sprintf("To tell %s from %s, measure while %s%s.", a, b, changing, together)
 }
@@ -150,7 +156,8 @@ confounded_inspection <- function(upgrade, model) {
 }
 
 stand_in_inspection <- function(model) {
-  c(stand_in = sprintf("Take %s as a sign and look for something that acts alike but shows on held-out data too: which days gain by it in calibration, and which lose held out?",
+  c(stand_in = sprintf(paste("Take %s as a sign and look for something that acts alike but shows on held-out data",
+                             "too: which days gain by it in calibration, and which lose held out?"),
                        model$mechanism))
 }
 
@@ -160,8 +167,9 @@ site_inspection <- function(upgrade, model) {
   own <- table[table$mechanism == model$mechanism, ]
   if (!NROW(own)) return(NULL)
   unit <- ifelse(nzchar(own$unit), paste0(" ", own$unit), "")
+  between <- sub(" to ", " and ", own[["95 % interval"]], fixed = TRUE)
   c(site = sprintf("If %s is the cause, %s: check that on site.", model$mechanism,
-                   listed(sprintf("%s lies between %s%s", own$parameter, sub(" to ", " and ", own[["95 % interval"]], fixed = TRUE), unit))))
+                   listed(sprintf("%s lies between %s%s", own$parameter, between, unit))))
 }
 
 # ---- what was not adopted
@@ -174,15 +182,18 @@ nearest_inspection <- function(upgrade) {
   best <- trials[which.max(trials$log10_bf), ]
   if (best$probability < rival_probability || best$log10_bf < 0.5) return(NULL)
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
-  c(nearest = sprintf("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it, or a look for %s on site.",
-                      best$mechanism, odds(best$log10_bf), paste(listed(drivers), if (length(drivers) > 1) "change" else "changes"),
+  c(nearest = sprintf(paste("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it,",
+                            "or a look for %s on site."),
+                      best$mechanism, odds(best$log10_bf),
+                      paste(listed(drivers), if (length(drivers) > 1) "change" else "changes"),
                       called_for(best$parameters[[1]])))
 }
 
 group_inspections <- function(attribution) {
   told <- vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
     several <- length(g$conditions) > 2
-    sprintf("In this record %s go together (correlation %.2f), so that the cause may lie with %s: measure some days on which %s changes while %s %s.",
+    sprintf(paste("In this record %s go together (correlation %.2f), so that the cause may lie with %s: measure",
+                  "some days on which %s changes while %s %s."),
             listed(g$conditions), g$correlation, if (several) "any of them" else "either", g$conditions[1],
             listed(g$conditions[-1]), if (several) "stay as they are" else "stays as it is")
   }, "")
@@ -197,10 +208,12 @@ answer_inspections <- function(upgrade, last) {
   told <- vapply(answers, function(name) {
     driven <- left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
     if (length(driven)) {
-      sprintf("The error still answers to %s, and of what it drives %s %s tried but not adopted: look for another way in which %s acts.",
+      sprintf(paste("The error still answers to %s, and of what it drives %s %s tried but not adopted: look for",
+                    "another way in which %s acts."),
               name, listed(driven), if (length(driven) > 1) "were" else "was", name)
     } else {
-      sprintf("The error still answers to %s, and no mechanism left in the catalogue is driven by it: think of what acts with %s, and add it.",
+      sprintf(paste("The error still answers to %s, and no mechanism left in the catalogue is driven by it: think",
+                    "of what acts with %s, and add it."),
               name, name)
     }
   }, "")
@@ -213,7 +226,8 @@ driver_inspections <- function(upgrade) {
   absent <- setdiff(drivers, upgrade$measurements$conditions)
   if (!length(absent)) return(NULL)
   driven <- names(upgrade$catalogue)[vapply(upgrade$catalogue, function(m) any(m$boundary %in% absent), NA)]
-  c(driver = sprintf("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of measurements(), so that the error can answer to it.",
+  c(driver = sprintf(paste("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of",
+                           "measurements(), so that the error can answer to it."),
                      listed(absent), if (length(absent) > 1) "drive" else "drives", listed(driven)))
 }
 
@@ -224,9 +238,10 @@ edge_inspections <- function(fit) {
   rows <- rows[rows$at_edge, ]
   upper <- abs(rows$prior_upper - rows$median) < abs(rows$median - rows$prior_lower)
   unit <- ifelse(nzchar(rows$unit), paste0(" ", pretty_unit(rows$unit)), "")
-  told <- sprintf("At the %s end of its prior (%s%s) lies %s: measure it, or widen the prior if %s is possible; otherwise it makes up for something else.",
-                  ifelse(upper, "upper", "lower"), short(ifelse(upper, rows$prior_upper, rows$prior_lower)), unit, rows$label,
-                  ifelse(upper, "more", "less"))
+  told <- sprintf(paste("At the %s end of its prior (%s%s) lies %s: measure it, or widen the prior if %s is",
+                        "possible; otherwise it makes up for something else."),
+                  ifelse(upper, "upper", "lower"), short(ifelse(upper, rows$prior_upper, rows$prior_lower)), unit,
+                  rows$label, ifelse(upper, "more", "less"))
   stats::setNames(told, rep("edge", length(told)))
 }
 
@@ -236,7 +251,8 @@ tied_inspections <- function(fit) {
   if (ncol(r) < 2) return(NULL)
   pairs <- which(abs(r) > 0.9 & upper.tri(r), arr.ind = TRUE)
   label <- parameter_labels(fit, colnames(r))
-  told <- sprintf("The parameters %s and %s trade off against each other (correlation %.2f): a measurement of either settles both.",
+  told <- sprintf(paste("The parameters %s and %s trade off against each other (correlation %.2f): a measurement of",
+                        "either settles both."),
                   label[pairs[, 1]], label[pairs[, 2]], r[pairs])
   stats::setNames(told, rep("tied", length(told)))
 }
@@ -245,7 +261,8 @@ loose_inspections <- function(fit) {
   left <- narrowing(fit)
   loose <- names(left)[left > 0.7]
   if (length(loose)) {
-    c(loose = sprintf("The record says little about %s: %s is still the prior's; if it matters, measure it or find a record in which it shows.",
+    c(loose = sprintf(paste("The record says little about %s: %s is still the prior's; if it matters, measure it or",
+                            "find a record in which it shows."),
                       listed(loose), if (length(loose) > 1) "their range" else "its range"))
   }
 }
@@ -256,12 +273,17 @@ remainder_inspection <- function(model, measurements) {
   left <- remaining_error(model, measurements)
   noise <- paste0(short(measurements$noise_sd), " ", pretty_unit(measurements$unit))
   if (left$large && is.null(left$pattern)) {
-    return(c(noise = sprintf("The remaining error is %s times the stated noise of %s: hold a second sensor beside the first; if that noise is right, something is still missing from the model.",
+    return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: hold a second sensor",
+                                   "beside the first; if that noise is right, something is still missing from the",
+                                   "model."),
                              short(left$ratio), noise)))
   }
-  if (left$large) return(c(pattern = sprintf("In the error that remains, %s. %s", left$pattern$what, left$pattern$where)))
+  if (left$large) {
+    return(c(pattern = sprintf("In the error that remains, %s. %s", left$pattern$what, left$pattern$where)))
+  }
   if (left$ratio < 0.6) {
-    c(noise = sprintf("The remaining error is only %s times the stated noise of %s: if the sensor is that good, state less noise, and causes that now hide in it will show.",
+    c(noise = sprintf(paste("The remaining error is only %s times the stated noise of %s: if the sensor is that",
+                            "good, state less noise, and causes that now hide in it will show."),
                       short(left$ratio), noise))
   }
 }
@@ -283,7 +305,8 @@ separation_inspection <- function(comparison) {
   }, 0)
   name <- names(which.max(abs(conditions)))
   at <- which.max(apart)
-  c(separate = sprintf("Not told apart are %s and %s. Their simulations differ most (by %s %s) at %s, and the more so the %s %s is: measure under such conditions.",
+  c(separate = sprintf(paste("Not told apart are %s and %s. Their simulations differ most (by %s %s) at %s, and the",
+                             "more so the %s %s is: measure under such conditions."),
                        best$model, best$against, short(apart[at]), pretty_unit(m$unit),
                        paste0(if (is.numeric(a$time)) "hour ", format(a$time[at])),
                        if (conditions[[name]] > 0) "higher" else "lower", name))

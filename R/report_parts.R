@@ -1,7 +1,7 @@
 # What the templates are written with. Each of these writes markdown, and HTML where the document becomes HTML.
 
-# Text as it is: nothing in it is markup, but 10^3 is set as a power. Entities, as pandoc reads them after everything that
-# could be markup: a colon makes a bare address a link, a number with a point at the beginning makes a list.
+# Text as it is: nothing in it is markup, but 10^3 is set as a power. Entities, as pandoc reads them after everything
+# that could be markup: a colon makes a bare address a link, a number with a point at the beginning makes a list.
 markdown_text <- function(x) {
   plain <- gsub("&", "&#38;", trimws(gsub("[[:space:]]+", " ", x)), fixed = TRUE)
   for (sign in strsplit("\\`*_{}[]$^~|@<>:()\"'+=-!", "")[[1]]) {
@@ -39,8 +39,8 @@ html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
   rows <- vapply(seq_len(nrow(table)), function(i) {
     paste0("<tr", if (bold[i]) " class=\"adopted\"", ">", cell(unlist(lapply(table[i, ], as.character)), "td"), "</tr>")
   }, "")
-  cat("\n```{=html}\n<div class=\"scroll\"><table><thead><tr>", cell(names(table), "th"), "</tr></thead><tbody>\n", paste(rows, collapse = "\n"),
-      "\n</tbody></table></div>\n```\n", sep = "")
+  cat("\n```{=html}\n<div class=\"scroll\"><table><thead><tr>", cell(names(table), "th"), "</tr></thead><tbody>\n",
+      paste(rows, collapse = "\n"), "\n</tbody></table></div>\n```\n", sep = "")
 }
 
 # A pipe table; its dashes are the widths of the columns, by the longest word and the length of what they hold.
@@ -69,7 +69,8 @@ html_text <- function(x) {
 
 narrow_canvas <- 4.2  # inches: of a figure on a phone
 
-# A figure of the result. In HTML it is drawn twice, also for a narrow page, where letters of the wide one were too small.
+# A figure of the result by its name, or one made already. In HTML it is drawn twice, also for a narrow
+# page, where letters of the wide one were too small.
 report_figure <- function(x, which) {
   figure <- if (inherits(x, "ggplot")) x else ggplot2::autoplot(x, which)
   alt <- paste0(which, ": ", gsub("[[:space:]]+", " ", figure$labels$title))
@@ -89,7 +90,8 @@ html_figure <- function(figure, alt) {
     save_figure(figure, file, width, dpi)
     knitr::image_uri(file)
   }
-  cat("\n```{=html}\n<picture><source media=\"screen and (max-width: 620px)\" srcset=\"", drawn(narrow, narrow_canvas, 170), "\">",
+  cat("\n```{=html}\n<picture><source media=\"screen and (max-width: 620px)\" srcset=\"",
+      drawn(narrow, narrow_canvas, 170), "\">",
       "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_text(alt), "\"></picture>\n```\n", sep = "")
 }
 

@@ -17,8 +17,9 @@ find_browser <- function(call = rlang::caller_env()) {
   found <- unname(found[nzchar(found) & file.exists(found)])
   if (!length(found)) {
     abort_input(c("A report in PDF is printed by Chromium, Chrome or Edge, and none was found.",
-                  x = if (nzchar(named)) "The environment variable CHROMOTE_CHROME names {.file {named}}, which does not exist.",
-                  i = "Install one (Debian: {.code apt-get install chromium}; others: {.url https://www.google.com/chrome/}).",
+                  x = if (nzchar(named)) "CHROMOTE_CHROME names {.file {named}}, which does not exist.",
+                  i = paste("Install one (Debian: {.code apt-get install chromium}; others:",
+                            "{.url https://www.google.com/chrome/})."),
                   i = "Or write {.code .html} and print it from a browser, or {.code .docx}."), call = call)
   }
   found[1]

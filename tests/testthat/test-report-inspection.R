@@ -19,12 +19,15 @@ test_that("rivals are told apart by what only one of them answers to, or on site
   used <- m$use == "calibrate"
   r <- cor(m$boundary[used, m$condition == 1], m$boundary[used, m$condition == 2])
   told <- about(inspected(upgrade), "rival")
-  expect_match(told, sprintf("tell sun from drift, measure while Gv changes while Te does not, .*correlation is %.2f", r))
+  expect_match(told, sprintf(paste("tell sun from drift, measure while Gv changes while Te does not, .*correlation",
+                                   "is %.2f"), r))
   expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
   upgrade$catalogue$drift$boundary <- "Gv"
-  expect_match(about(inspected(upgrade), "rival"), "only a look on site tells them apart: the one asks for a sun_gain of 0.00")
+  expect_match(about(inspected(upgrade), "rival"), paste("only a look on site tells them apart: the one asks for a",
+                                                         "sun_gain of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
-  expect_match(about(inspected(upgrade), "rival"), "What sun brings \\(gain of the sun\\) trades off against gain: measure that", all = FALSE)
+  expect_match(about(inspected(upgrade), "rival"), paste("What sun brings \\(gain of the sun\\) trades off against",
+                                                         "gain: measure that"), all = FALSE)
 })
 
 test_that("a stand-in and a drifting sensor have tests of their own", {
@@ -47,7 +50,8 @@ test_that("conditions that go together, answers without a mechanism and absent d
   attribution$table$group <- "Te or Gv"
   attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE, correlation = 0.97))
   upgrade$models[[1]]$attribution <- attribution
-  expect_match(about(inspected(upgrade), "group"), "Te and Gv go together .correlation 0.97.*Te changes while Gv stays as it is")
+  expect_match(about(inspected(upgrade), "group"), paste("Te and Gv go together .correlation 0.97.*Te changes while",
+                                                         "Gv stays as it is"))
   upgrade$catalogue$sun$boundary <- c("Gv", "wind")
   expect_match(about(inspected(upgrade), "driver"), "analysed: wind, which drives sun")
 })
@@ -56,7 +60,8 @@ test_that("a candidate that is near is named with what would decide it", {
   upgrade <- base_only(small_upgrade())
   upgrade$candidates$log10_bf <- c(1, -1)
   upgrade$candidates$probability <- c(0.8, 0.01)
-  expect_match(about(inspected(upgrade), "nearest"), "Not decided is sun \\(odds of 10 to 1 in favour\\).*Gv changes strongly")
+  expect_match(about(inspected(upgrade), "nearest"), paste("Not decided is sun \\(odds of 10 to 1 in favour\\).*Gv",
+                                                           "changes strongly"))
   upgrade$candidates$probability <- c(0.04, 0.01)
   expect_length(about(inspected(upgrade), "nearest"), 0)
 })
@@ -68,7 +73,8 @@ test_that("numbers that are not trusted come first", {
   told <- inspected(upgrade)
   expect_identical(names(told)[1:2], c("emulator", "sampler"))
   runs <- nrow(upgrade$models[[1]]$fit$emulator$processes$inputs)
-  expect_match(told[1], sprintf("emulator of base is not trusted \\(half of the noise\\): make more runs \\(%d now\\)", runs))
+  expect_match(told[1], sprintf(paste("emulator of base is not trusted \\(half of the noise\\): make more runs",
+                                      "\\(%d now\\)"), runs))
   expect_match(told[2], "\\(chains stand still\\): give it more chains \\(pilot_chains, 24 now\\)")
   upgrade$models[[1]]$fit$emulator["simulator"] <- list(NULL)
   expect_match(inspected(upgrade)[1], "give more runs where the posterior lies")
@@ -91,7 +97,8 @@ test_that("edges of the prior are told with the end and its value", {
   expect_length(edge_inspections(fit), 0)
   fit$values[, "gain"] <- 1.9999
   fit$posterior$unit[, match("gain", colnames(fit$values))] <- 0.99995
-  expect_match(edge_inspections(fit), "At the upper end of its prior \\(2.0\\) lies gain: measure it, .* if more is possible")
+  expect_match(edge_inspections(fit), paste("At the upper end of its prior \\(2.0\\) lies gain: measure it, .* if",
+                                            "more is possible"))
 })
 
 test_that("the size of the error that remains asks for a check of the noise", {
@@ -122,7 +129,8 @@ test_that("models that are not told apart are so where their simulations differ 
   compared$models$b$prediction$mean <- compared$models$a$prediction$mean + c(data$Te / 10)
   told <- summary(compared)$inspect
   at <- which.max(data$Te)
-  expect_match(about(told, "separate"), sprintf("differ most \\(by %s K\\) at hour %s, and the more so the higher Te is", short(data$Te[at] / 10), data$hour[at]))
+  expect_match(about(told, "separate"), sprintf(paste("differ most \\(by %s K\\) at hour %s, and the more so the",
+                                                      "higher Te is"), short(data$Te[at] / 10), data$hour[at]))
   text <- knitr::knit(text = c("```{r}", "report_fragment(compared, \"summary\")", "```"), quiet = TRUE,
                       envir = list2env(list(compared = compared), parent = globalenv()))
   expect_match(text, "differ most")

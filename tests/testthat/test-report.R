@@ -265,6 +265,8 @@ test_that("fragments go into a document of one's own, of any level, twice", {
   expect_match(said, "```r\n1 + 1\n```", fixed = TRUE)  # the options of the document are its own
   expect_no_match(said, "What drives the error")
   expect_length(list.files(figures, "png$", recursive = TRUE), 1)
+  expect_error(report_fragment(made), "belongs in a chunk", class = "amiss_error_input")
+  withr::local_options(knitr.in.progress = TRUE)
   expect_error(report_fragment(made, "nonsense"), "parts", class = "amiss_error_input")
   expect_error(report_fragment(made, level = 7), "level", class = "amiss_error_input")
   expect_error(report_fragment(1), "upgrade_model", class = "amiss_error_input")
