@@ -96,5 +96,5 @@ figure_moved <- function(upgrade) {
     figure_titles(title, paste("A parameter that moved far had made up for what was missing. One that is strongly correlated",
                                "with a new parameter trades off against it: data that tell the two apart come next.")) +
     figure_theme()
-  with_height(figure, 2.4 + 0.36 * nrow(table))
+  with_height(figure, 2.4 + 0.5 * nrow(table))
 }

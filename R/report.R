@@ -1,412 +1,138 @@
-#' Diagnosis in words
+#' Write a report
 #'
-#' What is wrong, how sure that is, what would change, what it brings and what remains, as plain sentences and tables;
-#' [report()] sets it out.
+#' First what was found in plain words, then what to inspect next, then the figures and tables behind it. `report()`
+#' writes a file of its own; `report_fragment()` is for a chunk of a document of yours, of any format that R Markdown
+#' knows. RStudio offers the R Markdown template of the report under *New File, From Template: Report of amiss*.
 #'
-#' @param object An upgrade ([upgrade_model()]).
-#' @param x The summary.
-#' @param ... Not used.
-#' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`), `tag`, `headline`; the
-#'   sentences `note`, `sure`, `change`, `gain` and `remains`; and the tables `scores`, `changes`, `candidates`,
-#'   `parameters`, `attribution` and `method`.
-#' @export
-summary.amiss_upgrade <- function(object, ...) {
-  verdict <- diagnosis_verdict(object)
-  last <- object$models[[length(object$models)]]
-  structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
-              list(note = size_note(object), sure = sure_sentences(object), change = change_sentences(object),
-                   gain = gain_sentences(object), remains = remaining_sentences(object), scores = scores_table(object),
-                   changes = changes_table(object), candidates = candidates_words(object),
-                   parameters = parameters_words(last$fit), attribution = last$attribution$table, method = method_table(object),
-                   stopped_because = object$stopped_because, seed = object$seed)), class = "summary.amiss_upgrade")
-}
-
-#' @rdname summary.amiss_upgrade
-#' @export
-print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
-  cli::cli_text("{.strong {x$title}}: {x$tag}")
-  cli::cli_text("{x$headline}")
-  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain, "What remains" = x$remains)
-  for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
-  cli::cli_bullets(c(">" = "next: {.fun report}"))
-})
-
-# The first step's trials, best first, and the probability that is left to no change.
-first_trials <- function(upgrade) {
-  table <- upgrade$candidates[upgrade$candidates$from == upgrade$models[[1]]$name, ]
-  table[order(-table$log10_bf), ]
-}
-
-last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$attribution$table
-
-# The verdict on the whole: what of the mechanisms adopted is named, or what stays open.
-diagnosis_verdict <- function(upgrade) {
-  adopted <- adopted_models(upgrade)
-  if (!length(adopted)) return(open_verdict(upgrade))
-  of <- function(verdict) Filter(function(m) m$verdict == verdict, adopted)
-  headline <- cause_headline(upgrade)
-  if (length(of("named"))) {
-    return(list(verdict = "named", tag = if (length(of("named")) > 1) "Causes named" else "Cause named", headline = headline))
-  }
-  likely <- of("likely")
-  if (length(likely)) {
-    return(list(verdict = "likely", tag = paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; ")), headline = headline))
-  }
-  list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
-}
-
-open_verdict <- function(upgrade) {
-  unexplained <- function(headline) list(verdict = "unexplained", tag = "Unexplained", headline = headline)
-  base <- upgrade$models[[1]]
-  answers <- significant_conditions(base$attribution$table)
-  if (length(answers)) {
-    return(unexplained(sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.", listed(answers))))
-  }
-  remainder <- remaining_error(base, upgrade$measurements)
-  if (remainder$large) {
-    return(unexplained(sprintf("Something is missing from the model that no mechanism of the catalogue explains: its error is %s times the stated noise; %s.",
-                               short(remainder$ratio), remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
-  }
-  if (!base$fit$trust$trusted) {
-    return(list(verdict = "nothing", tag = "Nothing decisive, but the numbers are not trusted",
-                headline = paste0("No mechanism is called for, but the numbers behind this are not to be trusted: ", base$fit$trust$verdict, ".")))
-  }
-  list(verdict = "nothing", tag = "Nothing decisive",
-       headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition.")
-}
-
-# The sentences of all mechanisms adopted, each as firmly as its verdict allows.
-cause_headline <- function(upgrade) {
-  adopted <- adopted_models(upgrade)
-  sentence <- function(m) upgrade$catalogue[[m$mechanism]]$sentence
-  adopted <- adopted[order(match(vapply(adopted, `[[`, "", "verdict"), c("named", "likely", "stand-in")))]
-  told <- vapply(seq_along(adopted), function(k) {
-    m <- adopted[[k]]
-    switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
-           likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
-           paste0("\"", m$mechanism, "\" fits too, but data held out do not gain by it: take it as a stand-in for something else."))
-  }, "")
-  paste(told, collapse = " ")
-}
-
-# TRUE where no data were held out, or the changes as a whole lower their error by more than its own error.
-improves_held_out <- function(upgrade) {
-  last <- upgrade$models[[length(upgrade$models)]]
-  !isFALSE(held_out_gain(upgrade$models[[1]], last)$improves)
-}
-
-# 10^x written out while it can be read.
-power_of_ten <- function(x) ifelse(x < 4.5, format_each_comma(signif(10^x, 2)), paste0("10^", round(x)))
-
-format_each_comma <- function(x) vapply(x, format, "", big.mark = ",", scientific = FALSE)
-
-odds <- function(x) {
-  size <- power_of_ten(abs(x))
-  if (size == "1") return("1 to 1, neither for nor against")
-  paste(size, if (x >= 0) "to 1 in favour" else "to 1 against")
-}
-
-evidence_sentence <- function(row) {
-  sprintf("The evidence for %s is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf), odds_interval(c(row$lower95, row$upper95)))
-}
-
-# Left out where both ends read the same.
-odds_interval <- function(interval) {
-  ends <- power_of_ten(abs(interval))
-  if (ends[1] == ends[2]) return("")
-  told <- if (interval[1] >= 0) paste(ends, collapse = " to ")
-  else if (interval[2] <= 0) paste(paste(rev(ends), collapse = " to "), "to 1 against")
-  else paste(ends[1], "to 1 against, to", ends[2], "to 1 in favour")
-  sprintf(" (95 %% interval: %s)", told)
-}
-
-sure_sentences <- function(upgrade) {
-  if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
-  trials <- first_trials(upgrade)
-  best <- trials[1, ]
-  needed <- sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no doubt who gains.", sub(" in favour", "", odds(upgrade$control$decisive)))
-  if (!length(adopted_models(upgrade))) {
-    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed, trust_sentence(upgrade, best)))
-  }
-  later <- vapply(adopted_models(upgrade)[-1], function(m) {
-    evidence_sentence(upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ])
-  }, "")
-  c(evidence_sentence(best), later, probability_sentence(trials), trust_sentence(upgrade, best))
-}
-
-# Only where the size of the error itself says that something is missing.
-missing_sentence <- function(upgrade) {
-  left <- remaining_error(upgrade$models[[1]], upgrade$measurements)
-  if (left$large) sprintf("That something is missing is plain: the error is %s times the stated noise. What it is stays open.", short(left$ratio))
-}
-
-probability_sentence <- function(trials) {
-  all <- stats::setNames(c(trials$probability, max(0, 1 - sum(trials$probability))), c(trials$mechanism, "no change"))
-  all <- sort(all, decreasing = TRUE)
-  near <- all[-1][all[-1] >= 0.01]
-  told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
-  paste0("Of ", nrow(trials), if (nrow(trials) == 1) " mechanism" else " mechanisms", " tried and \"no change\", all equally likely beforehand, ",
-         names(all)[1], " holds ", percent(unname(all[1])), " of the probability",
-         if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
-}
-
-# Whether the numbers behind the first decision can be trusted, in words; if not, whether the decision hangs on it.
-trust_sentence <- function(upgrade, best) {
-  base <- upgrade$models[[1]]$fit$trust
-  if (base$trusted && best$trusted) return("The numbers behind this can be trusted: the sampler passed its own checks.")
-  who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
-  why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
-  sprintf("The numbers are rough for %s%s: read the odds as an order of size. %s", listed(who), why,
-          if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
-          else "The decision may hang on it: more runs or chains would settle it.")
-}
-
-# How large the matter is, beside the noise and on data held out.
-size_note <- function(upgrade) {
-  m <- upgrade$measurements
-  seen <- score_of(upgrade, "calibrate", "rmse")
-  held <- score_of(upgrade, "validate", "rmse")
-  unit <- pretty_unit(m$unit)
-  noise <- sprintf("the stated measurement noise is %s %s", short(m$noise_sd), unit)
-  if (length(seen) < 2) return(sprintf("The model's typical error is %s %s; %s.", short(seen), unit, noise))
-  change <- if (length(upgrade$models) > 2) "changes" else "change"
-  if (!improves_held_out(upgrade)) {
-    return(sprintf("The %s not improve predictions of data the model has not seen (typical error %s %s before, %s after; %s). Take it as a hint, not as a repair.",
-                   if (length(upgrade$models) > 2) "changes do" else "change does", short(held[1]), unit, short(held[2]), noise))
-  }
-  if (anyNA(held)) sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit), noise)
-  else sprintf("With the %s the typical error on data the model has not seen %s; %s.", change, change_words(held[1], held[2], m$unit), noise)
-}
-
-adopted_models <- function(upgrade) upgrade$models[-1]
-
-change_sentences <- function(upgrade) {
-  adopted <- adopted_models(upgrade)
-  if (!length(adopted)) return("Nothing: the base model stays as it is.")
-  trials <- upgrade$candidates
-  unlist(lapply(adopted, function(model) {
-    row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
-    entry <- upgrade$catalogue[[model$mechanism]]
-    c(sprintf("%s (%s), driven by %s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf)),
-      step_sentence(upgrade, model), doubt_sentence(model), confounded_sentence(model))
-  }))
-}
-
-# What one step brought.
-step_sentence <- function(upgrade, model) {
-  parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
-  unit <- upgrade$measurements$unit
-  told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
-  gain <- model$held_out_gain
-  sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
-          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s the uncertainty of that change", told("validate"),
-                                                    if (gain$improves) "more than" else "not more than"))
-}
-
-doubt_sentence <- function(model) {
-  if (length(model$doubts)) sprintf("Against %s speaks that %s.", model$mechanism, listed(model$doubts))
-}
-
-confounded_sentence <- function(model) {
-  if (length(model$confounded_with)) {
-    sprintf("What %s does, %s could do in part as well (correlated beyond 0.4).", model$mechanism, listed(parameter_labels(model$fit, model$confounded_with)))
-  }
-}
-
-parameter_labels <- function(fit, names) {
-  rows <- parameter_rows(fit)
-  rows$label[match(names, rows$name)]
-}
-
-# The parameters that each adopted mechanism brought, as the last model sees them.
-changes_table <- function(upgrade) {
-  models <- upgrade$models
-  last <- parameters_words(models[[length(models)]]$fit)
-  rows <- lapply(seq_along(models)[-1], function(k) {
-    new <- setdiff(names(models[[k]]$fit$emulator$parameters), names(models[[k - 1]]$fit$emulator$parameters))
-    own <- last[last$name %in% new, ]
-    if (nrow(own)) cbind(mechanism = models[[k]]$mechanism, own)
-  })
-  do.call(rbind, rows)
-}
-
-gain_sentences <- function(upgrade) {
-  unit <- upgrade$measurements$unit
-  seen <- score_of(upgrade, "calibrate", "rmse")
-  held <- score_of(upgrade, "validate", "rmse")
-  inside <- score_of(upgrade, if (anyNA(held)) "calibrate" else "validate", "coverage95")
-  inside <- round(100 * inside[length(inside)])
-  told <- function(v) if (length(v) < 2) paste("is", short(v), pretty_unit(unit)) else change_words(v[1], v[2], unit)
-  c(paste0("The typical error (RMSE) ", told(seen), " in calibration", if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
-    if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
-    sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside, if (anyNA(held)) "calibration" else "held-out",
-            if (inside < 88) paste0(": ", narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
-}
-
-# Too few measurements in the band: because the simulation lies to one side of them, or all round.
-narrow_words <- function(upgrade) {
-  p <- upgrade$models[[length(upgrade$models)]]$prediction
-  p <- p[p$use == if (has_validation(upgrade)) "validate" else "calibrate", ]
-  bias <- mean(p$observed - p$mean)
-  if (abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
-  sprintf("the simulation is on average %s %s too %s there", short(abs(bias)), pretty_unit(upgrade$measurements$unit), if (bias > 0) "low" else "high")
-}
-
-remaining_sentences <- function(upgrade) {
-  answers <- significant_conditions(last_attribution(upgrade))
-  rows <- parameter_rows(upgrade$models[[length(upgrade$models)]]$fit)
-  edge <- rows$label[rows$at_edge]
-  last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
-  c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers)) else "The remaining error answers to no boundary condition.",
-    if (last$large) sprintf("In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
-                            if (is.null(last$pattern)) ": either the stated noise is too small, or something else is missing."
-                            else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    reach_sentence(upgrade$models[[length(upgrade$models)]]$fit), group_words(upgrade$models[[length(upgrade$models)]]$attribution),
-    if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these parameters make up for something else.", listed(edge))
-    else "No parameter is at the edge of its range.",
-    sprintf("The search stopped because %s%s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
-            if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))
-}
-
-# What the reach of the discrepancy says of the last model.
-reach_sentence <- function(fit) {
-  free <- sum(fit$reach[is.infinite(fit$control$reach)])
-  if (length(fit$reach) > 1 && free > 0.9) "What remains reaches into what the parameters can do: they may hide a part of it, so do not read their values as physical."
-}
-
-scores_table <- function(upgrade) {
-  table <- gain_table(upgrade)
-  values <- stats::xtabs(seq_len(nrow(table)) ~ paste(table$panel, table$use, sep = ", ") + table$stage)
-  keys <- unique(paste(table$panel, table$use, sep = ", "))
-  columns <- lapply(levels(table$stage), function(s) as.character(table$label[values[keys, s]]))
-  cbind(score = keys, as.data.frame(stats::setNames(columns, levels(table$stage)), optional = TRUE))
-}
-
-candidates_words <- function(upgrade) {
-  if (is.null(upgrade$candidates)) return(NULL)
-  table <- candidate_table(upgrade)
-  table <- table[order(table$step, -table$log10_bf), ]
-  drives <- vapply(table$mechanism, function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
-  data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives, "log10 Bayes factor" = signed(table$log10_bf),
-             "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)), evidence = table$word,
-             probability = percent(table$probability), estimate = ifelse(table$trusted, "sound", "rough"),
-             decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
-}
-
-parameters_words <- function(fit) {
-  rows <- parameter_rows(fit)
-  data.frame(name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit), median = short(rows$median, 3),
-             "95 % interval" = paste(short(rows$lower95, 3), "to", short(rows$upper95, 3)),
-             "range thought possible" = paste(short(rows$prior_lower, 3), "to", short(rows$prior_upper, 3)),
-             note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
-}
-
-# What each adopted model was computed with.
-method_table <- function(upgrade) {
-  value <- function(model) {
-    fit <- model$fit
-    unit <- pretty_unit(fit$measurements$unit)
-    c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
-      paste(short(fit$measurements$noise_sd), unit), paste(short(fit$emulator$basis$discarded_rms), unit),
-      paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ", signed(fit$interval[2] / log(10)), ")"),
-      fit$check$verdict %||% "not checked", fit$trust$verdict)
-  }
-  columns <- lapply(upgrade$models, value)
-  names(columns) <- vapply(upgrade$models, `[[`, "", "name")
-  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M", "stated measurement noise",
-                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)", "emulator", "trust"),
-        as.data.frame(columns, optional = TRUE))
-}
-
-#' Write the report of an upgrade or a comparison
+#' @section Formats:
+#' The end of the file's name chooses: `.html`, one file that needs nothing from outside; `.pdf`, the same page printed
+#' by Chromium, Chrome or Edge (Debian: `apt-get install chromium`; the environment variable `CHROMOTE_CHROME` may name
+#' the program); `.docx`, a Word document with the same text, tables and figures.
 #'
-#' A self-contained HTML file: first what was found in plain words, then the figures and tables behind it. The R
-#' Markdown templates are also offered by RStudio (*Diagnosis of a simulation*, *Comparison of models*).
-#'
-#' @param x An upgrade ([upgrade_model()]) or a comparison ([compare_models()]).
-#' @param file Name of the HTML file, ending in `.html`; its folder must exist. The file appears only when it is complete.
+#' @param x An upgrade ([upgrade_model()]), a comparison ([compare_models()]) or a calibration ([calibrate()],
+#'   [calibrate_paper()]). The simulator of a calibration is run again to predict its record.
+#' @param file Name of the file, ending in `.html`, `.pdf` or `.docx`; its folder must exist. The file appears only when
+#'   it is complete.
 #' @param quiet No messages of R Markdown.
-#' @return `file`, invisibly.
-#' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the figures alone.
+#' @param parts Which parts, in their order; `NULL` for all. Of an upgrade: `"summary"`, `"mechanisms"`, `"fit"`,
+#'   `"drivers"`, `"trials"`, `"parameters"`, `"lack"`, `"trust"`, `"method"` and `"words"`. Of a comparison:
+#'   `"summary"`, `"evidence"`, `"drivers"`, `"fit"`, `"parameters"`, `"practice"` and `"method"`. Of a calibration:
+#'   `"summary"`, `"fit"`, `"parameters"`, `"lack"` and `"trust"`.
+#' @param level Level of the headings of the parts, 1 to 4.
+#' @return `report()`: `file`, invisibly. `report_fragment()`: text for knitr, which a chunk shows as it is.
+#' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the
+#'   figures.
+#' @examples
+#' \dontrun{
+#' report(upgrade, "house.html")
+#' report(upgrade, "house.pdf")
+#' report_fragment(upgrade, parts = c("summary", "fit"), level = 3)  # in a chunk of a document
+#' }
 #' @export
 report <- function(x, file, quiet = TRUE) {
-  check_input(checkmate::check_multi_class(x, c("amiss_upgrade", "amiss_comparison")), "x", "It is made by {.fun upgrade_model} or {.fun compare_models}.")
-  check_report_file(file)
+  check_reported(x)
+  kind <- report_kind(file)
   check_report_tools()
+  browser <- if (kind == "pdf") find_browser()
   work <- tempfile("amiss-report-")
   dir.create(work)
   on.exit(unlink(work, recursive = TRUE))
-  upgraded <- inherits(x, "amiss_upgrade")
-  template <- system.file("rmarkdown", "templates", if (upgraded) "diagnosis" else "comparison", "skeleton", "skeleton.Rmd", package = "amiss", mustWork = TRUE)
   source <- file.path(work, "report.Rmd")
-  file.copy(template, source)
-  made <- rmarkdown::render(source, output_file = "report.html", output_dir = work, intermediates_dir = work,
-                            params = stats::setNames(list(x), if (upgraded) "upgrade" else "comparison"), envir = new.env(parent = globalenv()), quiet = quiet)
+  file.copy(report_path("templates", "report", "skeleton", "skeleton.Rmd"), source)
+  made <- rmarkdown::render(source, if (kind == "docx") "word_document" else "html_document", output_dir = work,
+                            intermediates_dir = work, params = list(result = x),
+                            envir = new.env(parent = globalenv()), quiet = quiet)
+  if (kind == "pdf") made <- print_page(made, file.path(work, "report.pdf"), browser)
   move_into_place(made, file)
   invisible(file)
 }
 
-# ---- what the templates are written with
-
-# Text as it is: nothing in it is markup, but 10^3 is set as a power. Entities, as pandoc reads them after everything that
-# could be markup: a colon makes a bare address a link, a number with a point at the beginning makes a list.
-markdown_text <- function(x) {
-  plain <- gsub("&", "&#38;", trimws(gsub("[[:space:]]+", " ", x)), fixed = TRUE)
-  for (sign in strsplit("\\`*_{}[]$^~|@<>:()\"'+=-!", "")[[1]]) {
-    plain <- gsub(sign, sprintf("&#%d;", utf8ToInt(sign)), plain, fixed = TRUE)
+#' @rdname report
+#' @export
+report_fragment <- function(x, parts = NULL, level = 2) {
+  check_reported(x)
+  check_input(checkmate::check_int(level, lower = 1, upper = 4), "level")
+  if (!isTRUE(getOption("knitr.in.progress"))) {
+    abort_input(c("A fragment belongs in a chunk of a document that is being knit.",
+                  i = "{.fun report} writes a file of its own."))
   }
-  plain <- sub("^#", "&#35;", sub("^([0-9A-Za-z]+)\\.", "\\1&#46;", plain))
-  plain <- gsub("10&#94;((&#45;)?[0-9]+)", "10^\\1^", plain)
-  gsub("([0-9]) %", "\\1\u00a0%", plain)
+  all <- template_parts(x)
+  parts <- parts %||% names(all)
+  check_input(checkmate::check_subset(parts, names(all), empty.ok = FALSE), "parts")
+  text <- c("::::::::: {.amiss}", unlist(all[parts]), ":::::::::")
+  child <- knitr::knit_child(text = text, envir = report_environment(x), quiet = TRUE,
+                             options = list(echo = FALSE, message = FALSE, warning = FALSE, error = FALSE,
+                                            results = "asis", collapse = FALSE, comment = NA))
+  child <- gsub("(^|\n)##", paste0("\\1", strrep("#", level)), child)
+  knitr::asis_output(paste(c(fragment_style(), child), collapse = "\n"))
 }
 
-markdown_items <- function(x) cat("\n", paste0("- ", markdown_text(x), "\n"), "\n", sep = "")
-
-markdown_paragraphs <- function(x) cat("\n", paste0(markdown_text(x), "\n\n"), sep = "")
-
-html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
-  cell <- function(x, tag) paste0("<", tag, ">", html_text(x), "</", tag, ">", collapse = "")
-  rows <- vapply(seq_len(nrow(table)), function(i) {
-    paste0("<tr", if (bold[i]) " class=\"adopted\"", ">", cell(unlist(lapply(table[i, ], as.character)), "td"), "</tr>")
-  }, "")
-  cat("\n```{=html}\n<div class=\"scroll\"><table><thead><tr>", cell(names(table), "th"), "</tr></thead><tbody>\n", paste(rows, collapse = "\n"),
-      "\n</tbody></table></div>\n```\n", sep = "")
+check_reported <- function(x, call = rlang::caller_env()) {
+  check_input(checkmate::check_multi_class(x, c("amiss_upgrade", "amiss_comparison", "amiss_fit")), "x",
+              "It is made by {.fun upgrade_model}, {.fun compare_models} or {.fun calibrate}.", call = call)
 }
 
-html_tile <- function(value, words) paste0("<div><b>", html_text(value), "</b>", words, "</div>")
-
-# Three backticks would end the raw block that holds it.
-html_text <- function(x) {
-  gsub("`", "&#96;", htmltools::htmlEscape(gsub("[[:space:]]+", " ", as.character(x))), fixed = TRUE)
-}
-
-check_report_file <- function(file, call = rlang::caller_env()) {
+# html, pdf or docx, by the name of a file that can be written.
+report_kind <- function(file, call = rlang::caller_env()) {
   check_input(checkmate::check_string(file, min.chars = 1), "file", call = call)
   folder <- dirname(file)
   if (!dir.exists(folder)) {
-    abort_input(c("The folder {.file {folder}} of {.arg file} = {.file {file}} does not exist.", i = "Make it with {.fun dir.create}, or choose another."), call = call)
+    abort_input(c("The folder {.file {folder}} of {.arg file} = {.file {file}} does not exist.",
+                  i = "Make it with {.fun dir.create}, or choose another."), call = call)
   }
-  if (dir.exists(file)) abort_input(c("{.arg file} = {.file {file}} is a folder.", i = "Give the name of the HTML file in it."), call = call)
-  if (!grepl("\\.html?$", file, ignore.case = TRUE)) {
-    abort_input(c("{.arg file} = {.file {file}} does not end in {.code .html}: a report is written as HTML only.",
-                  i = "Give a name that ends in {.code .html}; a browser prints it to PDF."), call = call)
+  if (dir.exists(file)) {
+    abort_input(c("{.arg file} = {.file {file}} is a folder.", i = "Give the name of the file in it."), call = call)
+  }
+  kind <- tolower(tools::file_ext(file))
+  if (!kind %in% c("html", "htm", "pdf", "docx")) {
+    abort_input(c("{.arg file} = {.file {file}} does not say what to write.",
+                  i = "Give a name that ends in {.code .html}, {.code .pdf} or {.code .docx}."), call = call)
   }
   if (file.access(folder, 2) != 0) abort_input("The folder {.file {folder}} cannot be written.", call = call)
+  if (kind == "htm") "html" else kind
 }
 
 check_report_tools <- function(call = rlang::caller_env()) {
   if (!requireNamespace("rmarkdown", quietly = TRUE)) {
-    abort_input(c("A report needs the R package {.pkg rmarkdown}, which is not installed.", i = "Run {.code install.packages(\"rmarkdown\")}."), call = call)
+    abort_input(c("A report needs the R package {.pkg rmarkdown}, which is not installed.",
+                  i = "Run {.code install.packages(\"rmarkdown\")}."), call = call)
   }
   if (!rmarkdown::pandoc_available("2.0")) {
     abort_input(c("A report needs pandoc 2.0 or later, which was not found.",
-                  i = "Install it (Debian: {.code apt-get install pandoc}; others: {.url https://pandoc.org/installing.html}), or work in RStudio, which brings it."), call = call)
+                  i = paste("Install it (Debian: {.code apt-get install pandoc}; others:",
+                            "{.url https://pandoc.org/installing.html}), or work in RStudio, which brings it.")),
+                call = call)
   }
 }
+
+report_path <- function(...) system.file("rmarkdown", ..., package = "amiss", mustWork = TRUE)
+
+# The parts of a template, each from its mark to the next.
+template_parts <- function(x) {
+  kind <- if (inherits(x, "amiss_upgrade")) "diagnosis"
+          else if (inherits(x, "amiss_comparison")) "comparison"
+          else "calibration"
+  text <- readLines(report_path("parts", paste0(kind, ".Rmd")), encoding = "UTF-8")
+  mark <- "^<!-- part: (.*) -->$"
+  starts <- grep(mark, text)
+  part <- findInterval(seq_along(text), starts)
+  parts <- lapply(seq_along(starts), function(i) text[part == i][-1])
+  stats::setNames(parts, sub(mark, "\\1", text[starts]))
+}
+
+# What the chunks of a template see: the result, what is told of it, and the package's own functions.
+report_environment <- function(x) {
+  list2env(c(list(result = x), report_content(x)), parent = environment(report))
+}
+
+# What the templates show besides the result itself.
+report_content <- function(x) UseMethod("report_content")
 
 # Copied beside its destination and renamed: a reader never meets half a file.
 move_into_place <- function(made, file, call = rlang::caller_env()) {
   part <- tempfile(".amiss-report-", tmpdir = dirname(file))
   on.exit(unlink(part))
-  if (!file.copy(made, part) || !file.rename(part, file)) abort_input("The report could not be written to {.file {file}}.", call = call)
+  if (!file.copy(made, part) || !file.rename(part, file)) {
+    abort_input("The report could not be written to {.file {file}}.", call = call)
+  }
 }

@@ -6,7 +6,8 @@
 #' @param object A comparison ([compare_models()]).
 #' @param x The summary.
 #' @param ... Not used.
-#' @return A list: `title`, `headline`, the sentences `evidence`, `remains`, `practice` and `doubts`, and the tables
+#' @return A list: `title`, `headline`, the sentences `evidence`, `remains`, `practice`, `doubts` and `inspect` (what to
+#'   inspect next), and the tables
 #'   `models` and `attribution` (the paper's table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5),
 #'   `heat_loss` (of zones) and `method`.
 #' @export
@@ -14,7 +15,8 @@ summary.amiss_comparison <- function(object, ...) {
   no_doubt <- "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range."
   structure(list(title = object$title %||% object$study %||% object$measurements$name, headline = comparison_headline(object),
                  evidence = c(evidence_sentences(object), probability_sentences(object)), remains = remains_sentences(object),
-                 practice = practice_sentences(object), doubts = doubt_sentences(object) %||% no_doubt, models = models_words(object),
+                 practice = practice_sentences(object), doubts = doubt_sentences(object) %||% no_doubt,
+                 inspect = comparison_inspections(object), models = models_words(object),
                  attribution = attribution_table_words(object), parameters = compared_parameters_words(object), criteria = criteria_words(object),
                  errors = errors_words(object), heat_loss = heat_loss_words(object), method = comparison_method_table(object), seed = object$seed), class = "summary.amiss_comparison")
 }
@@ -23,7 +25,8 @@ summary.amiss_comparison <- function(object, ...) {
 #' @export
 print.summary.amiss_comparison <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$headline}")
-  parts <- list("Evidence" = x$evidence, "What remains" = x$remains, "What practice would do" = x$practice, "Doubts" = x$doubts)
+  parts <- list("Evidence" = x$evidence, "What remains" = x$remains, "What practice would do" = x$practice, "Doubts" = x$doubts,
+                "What to inspect next" = x$inspect)
   for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
   cli::cli_bullets(c(">" = "next: {.fun report}"))
 })
@@ -173,4 +176,11 @@ result_list.amiss_comparison <- function(x) {
        headline = comparison_headline(x), models = lapply(seq_along(x$models), model_list), disagreements = as.list(disagreements(x)),
        doubts = as.list(doubt_sentences(x)),
        truth = if (!is.null(x$truth)) list(values = as.list(x$truth$values), heat_loss = if (!is.na(true_loss)) true_loss))
+}
+
+#' @export
+report_content.amiss_comparison <- function(x) {
+  table <- generics::tidy(x)
+  list(comparison = x, told = summary(x), paper = x$method == "paper", table = table,
+       best = table[which.min(table$rank), ], figures = figures_of(x))
 }

@@ -134,29 +134,198 @@ test_that("text from data is never markup", {
   expect_match(sheet, "&#96;&#96;&#96; &lt;b&gt;", all = FALSE, fixed = TRUE)
 })
 
+# The report of the small upgrade, made once.
+report_cache <- new.env()
+
+small_report <- function() {
+  if (is.null(report_cache$file)) {
+    report_cache$file <- tempfile(fileext = ".html")
+    report(small_upgrade(), report_cache$file)
+  }
+  report_cache$file
+}
+
+# Tables of a page or, as XML, of a Word document, as lists of rows of cells.
+tables_of <- function(page, table = "//table", row = ".//tr", cell = "th|td") {
+  lapply(xml2::xml_find_all(page, table), function(t) {
+    lapply(xml2::xml_find_all(t, row), function(r) trimws(xml2::xml_text(xml2::xml_find_all(r, cell))))
+  })
+}
+
+# The rows of the table whose first row begins with these names.
+table_with <- function(tables, names) {
+  own <- Filter(function(t) identical(t[[1]][seq_along(names)], names), tables)
+  do.call(rbind, own[[length(own)]][-1])
+}
+
+word_body <- function(file) {
+  folder <- withr::local_tempdir()
+  utils::unzip(file, exdir = folder)
+  xml2::read_xml(file.path(folder, "word", "document.xml"))
+}
+
+word_tables <- function(body) tables_of(body, "//w:tbl", ".//w:tr", "./w:tc")
+
 test_that("a report is one file that names the cause and needs nothing from outside", {
   skip_without_pandoc()
   folder <- withr::local_tempdir()
   file <- file.path(folder, "diagnosis.html")
-  expect_identical(report(small_upgrade(), file), file)
-  expect_identical(list.files(folder, all.files = TRUE, no.. = TRUE), "diagnosis.html")
+  file.copy(small_report(), file)
+  expect_identical(list.files(dirname(small_report()), "^[.]amiss-report", all.files = TRUE), character())
   expect_lt(file.size(file), 3e6)
   html <- paste(readLines(file, warn = FALSE), collapse = "\n")
   expect_match(html, "Sun enters through a window &lt;that&gt; the model *leaves* out.", fixed = TRUE)
-  links <- regmatches(html, gregexpr("(src|href)=\"[^\"]{0,20}", html))[[1]]
+  links <- regmatches(html, gregexpr("(src|srcset|href)=\"[^\"]{0,20}", html))[[1]]
   expect_true(all(grepl("=\"(data:|#)", links)))
-  expect_gte(sum(grepl("data:image/png", links)), 8)
+  expect_gte(sum(grepl("src=\"data:image/png", links)), length(figure_names))
+})
+
+test_that("a report says what result.json says", {
+  skip_without_pandoc()
+  skip_if_not_installed("xml2")
+  file <- withr::local_tempfile(fileext = ".json")
+  jsonlite::write_json(result_list(small_upgrade()), file, auto_unbox = TRUE, digits = NA, null = "null", na = "null")
+  told <- jsonlite::read_json(file)
+  page <- xml2::read_html(small_report())
+  text <- function(class) trimws(xml2::xml_text(xml2::xml_find_all(page, sprintf("//*[contains(@class, '%s')]", class))))
+  expect_identical(text("headline"), told$diagnosis$headline)
+  expect_identical(text("tag"), told$diagnosis$tag)
+  expect_true(grepl(told$diagnosis$verdict, text("verdict")[1]) || length(text(told$diagnosis$verdict)) > 0)
+  tables <- tables_of(page)
+
+  adopted <- Filter(function(m) !is.null(m$mechanism), told$models)
+  heads <- gsub("\\s+", " ", xml2::xml_text(xml2::xml_find_all(page, "//*[contains(@class, 'mechanism')]//h3")))
+  expect_identical(heads, vapply(adopted, function(m) paste(m$mechanism, m$verdict), ""))
+  for (doubt in unlist(lapply(adopted, `[[`, "doubts"))) expect_match(text("mechanism"), doubt, fixed = TRUE)
+
+  trials <- table_with(tables, c("step", "mechanism"))
+  for (trial in told$candidates) {
+    row <- trials[trials[, 2] == trial$mechanism, ]
+    expect_identical(row[c(4, 5, 7, 8)], c(signed(trial$log10_bf), paste(signed(unlist(trial$interval)), collapse = " to "),
+                                           percent(trial$probability), if (trial$trusted) "sound" else "rough"))
+    expect_identical(row[9] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
+  }
+
+  first <- told$models[[1]]
+  last <- told$models[[length(told$models)]]
+  tiles <- xml2::xml_text(xml2::xml_find_all(page, "//*[@class = 'big']//b"))
+  expect_identical(tiles[1:2], c(paste(short(first$rmse_validation), "\u2192", short(last$rmse_validation), "K"),
+                                 paste(short(first$rmse_calibration), "\u2192", short(last$rmse_calibration), "K")))
+  parameters <- table_with(tables, c("parameter", "unit", "median", "95 % interval", "range thought possible"))
+  expect_setequal(parameters[, 3], vapply(last$parameters, function(p) short(p$median, 3), ""))
+  drivers <- table_with(tables, "boundary condition")
+  for (condition in last$attribution) {
+    row <- drivers[drivers[, 1] == condition$boundary, ]
+    expect_identical(row[c(2, 5)], c(sprintf("%+.1f", condition$log10_bf_dropped), if (condition$significant) "yes" else "no"))
+  }
+  method <- table_with(tables, "quantity")
+  expect_identical(as.numeric(method[1:3, 3]), as.numeric(unlist(last[c("N", "Q", "M")])))
+  if (!any(vapply(last$attribution, `[[`, NA, "significant"))) expect_match(text("wide"), "answers to no boundary", all = FALSE)
+})
+
+test_that("a report of one calibration has its tables in Word, too", {
+  skip_without_pandoc()
+  skip_if_not_installed("xml2")
+  file <- withr::local_tempfile(fileext = ".docx")
+  fit <- linear_fit()
+  expect_identical(report(fit, file), file)
+  body <- word_body(file)
+  text <- xml2::xml_text(body)
+  expect_match(text, "What to inspect next")
+  expect_match(text, "attribute_discrepancy()", fixed = TRUE)
+  rows <- table_with(word_tables(body), c("parameter", "unit", "median"))
+  expect_identical(rows[, 1], c("offset", "gain"))
+  expect_identical(rows[, 3], short(tidy(fit)$estimate, 3))
+  expect_length(xml2::xml_find_all(body, "//pic:pic"), 9)
+})
+
+test_that("a new file from the template works at once", {
+  skip_without_pandoc()
+  skip_if_not_installed("xml2")
+  folder <- withr::local_tempdir()
+  draft <- rmarkdown::draft(file.path(folder, "mine.Rmd"), "report", "amiss", edit = FALSE)
+  made <- rmarkdown::render(draft, "word_document", envir = new.env(), quiet = TRUE)
+  body <- word_body(made)
+  expect_match(xml2::xml_text(body), "This shows a made-up example")
+  expect_match(xml2::xml_text(body), "sun: named")
+  expect_identical(table_with(word_tables(body), c("step", "mechanism"))[, 2], "sun")
+})
+
+test_that("fragments go into a document of one's own, of any level, twice", {
+  skip_without_pandoc()
+  made <- small_upgrade()
+  text <- c("# Mine", "```{r}", "report_fragment(made, \"mechanisms\", level = 3)", "```", "```{r}", "1 + 1", "```",
+            "```{r}", "report_fragment(made, \"words\", level = 1)", "```")
+  figures <- withr::local_tempdir()
+  withr::local_dir(figures)
+  said <- knitr::knit(text = text, quiet = TRUE, envir = list2env(list(made = made), parent = globalenv()))
+  expect_match(said, "\n### What would change in the model")
+  expect_match(said, "\n#### sun: named")
+  expect_match(said, "\n# Words")
+  expect_match(said, "```r\n1 + 1\n```", fixed = TRUE)  # the options of the document are its own
+  expect_no_match(said, "What drives the error")
+  expect_length(list.files(figures, "png$", recursive = TRUE), 1)
+  expect_error(report_fragment(made), "belongs in a chunk", class = "amiss_error_input")
+  withr::local_options(knitr.in.progress = TRUE)
+  expect_error(report_fragment(made, "nonsense"), "parts", class = "amiss_error_input")
+  expect_error(report_fragment(made, level = 7), "level", class = "amiss_error_input")
+  expect_error(report_fragment(1), "upgrade_model", class = "amiss_error_input")
 })
 
 test_that("a report is refused with a reason, and nothing half-written stays", {
   folder <- withr::local_tempdir()
   expect_error(report(small_upgrade(), file.path(folder, "absent", "a.html")), "does not exist", class = "amiss_error_input")
   expect_error(report(small_upgrade(), folder), "is a folder", class = "amiss_error_input")
-  expect_error(report(small_upgrade(), file.path(folder, "a.pdf")), "HTML only", class = "amiss_error_input")
-  expect_error(report(list(), file.path(folder, "a.html")), "amiss_upgrade", class = "amiss_error_input")
+  expect_error(report(small_upgrade(), file.path(folder, "a.tex")), "html.*pdf.*docx", class = "amiss_error_input")
+  expect_error(report(list(), file.path(folder, "a.html")), "upgrade_model", class = "amiss_error_input")
   skip_without_pandoc()
+  withr::local_envvar(CHROMOTE_CHROME = "/nowhere/chrome")
+  expect_error(report(small_upgrade(), file.path(folder, "a.pdf")), "apt-get install chromium", class = "amiss_error_input")
   broken <- small_upgrade()
   broken$models[[1]]$prediction <- NULL
   expect_error(suppressMessages(report(broken, file.path(folder, "a.html"))))
   expect_length(list.files(folder, all.files = TRUE, no.. = TRUE), 0)
+})
+
+browser_or_skip <- function() tryCatch(find_browser(), amiss_error_input = function(e) skip("no browser of the Chromium family"))
+
+# What a browser makes of a page in a frame of a given width, and what its console says.
+seen_in_browser <- function(browser, file, width) {
+  page <- withr::local_tempfile(fileext = ".html")
+  html <- htmltools::htmlEscape(paste(readLines(file, warn = FALSE, encoding = "UTF-8"), collapse = "\n"), attribute = TRUE)
+  script <- "frame.onload = function() {
+    const page = frame.contentDocument, images = [...page.images];
+    probe.textContent = JSON.stringify({width: page.documentElement.scrollWidth,
+      letters: Math.min(...[...page.querySelectorAll('p, li')].map(e => parseFloat(getComputedStyle(e).fontSize))),
+      natural: images.map(i => i.naturalWidth), shown: images.map(i => i.clientWidth)});
+  }"
+  writeLines(sprintf("<pre id='probe'></pre><script>%s</script>",
+                     paste0("</script><iframe id='frame' style='border:0; height:900px; width:", width, "px' srcdoc=\"", html,
+                            "\"></iframe><script>", script)), page, useBytes = TRUE)
+  ran <- browse(browser, page, c("--enable-logging=stderr", "--dump-dom"))
+  seen <- jsonlite::fromJSON(sub(".*<pre id=\"probe\">(\\{[^<]*\\}).*", "\\1", substr(ran$stdout, 1, 10000)))
+  c(seen, console = list(grep("CONSOLE", strsplit(ran$stderr, "\n")[[1]], value = TRUE)))
+}
+
+test_that("a browser shows the report on a desk and on a phone, and prints it", {
+  skip_without_pandoc()
+  browser <- browser_or_skip()
+  for (width in c(400, 1400)) {
+    seen <- seen_in_browser(browser, small_report(), width)
+    expect_identical(seen$console, character())
+    expect_length(seen$natural, length(figure_names))
+    expect_true(all(seen$natural > 0))
+    expect_lte(seen$width, width)
+    expect_gte(seen$letters, 12)
+    # Letters of a figure have 9 points on the narrow canvas and 15 on the wide one.
+    inches <- if (width == 400) narrow_canvas else canvas_width
+    expect_true(all((if (width == 400) 9 else 15) / 72 * seen$shown / inches > 10))
+    expect_identical(all(seen$natural < 800), width == 400)
+  }
+  pdf <- withr::local_tempfile(fileext = ".pdf")
+  print_page(small_report(), pdf, browser)
+  expect_identical(readChar(pdf, 5, useBytes = TRUE), "%PDF-")
+  expect_gt(file.size(pdf), 2e5)
+  expect_error(print_page(small_report(), file.path(tempdir(), "absent", "a.pdf"), Sys.which("false")), "did not print",
+               class = "amiss_error_input")
 })

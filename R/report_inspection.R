@@ -1,0 +1,313 @@
+# What to inspect next to settle what a result leaves open: sentences that say what to measure, look at or compute, each
+# from something that the result knows. Their names say what they are about.
+
+# Rivals below this probability are not worth a measurement.
+rival_probability <- 0.05
+
+upgrade_inspections <- function(upgrade) {
+  last <- upgrade$models[[length(upgrade$models)]]
+  adopted <- adopted_models(upgrade)
+  told <- c(unlist(lapply(upgrade$models, function(m) trust_inspections(m$fit, m$name))),
+            held_out_inspection(last, upgrade$measurements),
+            unlist(lapply(adopted, function(m) mechanism_inspections(upgrade, m))),
+            nearest_inspection(upgrade),
+            group_inspections(last$attribution),
+            answer_inspections(upgrade, last),
+            driver_inspections(upgrade),
+            edge_inspections(last$fit),
+            remainder_inspection(last, upgrade$measurements),
+            if (grepl("^the limit of", upgrade$stopped_because)) {
+              c(steps = "Further causes were not looked for: raise control$max_steps and go on from here.")
+            })
+  if (length(told)) told
+  else c(nothing = paste("Nothing that this record could settle is open. The next test is a record of another",
+                         "season or another use."))
+}
+
+calibration_inspections <- function(fit, model = NULL) {
+  c(trust_inspections(fit, "the model"),
+    if (!is.null(model)) held_out_inspection(model, fit$measurements),
+    edge_inspections(fit), tied_inspections(fit), loose_inspections(fit),
+    if (!is.null(model)) remainder_inspection(model, fit$measurements),
+    cause = paste("What its error answers to, and what may cause it, is not part of a calibration:",
+                  "attribute_discrepancy() asks the first, upgrade_model() with a catalogue of mechanisms the second."))
+}
+
+comparison_inspections <- function(comparison) {
+  best <- comparison$models[[best_model(comparison)]]
+  attribution <- comparison$tables$attribution
+  answers <- attribution$boundary[attribution$model == best$name & attribution$significant]
+  c(unlist(lapply(comparison$models, function(m) trust_inspections(m$fit, m$name)), use.names = FALSE),
+    separation_inspection(comparison),
+    held_out_inspection(best, comparison$measurements),
+    edge_inspections(best$fit),
+    if (length(answers)) {
+      c(answers = sprintf(paste("Even %s leaves an error that answers to %s: ask upgrade_model() for the cause, with",
+                                "mechanisms driven by %s."), best$name, listed(answers), listed(answers, "or")))
+    })
+}
+
+# ---- can the numbers be trusted
+
+trust_inspections <- function(fit, name) {
+  runs <- nrow(fit$emulator$processes$inputs)
+  sampler <- fit$posterior %||% fit$trust  # of the paper's calibration
+  more <- if (is.null(fit$emulator$simulator)) "give more runs where the posterior lies"
+          else sprintf("make more runs (%d now)", runs)
+  c(if (isFALSE(fit$check$passed)) {
+      c(emulator = sprintf("The emulator of %s is not trusted (%s): %s before anything is read from its numbers.", name,
+                           fit$check$verdict, more))
+    },
+    if (!sampler$trusted) {
+      c(sampler = sprintf(paste("The sampler's result for %s is not trusted (%s): give it more chains",
+                                "(pilot_chains, %d now)."), name,
+                          sub("^not trusted: ", "", sampler$verdict), as.integer(fit$control$ais$pilot_chains)))
+    })
+}
+
+# ---- data held out
+
+held_out_inspection <- function(model, measurements) {
+  seen <- model$scores$calibrate[["rmse"]]
+  held <- model$scores$validate[["rmse"]]
+  if (is.na(held)) {
+    return(c(held_out = paste("No data were held out, so that no change could fail a test: keep some days from",
+                              "calibration (argument validate of measurements()), or measure some more.")))
+  }
+  if (held < 1.5 * max(seen, measurements$noise_sd)) return(NULL)
+  beyond <- uncovered_conditions(measurements)
+  where <- if (!length(beyond)) "compare the two periods for what else differs: settings, doors, use, sensors"
+           else sprintf("there %s outside of what calibration saw; calibrate on data that cover it",
+                        listed(sprintf("%s lies in %s of the steps", names(beyond), percent(beyond))))
+  c(held_out = sprintf("On held-out data the error is %s times that in calibration: %s.", short(held / seen), where))
+}
+
+# Share of the held-out steps at which a condition lies outside of its range in calibration, if a tenth or more.
+uncovered_conditions <- function(measurements) {
+  share <- vapply(measurements$conditions, function(name) {
+    value <- condition_values(measurements, name)
+    seen <- range(value[measurements$use == "calibrate"], na.rm = TRUE)
+    held <- value[measurements$use == "validate"]
+    mean(held < seen[1] | held > seen[2], na.rm = TRUE)
+  }, 0)
+  turning <- tabulate(measurements$condition, length(share)) == 2
+  share[share >= 0.1 & !turning]
+}
+
+# ---- one mechanism
+
+mechanism_inspections <- function(upgrade, model) {
+  trials <- upgrade$candidates[upgrade$candidates$from == model$parent, ]
+  rivals <- trials[trials$mechanism != model$mechanism & trials$probability >= rival_probability, ]
+  told <- c(vapply(rivals$mechanism, function(rival) separating_words(upgrade, trials, model$mechanism, rival), ""),
+            confounded_inspection(upgrade, model))
+  c(stats::setNames(told, rep("rival", length(told))),
+    if (model$verdict == "stand-in") stand_in_inspection(model) else site_inspection(upgrade, model),
+    if (any(grepl("drifting sensor", model$doubts))) {
+      c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: a drift of it would",
+                              "explain as much as %s."),
+                        upgrade$measurements$target, model$mechanism))
+    })
+}
+
+# What would tell two mechanisms apart: conditions that only one answers to, or what each asks to be found on site.
+separating_words <- function(upgrade, trials, a, b) {
+  drivers <- lapply(upgrade$catalogue[c(a, b)], `[[`, "boundary")
+  only <- list(setdiff(drivers[[1]], drivers[[2]]), setdiff(drivers[[2]], drivers[[1]]))
+  if (!length(unlist(only))) {
+    called <- vapply(c(a, b), function(name) called_for(trials$parameters[[match(name, trials$mechanism)]]), "")
+    return(sprintf(paste("Since %s and %s answer to the same conditions, only a look on site tells them apart: the",
+                         "one asks for %s, the other for %s."),
+                   a, b, called[1], called[2]))
+  }
+  together <- correlation_words(upgrade$measurements, drivers[[1]], drivers[[2]])
+  either <- lapply(only, listed, "or")
+  changing <- if (all(lengths(only))) sprintf("%s changes while %s does not, or vice versa", either[[1]], either[[2]])
+              else sprintf("%s changes and nothing else does", listed(unlist(only), "or"))
+  sprintf("To tell %s from %s, measure while %s%s.", a, b, changing, together)
+}
+
+correlation_words <- function(measurements, a, b) {
+  pairs <- expand.grid(a = intersect(a, measurements$conditions), b = intersect(b, measurements$conditions),
+                       stringsAsFactors = FALSE)
+  pairs <- pairs[pairs$a != pairs$b, ]
+  if (nrow(pairs) != 1) return("")
+  used <- measurements$use == "calibrate"
+  r <- stats::cor(condition_values(measurements, pairs$a)[used], condition_values(measurements, pairs$b)[used],
+                  use = "pairwise.complete.obs")
+  if (is.na(r)) "" else sprintf(" (in this record their correlation is %.2f)", r)
+}
+
+called_for <- function(parameters) {
+  if (!NROW(parameters)) return("no value that could be checked")
+  unit <- ifelse(nzchar(parameters$unit), paste0(" ", pretty_unit(parameters$unit)), "")
+  listed(sprintf("a %s of %s to %s%s", parameters$name, short(parameters$lower95), short(parameters$upper95), unit))
+}
+
+# The strongest tie between what a mechanism brought and another part of the model.
+confounded_inspection <- function(upgrade, model) {
+  others <- model$confounded_with
+  parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
+  new <- setdiff(names(model$fit$emulator$parameters), names(parent$fit$emulator$parameters))
+  if (!length(others) || !length(new)) return(NULL)
+  labels <- parameter_labels(model$fit, others)
+  sprintf("What %s brings (%s) trades off against %s: measure %s to see how much is due to it.", model$mechanism,
+          listed(parameter_labels(model$fit, new)), listed(labels), if (length(labels) > 1) "one of these" else "that")
+}
+
+stand_in_inspection <- function(model) {
+  c(stand_in = sprintf(paste("Take %s as a sign and look for something that acts alike but shows on held-out data",
+                             "too: which days gain by it in calibration, and which lose held out?"),
+                       model$mechanism))
+}
+
+# What the calibrated values ask to be found on site.
+site_inspection <- function(upgrade, model) {
+  table <- changes_table(upgrade)
+  own <- table[table$mechanism == model$mechanism, ]
+  if (!NROW(own)) return(NULL)
+  unit <- ifelse(nzchar(own$unit), paste0(" ", own$unit), "")
+  between <- sub(" to ", " and ", own[["95 % interval"]], fixed = TRUE)
+  c(site = sprintf("If %s is the cause, %s: check that on site.", model$mechanism,
+                   listed(sprintf("%s lies between %s%s", own$parameter, between, unit))))
+}
+
+# ---- what was not adopted
+
+# The best of the mechanisms left, where the evidence for it is substantial but not decisive.
+nearest_inspection <- function(upgrade) {
+  last <- upgrade$models[[length(upgrade$models)]]
+  trials <- upgrade$candidates[upgrade$candidates$from == last$name, ]
+  if (!NROW(trials)) return(NULL)
+  best <- trials[which.max(trials$log10_bf), ]
+  if (best$probability < rival_probability || best$log10_bf < 0.5) return(NULL)
+  drivers <- upgrade$catalogue[[best$mechanism]]$boundary
+  c(nearest = sprintf(paste("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it,",
+                            "or a look for %s on site."),
+                      best$mechanism, odds(best$log10_bf),
+                      paste(listed(drivers), if (length(drivers) > 1) "change" else "changes"),
+                      called_for(best$parameters[[1]])))
+}
+
+group_inspections <- function(attribution) {
+  told <- vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
+    several <- length(g$conditions) > 2
+    sprintf(paste("In this record %s go together (correlation %.2f), so that the cause may lie with %s: measure",
+                  "some days on which %s changes while %s %s."),
+            listed(g$conditions), g$correlation, if (several) "any of them" else "either", g$conditions[1],
+            listed(g$conditions[-1]), if (several) "stay as they are" else "stays as it is")
+  }, "")
+  stats::setNames(told, rep("group", length(told)))
+}
+
+# Conditions that the error still answers to, with the mechanisms left that they drive.
+answer_inspections <- function(upgrade, last) {
+  table <- last$attribution$table
+  answers <- table$boundary[table$significant & is.na(table$group)]
+  left <- setdiff(names(upgrade$catalogue), unlist(lapply(upgrade$models, `[[`, "mechanism")))
+  told <- vapply(answers, function(name) {
+    driven <- left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
+    if (length(driven)) {
+      sprintf(paste("The error still answers to %s, and of what it drives %s %s tried but not adopted: look for",
+                    "another way in which %s acts."),
+              name, listed(driven), if (length(driven) > 1) "were" else "was", name)
+    } else {
+      sprintf(paste("The error still answers to %s, and no mechanism left in the catalogue is driven by it: think",
+                    "of what acts with %s, and add it."),
+              name, name)
+    }
+  }, "")
+  stats::setNames(told, rep("answer", length(told)))
+}
+
+# Drivers of mechanisms that are not among the conditions analysed.
+driver_inspections <- function(upgrade) {
+  drivers <- unique(unlist(lapply(upgrade$catalogue, `[[`, "boundary")))
+  absent <- setdiff(drivers, upgrade$measurements$conditions)
+  if (!length(absent)) return(NULL)
+  driven <- names(upgrade$catalogue)[vapply(upgrade$catalogue, function(m) any(m$boundary %in% absent), NA)]
+  c(driver = sprintf(paste("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of",
+                           "measurements(), so that the error can answer to it."),
+                     listed(absent), if (length(absent) > 1) "drive" else "drives", listed(driven)))
+}
+
+# ---- the parameters
+
+edge_inspections <- function(fit) {
+  rows <- parameter_rows(fit)
+  rows <- rows[rows$at_edge, ]
+  upper <- abs(rows$prior_upper - rows$median) < abs(rows$median - rows$prior_lower)
+  unit <- ifelse(nzchar(rows$unit), paste0(" ", pretty_unit(rows$unit)), "")
+  told <- sprintf(paste("At the %s end of its prior (%s%s) lies %s: measure it, or widen the prior if %s is",
+                        "possible; otherwise it makes up for something else."),
+                  ifelse(upper, "upper", "lower"), short(ifelse(upper, rows$prior_upper, rows$prior_lower)), unit,
+                  rows$label, ifelse(upper, "more", "less"))
+  stats::setNames(told, rep("edge", length(told)))
+}
+
+# Pairs of parameters that the record cannot tell apart.
+tied_inspections <- function(fit) {
+  r <- posterior_correlation(fit)
+  if (ncol(r) < 2) return(NULL)
+  pairs <- which(abs(r) > 0.9 & upper.tri(r), arr.ind = TRUE)
+  label <- parameter_labels(fit, colnames(r))
+  told <- sprintf(paste("The parameters %s and %s trade off against each other (correlation %.2f): a measurement of",
+                        "either settles both."),
+                  label[pairs[, 1]], label[pairs[, 2]], r[pairs])
+  stats::setNames(told, rep("tied", length(told)))
+}
+
+loose_inspections <- function(fit) {
+  left <- narrowing(fit)
+  loose <- names(left)[left > 0.7]
+  if (length(loose)) {
+    c(loose = sprintf(paste("The record says little about %s: %s is still the prior's; if it matters, measure it or",
+                            "find a record in which it shows."),
+                      listed(loose), if (length(loose) > 1) "their range" else "its range"))
+  }
+}
+
+# ---- what is left of the error
+
+remainder_inspection <- function(model, measurements) {
+  left <- remaining_error(model, measurements)
+  noise <- paste0(short(measurements$noise_sd), " ", pretty_unit(measurements$unit))
+  if (left$large && is.null(left$pattern)) {
+    return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: hold a second sensor",
+                                   "beside the first; if that noise is right, something is still missing from the",
+                                   "model."),
+                             short(left$ratio), noise)))
+  }
+  if (left$large) {
+    return(c(pattern = sprintf("In the error that remains, %s. %s", left$pattern$what, left$pattern$where)))
+  }
+  if (left$ratio < 0.6) {
+    c(noise = sprintf(paste("The remaining error is only %s times the stated noise of %s: if the sensor is that",
+                            "good, state less noise, and causes that now hide in it will show."),
+                      short(left$ratio), noise))
+  }
+}
+
+# ---- models compared
+
+# Where the predictions of two models that are not told apart differ most.
+separation_inspection <- function(comparison) {
+  table <- comparison$tables$evidence
+  best <- table[which.min(table$rank), ]
+  if (nrow(table) < 2 || (best$log10_bf >= 2 && best$bf_lower95 > 0)) return(NULL)
+  a <- comparison$models[[best$model]]$prediction
+  apart <- abs(a$mean - comparison$models[[best$against]]$prediction$mean)
+  m <- comparison$measurements
+  rows <- match(a$time, m$time)
+  conditions <- vapply(m$conditions, function(name) {
+    value <- condition_values(m, name)[rows]
+    if (stats::sd(value) > 0 && stats::sd(apart) > 0) stats::cor(value, apart) else 0
+  }, 0)
+  name <- names(which.max(abs(conditions)))
+  at <- which.max(apart)
+  c(separate = sprintf(paste("Not told apart are %s and %s. Their simulations differ most (by %s %s) at %s, and the",
+                             "more so the %s %s is: measure under such conditions."),
+                       best$model, best$against, short(apart[at]), pretty_unit(m$unit),
+                       paste0(if (is.numeric(a$time)) "hour ", format(a$time[at])),
+                       if (conditions[[name]] > 0) "higher" else "lower", name))
+}

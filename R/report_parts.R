@@ -1,0 +1,102 @@
+# What the templates are written with. Each of these writes markdown, and HTML where the document becomes HTML.
+
+# Text as it is: nothing in it is markup, but 10^3 is set as a power. Entities, as pandoc reads them after everything
+# that could be markup: a colon makes a bare address a link, a number with a point at the beginning makes a list.
+markdown_text <- function(x) {
+  plain <- gsub("&", "&#38;", trimws(gsub("[[:space:]]+", " ", x)), fixed = TRUE)
+  for (sign in strsplit("\\`*_{}[]$^~|@<>:()\"'+=-!", "")[[1]]) {
+    plain <- gsub(sign, sprintf("&#%d;", utf8ToInt(sign)), plain, fixed = TRUE)
+  }
+  plain <- sub("^#", "&#35;", sub("^([0-9A-Za-z]+)\\.", "\\1&#46;", plain))
+  plain <- gsub("10&#94;((&#45;)?[0-9]+)", "10^\\1^", plain)
+  gsub("([0-9]) %", "\\1\u00a0%", plain)
+}
+
+markdown_items <- function(x) if (length(x)) cat("\n", paste0("- ", markdown_text(x), "\n\n"), sep = "")
+
+markdown_paragraphs <- function(x) cat("\n", paste0(markdown_text(x), "\n\n"), sep = "")
+
+# The head of what is told of one mechanism.
+mechanism_head <- function(m) {
+  verdict <- if (knitr::is_html_output()) paste0(" [", m$verdict, "]{.chip}") else paste0(": ", m$verdict)
+  cat("\n\n### ", markdown_text(m$name), verdict, "\n\n", sep = "")
+}
+
+# A paragraph that begins with a word in bold.
+markdown_point <- function(head, x) {
+  if (length(x)) cat("\n**", head, "** ", paste(markdown_text(x), collapse = " "), "\n\n", sep = "")
+}
+
+# A table without the columns that say nothing.
+report_table <- function(table, bold = rep(FALSE, nrow(table))) {
+  if (!NROW(table)) return(invisible())
+  table <- table[vapply(table, function(x) any(nzchar(as.character(x))), NA)]
+  if (knitr::is_html_output()) html_sheet(table, bold) else markdown_sheet(table, bold)
+}
+
+html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
+  cell <- function(x, tag) paste0("<", tag, ">", html_text(x), "</", tag, ">", collapse = "")
+  rows <- vapply(seq_len(nrow(table)), function(i) {
+    paste0("<tr", if (bold[i]) " class=\"adopted\"", ">", cell(unlist(lapply(table[i, ], as.character)), "td"), "</tr>")
+  }, "")
+  cat("\n```{=html}\n<div class=\"scroll\"><table><thead><tr>", cell(names(table), "th"), "</tr></thead><tbody>\n",
+      paste(rows, collapse = "\n"), "\n</tbody></table></div>\n```\n", sep = "")
+}
+
+# A pipe table; its dashes are the widths of the columns, by the longest word and the length of what they hold.
+markdown_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
+  cells <- rbind(names(table), as.matrix(data.frame(lapply(table, as.character))))
+  widths <- apply(cells, 2, function(x) max(nchar(unlist(strsplit(x, " "))) + 2, min(40, 0.7 * max(nchar(x)))))
+  cells[] <- markdown_text(cells)
+  strong <- c(FALSE, bold) & nzchar(cells)
+  cells[strong] <- paste0("**", cells[strong], "**")
+  row <- function(x) paste0("|", paste(x, collapse = "|"), "|")
+  dashes <- row(strrep("-", ceiling(widths)))
+  cat("\n", paste0(c(row(cells[1, ]), dashes, apply(cells[-1, , drop = FALSE], 1, row)), "\n"), "\n", sep = "")
+}
+
+# Numbers with what they are: in HTML large, side by side.
+report_tiles <- function(value, words) {
+  if (!knitr::is_html_output()) return(markdown_items(paste0(words, ": ", value)))
+  tiles <- paste0("<div><b>", html_text(value), "</b>", html_text(words), "</div>", collapse = "")
+  cat("\n```{=html}\n<div class=\"big\">", tiles, "</div>\n```\n", sep = "")
+}
+
+# Three backticks would end the raw block that holds it.
+html_text <- function(x) {
+  gsub("`", "&#96;", htmltools::htmlEscape(gsub("[[:space:]]+", " ", as.character(x))), fixed = TRUE)
+}
+
+narrow_canvas <- 4.2  # inches: of a figure on a phone
+
+# A figure of the result by its name, or one made already. In HTML it is drawn twice, also for a narrow
+# page, where letters of the wide one were too small.
+report_figure <- function(x, which) {
+  figure <- if (inherits(x, "ggplot")) x else ggplot2::autoplot(x, which)
+  alt <- paste0(which, ": ", gsub("[[:space:]]+", " ", figure$labels$title))
+  if (knitr::is_html_output()) return(html_figure(figure, alt))
+  file <- knitr::fig_path(".png", number = which)
+  dir.create(dirname(file), recursive = TRUE, showWarnings = FALSE)
+  save_figure(figure, file, dpi = 160)
+  cat("\n![", markdown_text(alt), "](", file, "){width=85%}\\\n\n", sep = "")
+}
+
+# On the narrow canvas letters are smaller, so that panels need less height.
+html_figure <- function(figure, alt) {
+  narrow <- with_height(figure, 0.75 * (attr(figure, "height_in") %||% 5))
+  drawn <- function(figure, width, dpi) {
+    file <- tempfile(fileext = ".png")
+    on.exit(unlink(file))
+    save_figure(figure, file, width, dpi)
+    knitr::image_uri(file)
+  }
+  cat("\n```{=html}\n<picture><source media=\"screen and (max-width: 620px)\" srcset=\"",
+      drawn(narrow, narrow_canvas, 170), "\">",
+      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_text(alt), "\"></picture>\n```\n", sep = "")
+}
+
+# The style of a fragment goes with it, as others' documents know nothing of it.
+fragment_style <- function() {
+  if (!knitr::is_html_output()) return(NULL)
+  c("```{=html}", "<style>", readLines(report_path("fragment.css")), "</style>", "```", "")
+}

@@ -1,0 +1,137 @@
+inspected <- function(upgrade) upgrade_inspections(upgrade)
+about <- function(told, what) unname(told[names(told) == what])
+
+test_that("what to inspect next names the value that the mechanism asks for", {
+  told <- inspected(small_upgrade())
+  sun <- tidy(small_upgrade())
+  sun <- sun[sun$term == "sun_gain", ]
+  expect_match(about(told, "site"), sprintf("gain of the sun lies between %s and", short(sun$conf.low, 3)))
+  expect_match(about(told, "steps"), "max_steps")
+  expect_setequal(names(told), c("site", "steps"))
+  expect_identical(summary(small_upgrade())$inspect, told)
+  expect_identical(summary(small_upgrade())$mechanisms[[1]]$inspect, told[1])
+})
+
+test_that("rivals are told apart by what only one of them answers to, or on site", {
+  upgrade <- small_upgrade()
+  upgrade$candidates$probability <- c(0.7, 0.3)
+  m <- upgrade$measurements
+  used <- m$use == "calibrate"
+  r <- cor(m$boundary[used, m$condition == 1], m$boundary[used, m$condition == 2])
+  told <- about(inspected(upgrade), "rival")
+  expect_match(told, sprintf(paste("tell sun from drift, measure while Gv changes while Te does not, .*correlation",
+                                   "is %.2f"), r))
+  expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
+  upgrade$catalogue$drift$boundary <- "Gv"
+  expect_match(about(inspected(upgrade), "rival"), paste("only a look on site tells them apart: the one asks for a",
+                                                         "sun_gain of 0.00"))
+  upgrade$models[[2]]$confounded_with <- "gain"
+  expect_match(about(inspected(upgrade), "rival"), paste("What sun brings \\(gain of the sun\\) trades off against",
+                                                         "gain: measure that"), all = FALSE)
+})
+
+test_that("a stand-in and a drifting sensor have tests of their own", {
+  upgrade <- small_upgrade()
+  upgrade$models[[2]]$verdict <- "stand-in"
+  expect_match(about(inspected(upgrade), "stand_in"), "Take sun as a sign")
+  expect_length(about(inspected(upgrade), "site"), 0)
+  upgrade$models[[2]]$doubts <- "a drifting sensor would explain the error as well"
+  expect_match(about(inspected(upgrade), "drift"), "sensor of Ti beside a second one")
+})
+
+test_that("conditions that go together, answers without a mechanism and absent drivers are told", {
+  upgrade <- base_only(small_upgrade())
+  attribution <- upgrade$models[[1]]$attribution
+  attribution$table$significant <- TRUE
+  attribution$table$group <- NA_character_
+  upgrade$models[[1]]$attribution <- attribution
+  answers <- about(inspected(upgrade), "answer")
+  expect_match(answers, "answers to Gv, and of what it drives sun was tried but not adopted", all = FALSE)
+  attribution$table$group <- "Te or Gv"
+  attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE, correlation = 0.97))
+  upgrade$models[[1]]$attribution <- attribution
+  expect_match(about(inspected(upgrade), "group"), paste("Te and Gv go together .correlation 0.97.*Te changes while",
+                                                         "Gv stays as it is"))
+  upgrade$catalogue$sun$boundary <- c("Gv", "wind")
+  expect_match(about(inspected(upgrade), "driver"), "analysed: wind, which drives sun")
+})
+
+test_that("a candidate that is near is named with what would decide it", {
+  upgrade <- base_only(small_upgrade())
+  upgrade$candidates$log10_bf <- c(1, -1)
+  upgrade$candidates$probability <- c(0.8, 0.01)
+  expect_match(about(inspected(upgrade), "nearest"), paste("Not decided is sun \\(odds of 10 to 1 in favour\\).*Gv",
+                                                           "changes strongly"))
+  upgrade$candidates$probability <- c(0.04, 0.01)
+  expect_length(about(inspected(upgrade), "nearest"), 0)
+})
+
+test_that("numbers that are not trusted come first", {
+  upgrade <- small_upgrade()
+  upgrade$models[[1]]$fit$check[c("passed", "verdict")] <- list(FALSE, "half of the noise")
+  upgrade$models[[2]]$fit$posterior[c("trusted", "verdict")] <- list(FALSE, "not trusted: chains stand still")
+  told <- inspected(upgrade)
+  expect_identical(names(told)[1:2], c("emulator", "sampler"))
+  runs <- nrow(upgrade$models[[1]]$fit$emulator$processes$inputs)
+  expect_match(told[1], sprintf(paste("emulator of base is not trusted \\(half of the noise\\): make more runs",
+                                      "\\(%d now\\)"), runs))
+  expect_match(told[2], "\\(chains stand still\\): give it more chains \\(pilot_chains, 24 now\\)")
+  upgrade$models[[1]]$fit$emulator["simulator"] <- list(NULL)
+  expect_match(inspected(upgrade)[1], "give more runs where the posterior lies")
+})
+
+test_that("data held out are asked for, and what they hold that calibration did not", {
+  upgrade <- without_held_out(small_upgrade())
+  expect_match(about(inspected(upgrade), "held_out"), "No data were held out")
+  upgrade <- small_upgrade()
+  upgrade$models[[2]]$scores$validate[["rmse"]] <- 5
+  expect_match(about(inspected(upgrade), "held_out"), "error is .* times that in calibration: compare the two periods")
+  m <- upgrade$measurements
+  m$boundary[m$use == "validate", m$condition == 1] <- m$boundary[m$use == "validate", m$condition == 1] + 100
+  upgrade$measurements <- m
+  expect_match(about(inspected(upgrade), "held_out"), "Te lies in .* of the steps outside of what calibration saw")
+})
+
+test_that("edges of the prior are told with the end and its value", {
+  fit <- small_upgrade()$models[[1]]$fit
+  expect_length(edge_inspections(fit), 0)
+  fit$values[, "gain"] <- 1.9999
+  fit$posterior$unit[, match("gain", colnames(fit$values))] <- 0.99995
+  expect_match(edge_inspections(fit), paste("At the upper end of its prior \\(2.0\\) lies gain: measure it, .* if",
+                                            "more is possible"))
+})
+
+test_that("the size of the error that remains asks for a check of the noise", {
+  model <- small_upgrade()$models[[2]]
+  m <- small_upgrade()$measurements
+  expect_null(remainder_inspection(model, m))
+  m$noise_sd <- 0.2
+  expect_match(remainder_inspection(model, m), "only 0.2. times the stated noise of 0.20 K")
+  m$noise_sd <- 0.01
+  expect_match(remainder_inspection(model, m), "times the stated noise of 0.010 K")
+})
+
+test_that("a calibration tells what it does not know", {
+  fit <- linear_fit()
+  told <- calibration_inspections(fit)
+  expect_match(about(told, "cause"), "attribute_discrepancy")
+  fit$values[, "gain"] <- (fit$values[, "offset"] - 10) / 40
+  expect_match(about(calibration_inspections(fit), "tied"), "offset and gain trade off .*correlation 1.00")
+})
+
+test_that("models that are not told apart are so where their simulations differ most", {
+  data <- linear_data(90)
+  m <- linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60)
+  steep <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], free("gain", uniform(0, 1)), boundary = "Te")
+  rough <- list(calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 12, importance_draws = 200)))
+  compared <- compare_models(list(a = linear_simulator(), b = steep), m, "paper", runs = 12, control = rough, seed = 3, quiet = TRUE)
+  compared$tables$evidence$log10_bf <- c(1, 1)
+  compared$models$b$prediction$mean <- compared$models$a$prediction$mean + c(data$Te / 10)
+  told <- summary(compared)$inspect
+  at <- which.max(data$Te)
+  expect_match(about(told, "separate"), sprintf(paste("differ most \\(by %s K\\) at hour %s, and the more so the",
+                                                      "higher Te is"), short(data$Te[at] / 10), data$hour[at]))
+  text <- knitr::knit(text = c("```{r}", "report_fragment(compared, \"summary\")", "```"), quiet = TRUE,
+                      envir = list2env(list(compared = compared), parent = globalenv()))
+  expect_match(text, "differ most")
+})
