@@ -343,19 +343,16 @@ method_table <- function(upgrade) {
 #' @return `file`, invisibly.
 #' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the figures alone.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
-#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
-#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
-#'                      validate = table$hour > 72)
-#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
-#'                              free("gain", uniform(0, 1)), boundary = "Te")
-#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
-#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
-#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
-#' })
-#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 19))
-#' upgrade <- upgrade_model(linear, room, catalogue(sun), runs = 20, control = quick, seed = 1, quiet = TRUE)
-#' if (rmarkdown::pandoc_available("1.12.3")) report(upgrade, file.path(tempdir(), "room.html"))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
+#' gain <- free("gain", uniform(0, 1))
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain, boundary = "Te")
+#' bent <- function_simulator(function(values, drivers) 20 + values[["gain"]]^2 * drivers[, "Te"], gain, boundary = "Te")
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # a coarse sampler, for speed
+#' comparison <- compare_models(list(linear = linear, bent = bent), room, runs = 20, control = quick, seed = 1,
+#'                              quiet = TRUE)
+#' if (rmarkdown::pandoc_available("1.12.3")) report(comparison, file.path(tempdir(), "room.html"))
 #' @export
 report <- function(x, file, quiet = TRUE) {
   check_input(checkmate::check_multi_class(x, c("amiss_upgrade", "amiss_comparison")), "x", "It is made by {.fun upgrade_model} or {.fun compare_models}.")
