@@ -26,6 +26,17 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #'   cannot be told apart from (`NA` for none), and `significant` of a member is that of the group. `groups` is a list, one
 #'   element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and `correlation`, the largest between two members.
 #' @source Westfall and Young (1993), Resampling-based multiple testing, Wiley.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' attribute_discrepancy(fit, list(surrogates = 19), seed = 1)
 #' @export
 attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")

@@ -39,6 +39,19 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   the emulator: `error` (RMS at the record's rows), `ratio` (over the noise), `border` (share of the posterior in the outer tenth of the emulator's
 #'   region), `z2` (mean square in units of the
 #'   emulator's own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and `verdict`.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' fit
+#' fit$check$verdict
+#' coef(fit)
 #' @export
 calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
   calibrate_with_runs(emulator, measurements, control, seed, threads)$fit

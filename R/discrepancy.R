@@ -10,6 +10,18 @@
 #' @return An object of class `amiss_discrepancy`: `series`, a data frame with the columns `time`, `observed`,
 #'   `simulated`, `residual`, `discrepancy`, `lower95` and `upper95`; `responses`, one column for each condition (`NULL`
 #'   for the paper's, which has no sum of responses).
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' head(discrepancy(fit)$series)
+#' plot(discrepancy(fit))
 #' @export
 discrepancy <- function(fit) {
   check_input(checkmate::check_multi_class(fit, c("amiss_calibration", "amiss_paper_calibration")), "fit")

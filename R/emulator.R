@@ -52,6 +52,17 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 #'   estimations of hyper-parameters of Gaussian processes with model misspecification, Computational Statistics and Data
 #'   Analysis 66, 55-69. Gilmour, Thompson and Cullis (1995), Average information REML, Biometrics 51, 1440-1450. Giordano, Stephenson,
 #'   Liu, Jordan and Broderick (2019), A Swiss army infinitesimal jackknife, AISTATS.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' emulator <- train_emulator(runs, room)
+#' emulator
+#' tidy(emulator)
 #' @export
 train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
@@ -186,6 +197,15 @@ tidy.amiss_emulator <- function(x, ...) {
 #' @param ... Not used.
 #' @return A list of `mean` and `sd`, one column per point. `sd` is that of a run there: the emulator's uncertainty and
 #'   what the basis leaves out.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' lapply(predict(train_emulator(runs, room), cbind(gain = c(0.2, 0.4))), head, 3)
 #' @export
 predict.amiss_emulator <- function(object, newdata, ...) {
   rlang::check_dots_empty()

@@ -46,6 +46,18 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' @param runs Number of runs to add.
 #' @inheritParams simulate_design
 #' @return An ensemble with a `region`. Train and calibrate anew.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' near <- refine_ensemble(runs, fit, runs = 20)
+#' calibrate(train_emulator(near, room), room, quick, seed = 1)
 #' @export
 refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")

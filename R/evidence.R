@@ -6,6 +6,20 @@
 #'
 #' @param model,reference Calibrations on the same measurements by the same method ([calibrate()] or [calibrate_paper()]).
 #' @return A one-row data frame: `log10_bf` in favour of `model`, its 95 % interval `lower95`, `upper95`, and `word`.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' sunny <- function_simulator(function(values, drivers) 20 + values[["sun"]] * drivers[, "Gv"],
+#'                             free("sun", uniform(0, 0.1)), boundary = "Gv")
+#' other <- calibrate(train_emulator(simulate_design(sunny, room, runs = 20, seed = 1), room), room, quick, seed = 1)
+#' bayes_factor(fit, other)
 #' @export
 bayes_factor <- function(model, reference) {
   fits <- list(model = model, reference = reference)
@@ -41,6 +55,17 @@ evidence_word <- function(lower, upper) {
 #' @param ... Not used: an argument that is not known is an error.
 #' @return `logml()`: the natural logarithm of the evidence. `bf()`: the Bayes factor in favour of `x1`, of the class
 #'   `bf_bridge`.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' if (requireNamespace("bridgesampling", quietly = TRUE)) bridgesampling::logml(fit)
 #' @name logml
 #' @exportS3Method bridgesampling::logml
 logml.amiss_fit <- function(x, ...) {

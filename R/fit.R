@@ -22,6 +22,20 @@
 #'   discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a data frame of one row.
 #'   `augment()`: the record with `.fitted` and `.resid`; with `newdata` its prediction, with `.lower` and `.upper` too.
 #'   `update()`: a new calibration by the same emulator (one that was refined for its region is not refined again).
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' glance(fit)
+#' head(augment(fit))
+#' sqrt(mean(residuals(fit)^2))
+#' update(fit, control = list(inclusion = 0.5))
 #' @name fit
 NULL
 
@@ -121,6 +135,17 @@ augment_prediction <- function(fit, prediction) {
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), `reach`, `check` and `trust` in
 #'   words.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' summary(fit)
 #' @export
 summary.amiss_fit <- function(object, ...) {
   rlang::check_dots_empty()

@@ -23,6 +23,21 @@
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the number is `level`),
 #'   and `crps`, the continuous ranked probability score of each row.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' head(predict(fit, use = "validate"))
+#'
+#' # Other weather: a table with the columns that drive the simulator.
+#' warmer <- data.frame(time = 97:120, Te = 15 + 5 * sin(97:120 / 4), Gv = 0)
+#' head(predict(fit, warmer, interval = "confidence"))
 #' @export
 predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "validate"), draws = 40, discrepancy = FALSE,
                               interval = c("prediction", "confidence"), level = 0.95, seed = object$seed,
@@ -188,6 +203,17 @@ prediction_scores <- function(prediction) {
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ..., whose attribute
 #'   `seed` makes them again.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' head(simulate(fit, nsim = 3, seed = 1))
 #' @export
 simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) {
   rlang::check_dots_empty()

@@ -14,6 +14,17 @@
 #' @inheritParams calibrate
 #' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how many
 #'   runs of the simulator were made here, those of the checks included.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # a coarse sampler, for speed
+#' fit <- calibrate_refined(runs, room, control = quick, seed = 1)
+#' c(fit$rounds, fit$runs_made)
 #' @export
 calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")

@@ -23,13 +23,22 @@
 #' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the
 #'   figures.
 #' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
+#' gain <- free("gain", uniform(0, 1))
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain, boundary = "Te")
+#' bent <- function_simulator(function(values, drivers) 20 + values[["gain"]]^2 * drivers[, "Te"], gain, boundary = "Te")
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # a coarse sampler, for speed
+#' comparison <- compare_models(list(linear = linear, bent = bent), room, runs = 20, control = quick, seed = 1,
+#'                              quiet = TRUE)
+#' if (rmarkdown::pandoc_available("1.12.3")) report(comparison, file.path(tempdir(), "room.html"))
 #' \dontrun{
-#' report(upgrade, "house.html")
-#' report(upgrade, "house.pdf")
-#' report_fragment(upgrade, parts = c("summary", "fit"), level = 3)  # in a chunk of a document
+#' report_fragment(comparison, parts = "summary", level = 3)  # in a chunk of a document
 #' }
 #' @export
 report <- function(x, file, quiet = TRUE) {
+  check_input(checkmate::check_flag(quiet), "quiet")
   check_reported(x)
   kind <- report_kind(file)
   check_report_tools()

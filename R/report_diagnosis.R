@@ -10,6 +10,20 @@
 #'   sentences `note`, `sure`, `change`, `gain`, `remains` and `inspect` (what to inspect next, to settle what is open);
 #'   `mechanisms`, for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits `also`
 #'   and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`, `attribution` and `method`.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
+#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' })
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 19))
+#' upgrade <- upgrade_model(linear, room, catalogue(sun), runs = 20, control = quick, seed = 1, quiet = TRUE)
+#' summary(upgrade)
 #' @export
 summary.amiss_upgrade <- function(object, ...) {
   verdict <- diagnosis_verdict(object)

@@ -396,6 +396,11 @@ fill_free <- function(x, fields, values) {
 #' @param values Named numeric vector: a value for every free parameter.
 #' @return `zone_parameters()`: a named list of the free parameters, each once. `zone_boundary()`: the names of the
 #'   columns of data that the zone uses. `zone_resolve()`: the zone with numbers in place of free parameters.
+#' @examples
+#' box <- paper_box("M2")
+#' names(zone_parameters(box))
+#' zone_boundary(box)
+#' zone_resolve(box, c(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179, heater_radiant = 0.79))
 #' @export
 zone_parameters <- function(zone) {
   check_zone(zone)
@@ -470,6 +475,13 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' @param control List of `max_substep_s` (s), `cells` (refinement of the walls), `spinup` (times that the leading
 #'   held rows are repeated first), `initial_hours` (of data that give the walls their first outside temperature).
 #' @return Matrix of mean air temperatures, degC: one row per interval, one column per run; `NaN` in a run that fails.
+#' @examples
+#' weather <- synthetic_weather(1, seed = 1)
+#' weather$RHP <- rolbs(nrow(weather), power = 100, seed = 1)
+#' values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = c(0.040, 0.048), insulation_c = 179,
+#'                 heater_radiant = 0.79)
+#' air <- simulate_zone(paper_box("M2"), values, as.matrix(weather[-1]), step_s = 900)
+#' dim(air)
 #' @export
 simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, threads = 1L, control = list()) {
   call <- rlang::current_env()

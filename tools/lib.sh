@@ -27,6 +27,7 @@ install_package() {
   [[ ! -d "$copy/src" ]] || find "$copy/src" -type f ! -name '*.o' -delete  # sources that are no more
   tar -C "$root" -c --exclude='*.o' --exclude='*.so' --exclude=./{build,demo,.git,tests,tools,bench} . |
     tar -C "$copy" -x
+  [[ ! -d "$root/build/doc" ]] || cp -r "$root/build/doc" "$copy/inst/doc"  # see tools/vignettes
   state="$(cd "$copy" && { R --version; g++ --version; grep LinkingTo DESCRIPTION; cat src/Makevars "$root/tools/Makevars";
     find src -name '*.hpp' | sort | xargs cat; } | sha256sum)"
   if [[ "$(cat "$copy/.state" 2>/dev/null)" != "$state" ]]; then

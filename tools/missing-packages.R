@@ -1,5 +1,5 @@
 # Prints, one a line, the R packages of DESCRIPTION that cannot be loaded or are too old.
-# Usage: Rscript missing-packages.R DESCRIPTION runtime|all|bench
+# Usage: Rscript missing-packages.R DESCRIPTION runtime|all|bench|site
 arguments <- commandArgs(trailingOnly = TRUE)
 runtime <- arguments[2] == "runtime"
 fields <- read.dcf(arguments[1], fields = c("Imports", "LinkingTo", "Suggests"))
@@ -20,6 +20,10 @@ if (arguments[2] == "bench") {  # the hidden-effect benchmark runs on workers, w
   extra <- c("future", "future.apply", "ranger")
   name <- c(name, extra)
   minimum <- c(minimum, rep("0", length(extra)))
+}
+if (arguments[2] == "site") {
+  name <- c(name, "pkgdown")
+  minimum <- c(minimum, "0")
 }
 usable <- function(name, minimum) {
   suppressWarnings(suppressPackageStartupMessages(requireNamespace(name, quietly = TRUE))) &&
