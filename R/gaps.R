@@ -82,11 +82,10 @@ tell_stray <- function(hours, snapped, name) {
                   class = "amiss_message_gap")
 }
 
-# Time at the hours of the grid, as it was where it has not moved.
+# Time at the hours of the grid, rounded to milliseconds, as hours are not whole: a second before 00:10:00 is in another minute.
 grid_time <- function(time, grid) {
-  at <- if (is.numeric(time)) grid$hours else utc(round(3600 * grid$hours, 3))
-  stay <- which(time_hours(time)[grid$row] == grid$hours)
-  at[stay] <- time[grid$row[stay]]
+  if (is.numeric(time)) return(grid$hours)
+  at <- utc(round(3600 * grid$hours, 3))
   attr(at, "tzone") <- attr(time, "tzone")
   at
 }

@@ -94,6 +94,9 @@ test_that("readings between two steps are left out, and many of them refused", {
   between <- rbind(data, transform(data[c(20, 90), ], hour = hour + 0.5, Ti = 99))
   expect_message(m <- linear_measurements(between[order(between$hour), ]), "2 rows between two steps are left out; the first is row 21")
   expect_equal(m$y, data$Ti)
+  # Of two at one step, the nearer.
+  twice <- rbind(data, transform(data[c(20, 90), ], hour = hour + c(0.1, -0.1), Ti = 99))
+  expect_equal(quietly(twice[order(twice$hour), ])$y, data$Ti)
   early <- replace(data, "hour", replace(data$hour, 9, 9.3))
   expect_equal(suppressMessages(linear_measurements(early))$y, replace(data$Ti, 9, NA))
   many <- rbind(data, transform(data[1:60, ], hour = hour + 0.5))
