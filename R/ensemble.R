@@ -120,7 +120,7 @@ without_simulator <- function(emulator) {
 #' @param measurements The [measurements()] that the runs are compared with. Without them `outputs` are taken to be at
 #'   the calibration rows, and validation rows are not known.
 #' @param validation Matrix of outputs at the validation rows, one run a column, if `outputs` does not hold them.
-#' @param time Times of the rows of `outputs`, and then of `validation`: `POSIXct`, ISO 8601 text or hours, as in the
+#' @param time Times of the rows of `outputs`, and then of `validation`: anything that [measurements()] reads, as in the
 #'   data.
 #' @return An object of class `amiss_ensemble`; `held_out` holds its runs at the validation rows.
 #' @seealso [read_calibro()]
@@ -213,14 +213,14 @@ place_runs <- function(outputs, validation, measurements, time, call = rlang::ca
   if (is.null(measurements)) {
     if (!is.null(validation)) abort_input(paste("{.arg validation} needs {.arg measurements}, which say what its rows",
                                                 "are."), call = call)
-    hours <- if (!is.null(time)) row_times(time, nrow(outputs), call)
+    hours <- if (!is.null(time)) row_times(time, nrow(outputs), NULL, call)
     return(list(calibrate = outputs, hours = hours))
   }
   record <- if (is.null(time)) {
     runs_by_count(outputs, validation, measurements, call)
   } else {
     runs <- rbind(outputs, validation)
-    runs_by_time(runs, row_times(time, nrow(runs), call), measurements, call)
+    runs_by_time(runs, row_times(time, nrow(runs), measurements, call), measurements, call)
   }
   held <- used_rows(measurements, "validate")
   list(calibrate = record[used_rows(measurements, "calibrate"), , drop = FALSE],
@@ -230,8 +230,8 @@ place_runs <- function(outputs, validation, measurements, time, call = rlang::ca
        })
 }
 
-row_times <- function(time, rows, call) {
-  hours <- read_time(time, "time", call)
+row_times <- function(time, rows, measurements, call) {
+  hours <- time_hours(read_time(time, "time", measurements$time_format, measurements$time_zone, call))
   if (length(hours) != rows) abort_input(paste("{.arg time} has {length(hours)} value{?s}, the runs have {rows}",
                                                "row{?s}."), call = call)
   hours

@@ -107,12 +107,6 @@ change_words <- function(before, after, unit) {
   else paste0(if (after < before) "falls" else "rises", " from ", pair[1], " to ", pair[2], unit)
 }
 
-clock <- function(time) {
-  if (is.numeric(time) || inherits(time, "POSIXct")) return(time)
-  # Rounded to milliseconds, as hours are not whole: a second before 00:10:00 is in another minute.
-  as.POSIXct(round(3600 * read_time(time, "time"), 3), origin = "1970-01-01", tz = "UTC")
-}
-
 time_label <- function(time) if (is.numeric(time)) "time [h]"
 
 time_axis <- function(time) {
@@ -122,7 +116,7 @@ time_axis <- function(time) {
 # Middle of the clock hour in which an interval lies that ends at `time`.
 hour_of_day <- function(time, step_h) {
   if (is.numeric(time)) return(floor((time - step_h / 2) %% 24) + 0.5)
-  as.POSIXlt(clock(time) - 1800 * step_h)$hour + 0.5
+  as.POSIXlt(time - 1800 * step_h)$hour + 0.5
 }
 
 use_names <- c(calibrate = "calibration", validate = "held out")
@@ -130,7 +124,7 @@ use_names <- c(calibrate = "calibration", validate = "held out")
 # Prediction of a model at its calibration and held-out rows, with the residual.
 prediction_rows <- function(model) {
   p <- model$prediction
-  data.frame(time = clock(p$time), use = factor(use_names[p$use], use_names), part = paste(p$use, p$segment),
+  data.frame(time = p$time, use = factor(use_names[p$use], use_names), part = paste(p$use, p$segment),
              observed = p$observed, simulated = p$mean, lower95 = p$lower95, upper95 = p$upper95, residual = p$observed - p$mean,
              row = seq_len(nrow(p)))
 }

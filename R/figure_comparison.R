@@ -147,7 +147,7 @@ figure_discrepancies <- function(comparison) {
   m <- comparison$measurements
   table <- mark_models(bind_models(comparison$models, function(model) {
     d <- discrepancy(model$fit)
-    transform(d$series, time = clock(d$series$time), part = d$segment)
+    transform(d$series, part = d$segment)
   }), comparison)
   size <- vapply(split(table$discrepancy, table$model), function(d) sqrt(mean(d^2)), 0)
   title <- sprintf("The discrepancy is least in %s: typically %s %s", names(size)[which.min(size)], short(min(size)), pretty_unit(m$unit))

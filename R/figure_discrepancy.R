@@ -10,11 +10,7 @@ discrepancy_title <- function(table) {
 # Discrepancies over time, one panel each on a common scale, and the leading boundary condition below them.
 figure_discrepancy <- function(discrepancies, leading = NULL) {
   unit <- discrepancies[[1]]$unit
-  table <- stage_table(discrepancies, function(d) {
-    table <- cbind(d$series, segment = d$segment)
-    table$time <- clock(table$time)
-    table
-  })
+  table <- stage_table(discrepancies, function(d) cbind(d$series, segment = d$segment))
   attr(table, "unit") <- unit
   stage_panel <- paste0(ifelse(levels(table$stage) == "the model", "error", levels(table$stage)), if (nzchar(unit)) paste0(" [", pretty_unit(unit), "]"))
   panels <- c(stage_panel, leading$name)
@@ -38,7 +34,7 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
 
 leading_layer <- function(leading, table, panels) {
   if (is.null(leading)) return(NULL)
-  time <- clock(leading$time)
+  time <- leading$time
   shown <- time %in% table$time
   series <- data.frame(time = time[shown], value = leading$value[shown], panel = factor(leading$name, panels))
   series$part <- cumsum(c(TRUE, diff(as.numeric(series$time)) > 1.5 * stats::median(diff(as.numeric(series$time)))))
@@ -58,7 +54,7 @@ figure_response <- function(upgrade, classes = 10) {
   leading <- leading_condition(upgrade)
   m <- upgrade$measurements
   table <- stage_table(upgrade_stages(upgrade), prediction_rows)
-  table$value <- leading$value[match(table$time, clock(leading$time))]
+  table$value <- leading$value[match(table$time, leading$time)]
   table$class <- cut(table$value, classes)
   binned <- stats::aggregate(cbind(residual, value) ~ class + stage, table, mean)
   binned <- binned[stats::aggregate(residual ~ class + stage, table, length)$residual >= 5, ]
@@ -79,7 +75,7 @@ figure_missing <- function(discrepancy, most = 4) {
   responses <- discrepancy$responses
   size <- sqrt(colMeans(responses^2))
   shown <- names(sort(size, decreasing = TRUE))[seq_len(min(most, length(size)))]
-  table <- data.frame(time = rep(clock(discrepancy$series$time), length(shown)), value = as.numeric(responses[, shown]),
+  table <- data.frame(time = rep(discrepancy$series$time, length(shown)), value = as.numeric(responses[, shown]),
                       panel = factor(rep(shown, each = nrow(responses)), shown), part = rep(discrepancy$segment, length(shown)))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, .data$value, group = .data$part)) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +

@@ -119,7 +119,7 @@ figure_measurements <- function(measurements) {
   series <- c(list(m$y), lapply(m$conditions, function(name) condition_values(m, name)))
   panels <- c(axis_label(m$target, level_unit(m$unit, m$y)), m$conditions)
   uses <- c(warmup = "warm-up", use_names, none = "not used")
-  table <- data.frame(time = rep(clock(m$time), length(panels)), value = unlist(series),
+  table <- data.frame(time = rep(m$time, length(panels)), value = unlist(series),
                       use = factor(uses[rep(m$use, length(panels))], uses), panel = factor(rep(panels, each = length(m$y)), panels),
                       part = rep(paste(m$segment, cumsum(c(TRUE, m$use[-1] != m$use[-length(m$use)]))), length(panels)))
   count <- function(use) sum(m$use == use & !is.na(m$y))

@@ -4,8 +4,32 @@
 #' time is broken, averaged to a coarser step if asked (blocks follow the UTC clock), and each row is given its use: calibration, validation or
 #' warm-up. Time stamps mark the end of each interval.
 #'
-#' @param data A data frame; every numeric column may drive the simulator.
-#' @param time Name of the time column: `POSIXct`, ISO 8601 text or numbers (hours).
+#' # Time
+#'
+#' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text that is the same in all
+#' rows: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without), `30.08.2013 00:10`,
+#' `30/08/2013 00:10` or `08/30/2013 12:10 AM` (where the whole column tells day from month), the stamps of EnergyPlus
+#' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. Numbers of 1e8 and more
+#' are Unix time in seconds or milliseconds, which is told. What stays open is an error, and `time_format` settles it.
+#'
+#' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when daylight saving ends, the
+#' column's order tells the first from the second; a time that its beginning leaves out is an error. Text that steps as
+#' the clocks of a common zone do on such a day is not read as UTC unless `time_zone = "UTC"` says so.
+#'
+#' The record keeps time as `POSIXct`, with the clock of `time_zone`, or as hours where no date is known; simulators and
+#' figures are given that.
+#'
+#' # Gaps
+#'
+#' Rows whose target is `NA` drive the simulator and are left out of the comparison; so is an average that holds one.
+#' A lost row does not break the record: its drivers are interpolated linearly. So are those of longer gaps, and values
+#' that a driver lacks, up to `fill_gaps` hours. Where more is lost the record is cut. Stamps that stray by up to a
+#' quarter of a step are taken at the nearest of equal steps; rows at none, up to a tenth of all, are left out. Each of
+#' these is told.
+#'
+#' @param data A data frame, or a series of class `zoo`, `xts`, `ts` or `tsibble`; every numeric column may drive the
+#'   simulator. A `ts` of 24 values a cycle, or a multiple of that, counts days.
+#' @param time Name of the time column; a series that knows its own needs none.
 #' @param target Name of the measured target.
 #' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws + circular(Wd)` or their
 #'   names. A circular quantity (degrees) enters as sine and cosine.
@@ -18,29 +42,42 @@
 #' @param warmup Hours at the start of each segment that are left out, so that the simulator's unknown initial
 #'   state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
+#' @param time_format What the time column holds, if it does not tell itself: of text `"dmy"` or `"mdy"`; of numbers
+#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` or `"unix"`; of either a format of [strptime()] (`"%Y%m%d%H"`).
+#' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in: `"UTC"`, or a name
+#'   such as `"Europe/Berlin"`.
+#' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular
+#'   boundary conditions by way of sine and cosine.
 #' @return An object of class `amiss_measurements`; `noise` says how `noise_sd` came about (`method`, and
 #'   `per_step`, the value of each average, where it was estimated).
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6)
+#'
+#' # Local text, a lost row and a gap of a driver.
+#' stamp <- as.POSIXct("2024-03-30", tz = "Europe/Berlin") + 3600 * table$hour
+#' table$time <- format(stamp, "%d.%m.%Y %H:%M")
+#' table$Te[20] <- NA
+#' measurements(table[-30, ], time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1, time_zone = "Europe/Berlin",
+#'              fill_gaps = 2)
 #' @export
-measurements <- function(data, time, target, boundary, noise_sd = NULL, average = NULL, calibrate = NULL,
-                         validate = NULL, warmup = 0, name = target, unit = "") {
+measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, average = NULL, calibrate = NULL,
+                         validate = NULL, warmup = 0, name = target, unit = "", time_format = NULL, time_zone = NULL,
+                         fill_gaps = 0) {
+  table <- time_table(data, time, time_format)
+  data <- table$data
+  time <- table$time
   check_input(checkmate::check_data_frame(data, min.rows = 10), "data")
-  check_input(checkmate::check_string(time), "time")
   check_input(checkmate::check_string(target), "target")
   check_input(checkmate::check_number(warmup, lower = 0, finite = TRUE), "warmup")
+  check_input(checkmate::check_number(fill_gaps, lower = 0, finite = TRUE), "fill_gaps")
   terms <- boundary_terms(boundary)
   require_columns(data, c(time, target, terms$name))
   if (any(terms$name %in% c(time, target))) {
     abort_input(c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
                   i = "Leave it out of {.arg boundary}."))
   }
-  hours <- read_time(data[[time]], time)
-  step <- stats::median(diff(hours))
-  segment <- cumsum(c(TRUE, diff(hours) > 1.5 * step))
-  check_regular(hours, step, time)
-
+  stamps <- read_time(data[[time]], time, table$format, time_zone)
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
   require_numeric(data, c(target, terms$name))
   drivers <- as.matrix(data[numeric_columns])
@@ -49,8 +86,6 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
     abort_input(c("Target {.val {target}} has {sum(is.infinite(y))} infinite value{?s}; the first is in row {which(is.infinite(y))[1]}.",
                   i = "Mark a missing value as NA: it is then left out."))
   }
-  require_complete(drivers, terms$name, hours, data[[time]])
-
   if (is.character(calibrate)) calibrate <- eval_rows(calibrate, data, "calibrate")
   if (is.character(validate)) validate <- eval_rows(validate, data, "validate")
   calibrate <- rows_flag(calibrate, nrow(data), "calibrate", default = is.null(validate) | !isTRUE(any(validate)))
@@ -60,12 +95,20 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
     abort_input(c("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and validate{?s/}; the first is row {which(calibrate & validate)[1]}.",
                   i = "Validation rows must not be seen by the calibration."))
   }
-  tell_gaps(hours, segment, ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none")))
-  into_segment <- hours - stats::ave(hours, segment, FUN = min) + step
-  warm <- into_segment <= warmup + 1e-9
-  use <- ifelse(warm, "warmup", ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none")))
+  used_for <- ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none"))
+  grid <- regular_grid(time_hours(stamps), fill_gaps, time)
+  there <- !is.na(grid$row)
+  tell_gaps(grid$hours[there], grid$segment[there], used_for[grid$row[there]], grid$row[there])
+  drivers <- fill_drivers(drivers[grid$row, , drop = FALSE], grid, fill_gaps, terms$name[terms$circular])
+  stamps <- grid_time(stamps, grid)
+  require_complete(drivers, terms$name, stamps, grid$row)
+  # A lost row has the use of the row before it, which it needs for averages only.
+  used_for <- used_for[grid$row[there]][cumsum(there)]
+  into_segment <- grid$hours - stats::ave(grid$hours, grid$segment, FUN = min) + grid$step
+  use <- ifelse(into_segment <= warmup + 1e-9, "warmup", used_for)
 
-  raw <- list(time = data[[time]], hours = hours, step_h = step, segment = segment, use = use, y = y, drivers = drivers)
+  raw <- list(time = stamps, hours = grid$hours, step_h = grid$step, segment = grid$segment, use = use, y = y[grid$row],
+              drivers = drivers)
   # Sine and cosine are taken before averages: the mean of 350 and 10 degrees is not 180.
   columns <- boundary_columns(drivers, terms)
   coarse <- average_rows(raw, average, columns$values)
@@ -80,11 +123,12 @@ measurements <- function(data, time, target, boundary, noise_sd = NULL, average 
     abort_input(c("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after averaging and warm-up; at least 20 are needed.",
                   i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
   }
-  noise <- noise_level(noise_sd, coarse, y)
+  noise <- noise_level(noise_sd, coarse, raw$y)
   structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise$sd,
                  noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
-                 block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names),
+                 block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
+                 time_format = table$format, time_zone = time_zone),
             class = "amiss_measurements")
 }
 
@@ -120,66 +164,13 @@ require_numeric <- function(data, columns, call = rlang::caller_env()) {
   }
 }
 
-read_time <- function(values, name, call = rlang::caller_env()) {
-  if (is.factor(values)) values <- as.character(values)
-  if (is.character(values)) {
-    parsed <- read_time_text(values)
-    bad <- which(is.na(parsed))
-    if (length(bad)) {
-      abort_input(c("Time column {.val {name}} cannot be read: row {bad[1]} holds {.val {values[bad[1]]}}.",
-                    i = "Use ISO 8601, for example 2013-08-30T00:10:00."), call = call)
-    }
-    values <- parsed
-  }
-  hours <- if (inherits(values, "POSIXct")) as.numeric(values) / 3600 else if (is.numeric(values)) as.numeric(values)
-  if (is.null(hours)) abort_input("Time column {.val {name}} is of class {.cls {class(values)}}; give POSIXct, ISO text or hours.", call = call)
-  if (any(is.infinite(hours))) abort_input("Time column {.val {name}} has an infinite value in row {which(is.infinite(hours))[1]}.", call = call)
-  if (anyNA(hours)) {
-    abort_input(c("Time column {.val {name}} has {sum(is.na(hours))} missing value{?s}; the first is in row {which(is.na(hours))[1]}.",
-                  i = "Every row needs its time; delete rows without one."), call = call)
-  }
-  twice <- which(duplicated(hours))
-  if (length(twice)) {
-    abort_input(c("Time column {.val {name}} has {length(twice)} duplicated time stamp{?s}; the first is {.val {format(values[twice[1]])}} in row {twice[1]}.",
-                  i = "Keep one row for each time (a change of summer time does this; use UTC)."), call = call)
-  }
-  back <- which(diff(hours) < 0)
-  if (length(back)) {
-    abort_input(c("Time column {.val {name}} goes back in row {back[1] + 1}: {.val {format(values[back[1] + 1])}} after {.val {format(values[back[1]])}}.",
-                  i = "Sort the rows by time."), call = call)
-  }
-  hours
-}
-
-# ISO 8601 text as time in UTC (a date alone is its midnight), or all numbers as hours; NA where it is neither.
-read_time_text <- function(values) {
-  hours <- suppressWarnings(as.numeric(values))
-  if (!anyNA(hours)) return(hours)
-  parts <- regmatches(values, regexec("^(\\d{4}-\\d{2}-\\d{2})(?:[T ](\\d{2}:\\d{2})(:\\d{2}(?:\\.\\d+)?)?)?(Z|[+-]\\d{2}:?\\d{2})?$", trimws(values), perl = TRUE))
-  part <- function(k, empty) vapply(parts, function(p) if (length(p) < k || !nzchar(p[k])) empty else p[k], "")
-  clock <- paste0(part(2, NA_character_), " ", part(3, "00:00"), part(4, ":00"))
-  time <- as.POSIXct(strptime(clock, "%Y-%m-%d %H:%M:%OS", tz = "UTC"))
-  zone <- sub(":", "", sub("Z", "+0000", part(5, "+0000")))
-  shift <- as.numeric(paste0(substr(zone, 1, 1), 1)) * (60 * as.numeric(substr(zone, 2, 3)) + as.numeric(substr(zone, 4, 5)))
-  time - 60 * shift
-}
-
-check_regular <- function(hours, step, name, call = rlang::caller_env()) {
-  steps <- diff(hours)
-  off <- which(steps <= 1.5 * step & abs(steps - step) > 0.01 * step)
-  if (length(off)) {
-    abort_input(c("Time column {.val {name}} has unequal steps: {signif(steps[off[1]], 4)} h after row {off[1]}, while the usual step is {signif(step, 4)} h.",
-                  i = "Interpolate or average the record to equal steps; whole gaps may stay."), call = call)
-  }
-}
-
 # A gap between two uses of the record is as it should be; one within a use may be a loss of data.
-tell_gaps <- function(hours, segment, used_for) {
+tell_gaps <- function(hours, segment, used_for, row) {
   gaps <- which(diff(segment) != 0)
   inside <- gaps[used_for[gaps] == used_for[gaps + 1]]
   tell <- function(rows, say) {
     if (!length(rows)) return(invisible())
-    say(c("The record has {length(rows)} gap{?s} {where}: the first is of {round(diff(hours)[rows[1]], 1)} h after row {rows[1]}.",
+    say(c("The record has {length(rows)} gap{?s} {where}: the first is of {round(diff(hours)[rows[1]], 1)} h after row {row[rows[1]]}.",
           i = "Each part is simulated on its own, with its own warm-up."))
   }
   where <- "within the rows of one use"
@@ -188,12 +179,13 @@ tell_gaps <- function(hours, segment, used_for) {
   tell(setdiff(gaps, inside), function(text) cli::cli_inform(text, class = "amiss_message_gap", .envir = parent.frame()))
 }
 
-require_complete <- function(drivers, analysed, hours, time, call = rlang::caller_env()) {
+# `row` of the data, NA for one that was lost.
+require_complete <- function(drivers, analysed, time, row = seq_along(time), call = rlang::caller_env()) {
   for (column in analysed) {
-    bad <- which(!is.finite(drivers[, column]))
+    bad <- which(!is.finite(drivers[, column]) & !is.na(row))
     if (length(bad)) {
-      abort_input(c("Boundary condition {.val {column}} has {length(bad)} missing or infinite value{?s}; the first is in row {bad[1]} ({format(time[bad[1]])}).",
-                    i = "A simulator needs every value of what drives it: fill the gap, or remove these rows as a whole."), call = call)
+      abort_input(c("Boundary condition {.val {column}} has {length(bad)} missing or infinite value{?s}; the first is in row {row[bad[1]]} ({format(time[bad[1]])}).",
+                    i = "A simulator needs every value of what drives it: fill short gaps by {.arg fill_gaps} of {.fun measurements}, or remove these rows as a whole."), call = call)
     }
   }
 }

@@ -103,7 +103,8 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   terms <- list(name = m$conditions, circular = tabulate(m$condition, length(m$conditions)) == 2)
   require_columns(data, c("time", terms$name), call)
   require_numeric(data, c(terms$name, intersect(m$target, names(data))), call)
-  hours <- read_time(data$time, "time", call)
+  time <- read_time(data$time, "time", m$time_format, m$time_zone, call)
+  hours <- time_hours(time)
   step <- m$raw$step_h
   if (length(hours) < 2 || any(abs(diff(hours) - step) > 0.01 * step)) {
     abort_input(c("{.arg newdata} must have at least two rows, one for every {signif(step, 4)} h without a gap.",
@@ -111,9 +112,9 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   }
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, NA)], c("time", m$target))
   drivers <- as.matrix(data[numeric_columns])
-  require_complete(drivers, terms$name, hours, data$time, call)
+  require_complete(drivers, terms$name, time, call = call)
   observed <- if (m$target %in% names(data)) as.numeric(data[[m$target]]) else rep(NA_real_, nrow(data))
-  raw <- list(time = data$time, hours = hours, step_h = step, segment = rep(1L, nrow(data)),
+  raw <- list(time = time, hours = hours, step_h = step, segment = rep(1L, nrow(data)),
               use = rep("new", nrow(data)), y = observed, drivers = drivers)
   columns <- boundary_columns(drivers, terms)
   coarse <- average_rows(raw, m$step_h, columns$values, call)

@@ -183,8 +183,7 @@ simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, st
 # Times that are no numbers as ISO 8601 in UTC.
 drivers_table <- function(drivers, step_h, time) {
   if (!is.numeric(time)) {
-    stamps <- as.POSIXct(round(3600 * read_time(time, "time")), origin = "1970-01-01", tz = "UTC")
-    time <- format(stamps, "%Y-%m-%dT%H:%M:%SZ")
+    time <- format(utc(round(as.numeric(time))), "%Y-%m-%dT%H:%M:%SZ")
   }
   data.frame(time = time, hours = step_h * seq_len(nrow(drivers)), drivers, check.names = FALSE)
 }

@@ -34,10 +34,10 @@ remainder_pattern <- function(r, rows, measurements) {
        where = "Look for something that follows the clock and is not among the inputs: a heat gain, a schedule, a door.")
 }
 
-# Hour of the day as the record's own clock shows it; of text that states an offset, as everywhere, in UTC.
+# Hour of the day as the record's own clock shows it.
 clock_hour <- function(time) {
   if (is.numeric(time)) return(round(time %% 24, 4))
-  parts <- as.POSIXlt(clock(time))
+  parts <- as.POSIXlt(time)
   round(parts$hour + parts$min / 60, 4)
 }
 

@@ -9,7 +9,7 @@
 #'
 #' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with named columns, one row
 #'   per interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is given a
-#'   list of `step_h` (length of an interval in hours), `time` (of each row, as in the data), `segment` (its number) and
+#'   list of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment` (its number) and
 #'   `hold` (the target as measured in the rows that warm up, `NA` in the others).
 #'   `with_parameters()`: if it has an argument `base`, it is given the simulator before the edit, as a function of
 #'   `values` and, if they are to differ, `drivers` and `info`; `NULL` leaves the function as it is.
@@ -136,7 +136,7 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @param hold Values at which the target is held during warm-up, `NA` where it is free; a simulator that cannot be
 #'   held ignores it.
 #' @param threads Number of threads.
-#' @param ... What a method may use or ignore: `time` of each row and the number of the `segment`. Every method must have
+#' @param ... What a method may use or ignore: `time` of each row (`POSIXct`, or hours) and the number of the `segment`. Every method must have
 #'   it.
 #' @return `free_parameters()`: named list of [free()]; `driver_names()`: names of the columns that it needs;
 #'   `simulate_runs()`: matrix with one row per interval and one column per run, `NaN` columns where a run failed.

@@ -2,7 +2,7 @@ study_fields <- list(
   needed = c("study", "data", "time", "target", "boundary"),
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
-  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "runs", "seed", "control", "title"))
+  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h", "runs", "seed", "control", "title"))
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
@@ -19,7 +19,7 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'
 #' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
 #' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`, `average_h`,
-#' `warmup_h` (hours), `calibrate`, `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in
+#' `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]), `calibrate`, `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in
 #' [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
 #'
 #' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical. Conditions are
@@ -84,7 +84,8 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
   measure <- function() {
     measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
                  noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"), validate = rows("validate"),
-                 warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "")
+                 warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
+                 time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0)
   }
   pieces <- if (is.null(study$models)) upgrade_pieces(files) else comparison_pieces(files, study$method)
   c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150, control = study$control),
