@@ -53,7 +53,7 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
       abort_input(c("{.arg {name}} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
     })
   }
-  tally <- new.env()
+  tally <- list2env(list(points = 0, undefined = 0))
   at_unit <- function(unit) {
     values <- to_values(unit)
     usable_likelihood(attempt(log_likelihood, "log_likelihood", values), values, tally, call)
@@ -90,12 +90,11 @@ usable_likelihood <- function(x, values, tally, call) {
   endless <- which(x == Inf)
   if (length(endless)) abort_input("{.arg log_likelihood} is Inf at {at(endless[1])}: no likelihood is.", call = call)
   undefined <- which(is.na(x))
-  first <- is.null(tally$points)
-  tally$points <- length(x) + (if (first) 0 else tally$points)
-  tally$undefined <- length(undefined) + (if (first) 0 else tally$undefined)
+  tally$points <- tally$points + length(x)
+  tally$undefined <- tally$undefined + length(undefined)
   if (length(undefined) && is.null(tally$where)) tally$where <- at(undefined[1])
-  if (first && length(undefined) > largest_failed_share * length(x)) {
-    abort_numerical(c("{.arg log_likelihood} is not a number at {length(undefined)} of the first {length(x)} draws of the priors.",
+  if (tally$undefined > largest_failed_share * tally$points) {
+    abort_numerical(c("{.arg log_likelihood} is not a number at {tally$undefined} of the first {tally$points} points.",
                       x = "The first is at {tally$where}.",
                       i = "Narrow the priors to where it is defined, or return -Inf where the data are impossible."), call = call)
   }

@@ -26,13 +26,13 @@ check_training_size <- function(runs, option = "runs", value = runs, call = rlan
   check_size(option, value, matrix_gb(runs, runs), hours = runs^3 * 1e-9 / 3600, call = call)
 }
 
-# A grid of all ratios of all error times at each reach: the engine keeps a matrix for each setting.
+# A grid of all ratios of all error times at each reach: the engine keeps about three matrices for each setting.
 check_settings_size <- function(control, conditions, what, call = rlang::caller_env()) {
   settings <- length(control$reach) * length(control$error_ratios)^length(control$error_times)
   columns <- 2 + conditions * length(control$time_constants)
   option <- if (length(control$error_ratios) >= length(control$reach)) "error_ratios" else "reach"
   check_size(paste0(what, "$", option, " (", length(control[[option]]), " values)"), control[[option]],
-             matrix_gb(columns, columns, settings), call = call)
+             matrix_gb(columns, columns, copies = 3 * settings), call = call)
 }
 
 # Annealing visits at least ten temperatures; a likelihood takes at least 20 microseconds.
@@ -45,11 +45,15 @@ check_sampler_size <- function(ais, what, call = rlang::caller_env()) {
 
 # Substeps of all runs, components and cells of a zone.
 check_zone_size <- function(zone, runs, rows, step_s, control, call = rlang::caller_env()) {
+  if (step_s / control$max_substep_s > 1e8) {
+    abort_input("{.arg step_s} = {step_s} has more than 1e8 steps of {.arg control$max_substep_s} = {control$max_substep_s} s.", call = call)
+  }
   substeps <- rows * ceiling(step_s / control$max_substep_s)
   hours <- 2e-7 * runs * substeps * max(1, length(zone$components)) * (1 + control$cells / 3) / 3600
   spun <- 1 + control$spinup
+  gb <- matrix_gb(40 * control$cells, length(zone$components))
   culprit <- c(max_substep_s = step_s / control$max_substep_s, cells = control$cells, spinup = spun, values = runs)
   option <- names(which.max(culprit))
   told <- if (option == "values") runs else control[[option]]
-  check_size(if (option == "values") "values (rows)" else paste0("control$", option), told, hours = hours * spun, call = call)
+  check_size(if (option == "values") "values (rows)" else paste0("control$", option), told, gb, hours * spun, call)
 }

@@ -111,27 +111,28 @@ valid_calls <- function() {
 }
 
 # Values that an argument of each kind cannot take, by what they are.
-never_number <- list(NA, NaN, "nonsense", c(1, 2), numeric(), list(1), identity, as.Date("2024-03-01"))
+date <- as.Date("2024-03-01")
 kinds <- list(
-  number = c(never_number, list(Inf, NULL)),
-  limit = c(never_number, list(NULL)),
-  positive = c(never_number, list(Inf, -1, 0, NULL)),
-  not_negative = c(never_number, list(Inf, -1, NULL)),
-  share = c(never_number, list(-0.1, 1.1, NULL)),
-  count = c(never_number, list(Inf, -1, 1.5, NULL)),
-  positive_count = c(never_number, list(Inf, -1, 0, 1.5, NULL)),
+  number = list(NaN, Inf, "nonsense", c(1, 2), date),
+  limit = list(NA, "nonsense", c(1, 2)),
+  field = list(NaN, identity),
+  positive = list(NULL, "nonsense", date, -1, 0),
+  not_negative = list(NaN, list(1), -1),
+  share = list(NA, identity, -0.1, 1.1),
+  count = list(NA, "nonsense", Inf, -1, 1.5),
+  positive_count = list(NULL, numeric(), -1, 0, 1.5),
   huge = list(1e9),
-  seed = c(never_number, list(Inf, -1, 1.5, 2^31, 1e20)),
-  threads = c(never_number, list(Inf, 0, -1, 1.5, 1e6, NULL)),
-  flag = list(NULL, NA, 1, "yes", c(TRUE, FALSE), logical(), list(TRUE)),
-  string = list(NULL, NA_character_, 1, c("a", "b"), character(), list("a"), identity),
-  filled_string = list(NULL, NA_character_, "", 1, c("a", "b"), character(), list("a"), identity),
-  column = list(NA_character_, "", 1, c("a", "b"), list("a"), identity),
-  columns = list(NULL, NA_character_, 1, list("a"), identity),
-  choice = list(NULL, NA_character_, 1, "nonsense", character(), identity),
-  object = list(NULL, NA, 1, "nonsense", list(), identity, data.frame(a = 1)),
-  matrix = list(NA, 1, "nonsense", list(), identity, matrix("a"), matrix(list(1))),
-  control = list(1, "nonsense", identity, list(1), list(nonsense = 1)))
+  seed = list(NA, "nonsense", -1, 1.5, 2^31),
+  threads = list(NULL, 0, 1.5, 1e6),
+  flag = list(NULL, NA, "yes", c(TRUE, FALSE)),
+  string = list(NA_character_, 1, c("a", "b")),
+  filled_string = list(NULL, "", 1, c("a", "b")),
+  column = list(NA_character_, "", 1),
+  columns = list(NULL, NA_character_, list("a")),
+  choice = list(NULL, NA_character_, "nonsense", identity),
+  object = list(NULL, "nonsense", data.frame(a = 1)),
+  matrix = list("nonsense", list(), identity, matrix("a")),
+  control = list(1, "nonsense", list(1), list(nonsense = 1)))
 
 # Rows of a function's arguments, by kind: rows_of("uniform", lower = "number").
 rows_of <- function(.function, ...) {
@@ -150,34 +151,36 @@ bad <- function(f, arg, value, pattern = arg, class = "amiss_error_input") {
   list(list(f = f, arg = arg, value = value, class = class, pattern = pattern))
 }
 
-# Options of `control` at every depth: none takes text, an endless number or a function of no use.
-rows_of_control <- function(f, defaults, depth = character(), except = character()) {
-  options <- setdiff(names(defaults), except)
-  rows <- lapply(options, function(option) {
-    wrong <- list("nonsense", NaN, list(nonsense = 1), identity, -1)
+# Options at any depth of `control`, such as c("calibration", "ais"). No option takes a text of no sense.
+rows_of_control <- function(f, defaults, depth = character(), wrong = list("nonsense")) {
+  nested <- function(control) {
+    for (level in rev(depth)) control <- stats::setNames(list(control), level)
+    control
+  }
+  where <- paste(c("control", depth), collapse = "\\$")
+  rows <- lapply(names(defaults), function(option) {
     lapply(wrong, function(value) {
-      control <- stats::setNames(list(value), option)
-      for (level in rev(depth)) control <- stats::setNames(list(control), level)
-      pattern <- paste(c("control", depth, option), collapse = "\\$")
-      list(f = f, arg = "control", value = control, class = "amiss_error_input", pattern = pattern)
+      bad(f, "control", nested(stats::setNames(list(value), option)), paste0(where, "\\$", option))
     })
   })
-  unknown <- list(nonsense = 1)
-  for (level in rev(depth)) unknown <- stats::setNames(list(unknown), level)
-  c(unlist(rows, recursive = FALSE),
-    bad(f, "control", unknown, paste(c(c("control", depth), ".*nonsense"), collapse = if (length(depth)) "\\$" else "")))
+  c(unlist(unlist(rows, recursive = FALSE), recursive = FALSE), bad(f, "control", nested(list(nonsense = 1)), paste0(where, ".*nonsense")))
 }
 
-# Outcome of a row: "" where it is refused as it should be, and otherwise what happened.
+# Outcome of a row, within ten seconds: "" where it is refused as it should be, and otherwise what happened.
 row_outcome <- function(row, calls) {
   arguments <- calls[[row$f]]
   arguments[row$arg] <- list(row$value)
   f <- switch(row$f, predict = stats::predict, simulate = stats::simulate, getExportedValue("amiss", row$f))
+  setTimeLimit(elapsed = 10, transient = TRUE)
+  on.exit(setTimeLimit())
   refused <- tryCatch({
     suppressWarnings(suppressMessages(do.call(f, arguments, quote = TRUE)))
     NULL
   }, error = identity)
-  message <- if (!is.null(refused)) gsub("\\s+", " ", cli::ansi_strip(conditionMessage(refused)))
+  # Not conditionMessage(), which lays the text out anew.
+  message <- if (inherits(refused, "rlang_error")) paste(c(refused$message, refused$body), collapse = " ")
+             else if (!is.null(refused)) conditionMessage(refused)
+  message <- gsub("`", "", gsub("\\s+", " ", cli::ansi_strip(message)))
   if (is.null(refused)) "was accepted"
   else if (!inherits(refused, row$class)) paste0("stopped with <", class(refused)[1], ">: ", message)
   else if (!grepl(row$pattern, message)) paste0("says not '", row$pattern, "': ", message)
