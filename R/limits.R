@@ -1,5 +1,5 @@
 # Sizes that cannot finish are refused before work starts, with an estimate of what they would take. The estimates are
-# low ones: what is refused would take at least as much.
+# rough ones, made to be rather low.
 
 largest_gb <- 4
 longest_h <- 24
@@ -27,9 +27,9 @@ check_training_size <- function(runs, option = "runs", value = runs, call = rlan
 }
 
 # A grid of all ratios of all error times at each reach: the engine keeps about three matrices for each setting.
-check_settings_size <- function(control, conditions, what, call = rlang::caller_env()) {
+check_settings_size <- function(control, condition_columns, what, call = rlang::caller_env()) {
   settings <- length(control$reach) * length(control$error_ratios)^length(control$error_times)
-  columns <- 2 + conditions * length(control$time_constants)
+  columns <- 2 + condition_columns * length(control$time_constants)
   option <- if (length(control$error_ratios) >= length(control$reach)) "error_ratios" else "reach"
   check_size(paste0(what, "$", option, " (", length(control[[option]]), " values)"), control[[option]],
              matrix_gb(columns, columns, copies = 3 * settings), call = call)
@@ -37,23 +37,21 @@ check_settings_size <- function(control, conditions, what, call = rlang::caller_
 
 # Annealing visits at least ten temperatures; a likelihood takes at least 20 microseconds.
 check_sampler_size <- function(ais, what, call = rlang::caller_env()) {
-  counts <- c(pilot_chains = ais$pilot_chains, groups = ais$groups * max(ais$chains, 32), importance_draws = ais$importance_draws)
+  counts <- c(pilot_chains = ais$pilot_chains, groups = ais$groups * if (ais$chains > 0) ais$chains else 32, importance_draws = ais$importance_draws)
   counts[1:2] <- 10 * counts[1:2] * max(ais$sweeps, 1)
   largest <- names(which.max(counts))
   check_size(paste0(what, "$", largest), ais[[largest]], hours = 2e-5 * sum(counts) / 3600, call = call)
 }
 
-# Substeps of all runs, components and cells of a zone.
+# Substeps of all runs, components and cells of a zone; at most 40 cells a component are usual.
 check_zone_size <- function(zone, runs, rows, step_s, control, call = rlang::caller_env()) {
-  if (step_s / control$max_substep_s > 1e8) {
+  steps <- step_s / control$max_substep_s
+  if (steps > 1e8) {
     abort_input("{.arg step_s} = {step_s} has more than 1e8 steps of {.arg control$max_substep_s} = {control$max_substep_s} s.", call = call)
   }
-  substeps <- rows * ceiling(step_s / control$max_substep_s)
-  hours <- 2e-7 * runs * substeps * max(1, length(zone$components)) * (1 + control$cells / 3) / 3600
-  spun <- 1 + control$spinup
-  gb <- matrix_gb(40 * control$cells, length(zone$components))
-  culprit <- c(max_substep_s = step_s / control$max_substep_s, cells = control$cells, spinup = spun, values = runs)
-  option <- names(which.max(culprit))
-  told <- if (option == "values") runs else control[[option]]
-  check_size(if (option == "values") "values (rows)" else paste0("control$", option), told, gb, hours * spun, call)
+  components <- max(1, length(zone$components))
+  hours <- 2e-7 * runs * rows * ceiling(steps) * components * (1 + control$cells / 3) / 3600
+  largest <- which.max(c(steps, control$cells, runs))
+  check_size(c("control$max_substep_s", "control$cells", "values (rows)")[largest],
+             c(control$max_substep_s, control$cells, runs)[largest], matrix_gb(40 * control$cells, components), hours, call)
 }

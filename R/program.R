@@ -56,7 +56,7 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
   command[files] <- normalizePath(command[files])
   simulator <- structure(list(
     format_version = format_version, name = name, command = command, output = output, templates = templates,
-    parameters = named_parameters(list(...)), boundary = boundary, drivers = drivers, time_limit = time_limit,
+    parameters = named_parameters(list(...)), boundary = unique(boundary), drivers = drivers, time_limit = time_limit,
     retries = retries, cache = normalizePath(cache, mustWork = FALSE), version = version), class = "amiss_program_simulator")
   check_placeholders(simulator)
 }

@@ -45,7 +45,7 @@ function_simulator <- function(f, ..., boundary = character(), name = "simulator
   parameters <- named_parameters(list(...))
   check_columns_named(boundary)
   check_input(checkmate::check_string(name), "name")
-  structure(list(format_version = format_version, name = name, f = f, parameters = parameters, boundary = boundary),
+  structure(list(format_version = format_version, name = name, f = f, parameters = parameters, boundary = unique(boundary)),
             class = "amiss_function_simulator")
 }
 
@@ -110,7 +110,7 @@ check_run_function <- function(f, offered, call = rlang::caller_env()) {
 
 # Names of driver columns.
 check_columns_named <- function(boundary, call = rlang::caller_env()) {
-  check_input(checkmate::check_character(boundary, min.chars = 1, any.missing = FALSE, unique = TRUE), "boundary",
+  check_input(checkmate::check_character(boundary, min.chars = 1, any.missing = FALSE), "boundary",
               "Give the names of columns of the drivers.", call = call)
 }
 

@@ -17,7 +17,7 @@ read_study_file <- function(path, call = rlang::caller_env()) {
   if (any(marks > 1 & !(marks == length(written) & startsWith(written[marks], "...")))) refuse("It holds several documents; give each its own file.")
   tags <- new.env()
   study <- tryCatch(yaml::yaml.load(text, eval.expr = FALSE, handlers = c(plain_words, noted_tags(text, tags))),
-                    error = function(e) refuse(conditionMessage(e)))
+                    error = function(e) refuse(conditionMessage(e)), warning = function(w) refuse(conditionMessage(w)))
   if (length(tags)) refuse(paste("It has the tag", ls(tags)[1], "which is not known."))
   check_study_size(study, refuse)
   study
@@ -35,6 +35,11 @@ check_study_text <- function(text, refuse) {
 
 # YAML 1.1 takes yes, no, on, off, y and n for logical; here they stay text, so that a column may be called y.
 plain_words <- list(
+  int = function(word) {
+    # Larger ones than R's integers stay numbers.
+    number <- suppressWarnings(as.integer(word))
+    if (is.na(number)) as.numeric(word) else number
+  },
   "bool#yes" = function(word) if (tolower(word) == "true") TRUE else word,
   "bool#no" = function(word) if (tolower(word) == "false") FALSE else word)
 

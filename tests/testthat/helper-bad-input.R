@@ -187,4 +187,28 @@ row_outcome <- function(row, calls) {
   else ""
 }
 
+# A study that is read and checked without being run; `fields` replace its own, NULL leaves one out.
+bad_study <- function(fields) {
+  o <- bad_input_objects()
+  utils::write.csv(o$record, file.path(o$folder, "data.csv"), row.names = FALSE)
+  writeLines('function_simulator(function(values, drivers) drivers[, "Te"], free("gain", uniform(0, 1)), boundary = "Te")',
+             file.path(o$folder, "model.R"))
+  writeLines('catalogue(mechanism("sun", identity, "Gv", "The sun."))', file.path(o$folder, "catalogue.R"))
+  study <- list(study = "linear", data = "data.csv", time = "hour", target = "Ti", boundary = list("Te", "Gv"), noise_sd = 0.1,
+                model = "model.R", catalogue = "catalogue.R", runs = 10, seed = 1)
+  study[names(fields)] <- fields
+  path <- file.path(o$folder, "study.yml")
+  yaml::write_yaml(study, path)
+  path
+}
+
+# As row_outcome(), of a field of a study file.
+study_outcome <- function(row) {
+  calls <- list(run_study = list(path = bad_study(stats::setNames(list(row$value), row$arg)), quiet = TRUE, trust = TRUE))
+  row_outcome(utils::modifyList(row, list(f = "run_study", arg = "quiet", value = TRUE)), calls)
+}
+
+# Rows of a field: what it cannot be, each said with its name.
+study_rows <- function(field, ..., pattern = field) unlist(lapply(list(...), function(value) bad("study", field, value, pattern)), recursive = FALSE)
+
 row_name <- function(row) sprintf("%s(%s = %s)", row$f, row$arg, substr(deparse1(row$value), 1, 60))

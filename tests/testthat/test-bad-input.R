@@ -143,7 +143,6 @@ rows_of_their_own <- function() {
     bad("ensemble", "validation", "runs"), bad("ensemble", "validation", matrix(0, 3, 10), "validation.* 3"),
     bad("ensemble", "time", 1:3, "time.*3 values"), bad("ensemble", "time", 101:145, "lack 45 of the 45 rows"),
     bad("function_simulator", "f", function(values) 1, "values and drivers"),
-    bad("function_simulator", "boundary", c("Te", "Te"), "boundary.*duplicated"),
     bad("glance", "nonsense", 1, "nonsense", "rlib_error_dots_nonempty"),
     bad("heat_loss_coefficient", "drivers", "warm"), bad("heat_loss_coefficient", "inside", 5, "inside = 5"),
     bad("heat_loss_coefficient", "values", cbind(ach = Inf), "Inf in row 1"),
@@ -212,6 +211,69 @@ test_that("every option refuses what it cannot be, before anything is computed",
 
 test_that("what is of the right kind, and wrong all the same, is refused", {
   expect_identical(faults(rows_of_their_own()), character())
+})
+
+rows_of_study <- function() {
+  c(study_rows("study", NULL, 1, list("a", "b")), study_rows("title", 2024, list("a", "b")), study_rows("unit", 1, list("a", "b")),
+    study_rows("data", NULL, 1, "nowhere.csv", "model"), study_rows("time", NULL, 1, list("a", "b")), study_rows("target", NULL, 1, list("a", "b")),
+    study_rows("boundary", NULL, list("Te", "Te")),
+    study_rows("time", "Te", "none", pattern = "Te|none"), study_rows("target", "none", pattern = "none"), study_rows("boundary", "none", 1, pattern = "none|1"),
+    study_rows("noise_sd", -1, "much", TRUE, list(1, 2), NULL), study_rows("average_h", -1, 0.3, "day", pattern = "average"),
+    study_rows("calibrate", "hour <", "system('ls')", 1, TRUE, "humidity > 3"), study_rows("validate", "hour > 1e9", "stop()", list("a")),
+    study_rows("warmup_h", -1, "day", pattern = "warmup"), study_rows("runs", 0, -1, 1.5, "many", 1e9, 3, list(1, 2), TRUE),
+    study_rows("seed", -1, 1.5, "one", 3e9, list(1, 2), TRUE), study_rows("model", NULL, "data.csv", "nowhere.R", 1),
+    study_rows("catalogue", NULL, "nowhere.R", 1, "model.R"), study_rows("colour", "red"), study_rows("method", "paper"), study_rows("truth", "model.R"),
+    study_rows("control", "fast", 1, list(1)), study_rows("control", list(steps = 3), pattern = "steps"),
+    study_rows("control", list(max_steps = -1), pattern = "control\\$max_steps = -1"),
+    study_rows("control", list(emulator = list(starts = 0)), pattern = "control\\$emulator\\$starts = 0"),
+    study_rows("control", list(calibration = list(inclusion = 2)), pattern = "control\\$calibration\\$inclusion = 2"),
+    study_rows("control", list(calibration = list(ais = list(groups = 1))), pattern = "control\\$calibration\\$ais\\$groups = 1"),
+    study_rows("control", list(calibration = 5), list(attribution = "no"), list(attribution = list(level = 5)), list(screening = list(chains = -1))))
+}
+
+test_that("every field of a study is checked before anything is computed", {
+  told <- vapply(rows_of_study(), study_outcome, "")
+  expect_identical(paste(vapply(rows_of_study(), row_name, ""), told)[nzchar(told)], character())
+  fields <- vapply(rows_of_study(), `[[`, "", "arg")
+  expect_identical(setdiff(unlist(study_fields), c(fields, "models")), character())
+})
+
+test_that("the command refuses bad words with status 2, and bad studies with 1", {
+  study <- bad_study(list())
+  status <- function(...) {
+    said <- NULL
+    out <- withCallingHandlers(run_command(c(...)), message = function(m) {
+      said <<- c(said, conditionMessage(m))
+      invokeRestart("muffleMessage")
+    })
+    list(out, paste(said, collapse = " "))
+  }
+  refuses <- function(expected, pattern, ...) {
+    told <- status(...)
+    expect_identical(told[[1]], expected)
+    expect_match(told[[2]], pattern)
+  }
+  run <- function(...) c("run", study, "--out", file.path(tempdir(), "never-made"), "--trust", "--quiet", ...)
+  for (option in c("--seed", "--threads")) for (value in c("Inf", "NaN", "1.5", "-1", "x", "1e20", "NA", "''")) refuses(2, option, run(option, value))
+  refuses(2, "from 1 to 1024", run("--threads", "0"))
+  refuses(2, "from 0 to 2147483647", run("--seed", "2147483648"))
+  refuses(2, "colour", run("--colour"))
+  refuses(2, "one study file", run("more.yml"))
+  refuses(2, "no command", character())
+  refuses(2, "unknown command 'walk'", "walk")
+  refuses(2, "'--out DIR' is needed", "run", study)
+  refuses(2, "does not exist", "run", "nowhere.yml", "--out", "x")
+  bad_study(list(runs = 1e9))
+  refuses(1, "--large", run())
+  expect_false(file.exists(file.path(tempdir(), "never-made")))
+})
+
+test_that("a study nested without end is refused at once", {
+  path <- withr::local_tempfile(fileext = ".yml")
+  for (text in c(strrep("[", 1e5), strrep("{a: ", 1e5), strrep("- ", 1e5), strrep("a", 2e6))) {
+    writeLines(paste("study:", text), path)
+    expect_error(read_study(path), "nested deeper|larger than 1 MB", class = "amiss_error_input")
+  }
 })
 
 # Arguments that take anything, or nothing.
