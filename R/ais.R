@@ -53,7 +53,11 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
       abort_input(c("{.arg {name}} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
     })
   }
-  at_unit <- function(unit) as.numeric(attempt(log_likelihood, "log_likelihood", to_values(unit)))
+  tally <- list2env(list(points = 0, undefined = 0))
+  at_unit <- function(unit) {
+    values <- to_values(unit)
+    usable_likelihood(attempt(log_likelihood, "log_likelihood", values), values, tally, call)
+  }
   # d value / du is one over the prior's density.
   slope_at_unit <- function(unit) {
     values <- to_values(unit)
@@ -66,9 +70,41 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
     unname(slope / matrix(density, nrow(unit)))
   }
   result <- call_engine(ais_(at_unit, if (!is.null(gradient)) slope_at_unit, length(priors), control, engine_context(seed, 1)))
+  tell_undefined(tally)
   result$draws <- to_values(result$unit)
   result$unit <- NULL
   structure(c(list(format_version = format_version, seed = seed), result), class = "amiss_ais")
+}
+
+# Log-likelihoods as numbers. Where there is none (NaN), the point counts as impossible and is told of; where that is a
+# good part of the priors, the result would be of another model.
+usable_likelihood <- function(x, values, tally, call) {
+  if (!is.numeric(x) && !is.logical(x)) {
+    abort_input("{.arg log_likelihood} must return numbers; it returned {.cls {class(x)}}.", call = call)
+  }
+  if (length(x) != nrow(values)) {
+    abort_input(c("{.arg log_likelihood} returned another number of values than it got points: {length(x)} for {nrow(values)}.",
+                  i = "It gets a matrix, one point a row."), call = call)
+  }
+  at <- function(i) point_words(values[i, , drop = FALSE])
+  endless <- which(x == Inf)
+  if (length(endless)) abort_input("{.arg log_likelihood} is Inf at {at(endless[1])}: no likelihood is.", call = call)
+  undefined <- which(is.na(x))
+  tally$points <- tally$points + length(x)
+  tally$undefined <- tally$undefined + length(undefined)
+  if (length(undefined) && is.null(tally$where)) tally$where <- at(undefined[1])
+  if (tally$undefined > largest_failed_share * tally$points) {
+    abort_numerical(c("{.arg log_likelihood} is not a number at {tally$undefined} of the first {tally$points} points.",
+                      x = "The first is at {tally$where}.",
+                      i = "Narrow the priors to where it is defined, or return -Inf where the data are impossible."), call = call)
+  }
+  as.numeric(x)
+}
+
+tell_undefined <- function(tally) {
+  if (tally$undefined == 0) return(invisible())
+  warn_result(c("{.arg log_likelihood} was not a number at {tally$undefined} of {tally$points} points, which count as impossible.",
+                x = "The first is at {tally$where}."))
 }
 
 # The numbers of chains and moves stay 0 where they follow from the target, which the engine knows. Limits that were not
@@ -78,23 +114,28 @@ fill_ais_control <- function(control, what = "control", call = rlang::caller_env
   filled$pilot_chains <- filled$pilot_chains %||% 0
   filled$chains <- filled$chains %||% 0
   filled$sweeps <- filled$sweeps %||% 0
+  check <- function(name, value, lower, hint = NULL) {
+    check_input(checkmate::check_int(value, lower = lower, upper = 1e7), paste0(what, "$", name), hint, call = call)
+  }
+  follows <- c("pilot_chains", "chains", "sweeps", "importance_draws")
+  least <- c(groups = 2, sweeps = 1, pilot_chains = 8, chains = 4, importance_draws = 50, max_components = 1)
+  for (name in names(least)) {
+    value <- filled[[name]]
+    if (!(name %in% follows && checkmate::test_number(value) && value == 0)) check(name, value, least[[name]])
+  }
   for (limit in c("groups", "sweeps")) {
     upper <- paste0("max_", limit)
     if (is.null(control[[upper]])) filled[[upper]] <- max(filled[[upper]], filled[[limit]])
   }
-  check <- function(name, result, hint = NULL) check_input(result, paste0(what, "$", name), hint, call = call)
-  counts <- list(pilot_chains = 8, groups = 2, max_groups = filled$groups, chains = 4, sweeps = 1, max_sweeps = max(1, filled$sweeps),
-                 importance_draws = 50, max_components = 1)
-  absent <- c("pilot_chains", "chains", "sweeps", "importance_draws")
-  for (name in names(counts)) {
-    value <- filled[[name]]
-    if (name %in% absent && (identical(value, 0) || identical(value, 0L))) next
-    lower <- if (is.numeric(counts[[name]])) counts[[name]] else 1
-    check(name, checkmate::check_int(value, lower = lower, upper = 1e7), paste0("Seen: ", deparse1(value), "."))
+  check("max_groups", filled$max_groups, filled$groups, "It may not lie below {.code groups}.")
+  check("max_sweeps", filled$max_sweeps, max(1, filled$sweeps), "It may not lie below {.code sweeps}.")
+  check_input(checkmate::check_number(filled$precision, lower = 1e-6, finite = TRUE), paste0(what, "$precision"),
+              "It is a standard error in nats.", call = call)
+  check_input(checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999), paste0(what, "$ess_drop"), call = call)
+  for (flag in c("gradient", "resample")) {
+    check_input(checkmate::check_flag(filled[[flag]]), paste0(what, "$", flag), call = call)
   }
-  check("precision", checkmate::check_number(filled$precision, lower = 1e-6, finite = TRUE), "It is a standard error in nats.")
-  check("ess_drop", checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999))
-  for (flag in c("gradient", "resample")) check(flag, checkmate::check_flag(filled[[flag]]))
+  check_sampler_size(filled, what, call)
   filled
 }
 

@@ -28,7 +28,13 @@ format_version <- 1L
 # A seed given by the user, or one drawn from R's generator, so that set.seed() governs.
 pick_seed <- function(seed, call = rlang::caller_env()) {
   if (is.null(seed)) return(sample.int(.Machine$integer.max, 1))
-  check_input(checkmate::check_number(seed, lower = 0, upper = 2^53, finite = TRUE), "seed", call = call)
+  check_seed(seed, "seed", call)
+}
+
+# Whole, so that no two seeds are one; R's generator takes none above the largest integer.
+check_seed <- function(seed, name, call = rlang::caller_env()) {
+  check_input(checkmate::check_int(seed, lower = 0, upper = .Machine$integer.max), name,
+              "A seed is a whole number from 0 to 2147483647.", call = call)
   as.numeric(seed)
 }
 
@@ -36,12 +42,12 @@ pick_seed <- function(seed, call = rlang::caller_env()) {
 with_seed <- function(seed, expression) {
   old <- globalenv()$.Random.seed
   on.exit(if (is.null(old)) rm(list = ".Random.seed", envir = globalenv()) else assign(".Random.seed", old, envir = globalenv()))
-  set.seed(as.integer(seed %% .Machine$integer.max), kind = "Mersenne-Twister", normal.kind = "Inversion", sample.kind = "Rejection")
+  set.seed(as.integer(seed), kind = "Mersenne-Twister", normal.kind = "Inversion", sample.kind = "Rejection")
   expression
 }
 
 check_threads <- function(threads, call = rlang::caller_env()) {
-  check_input(checkmate::check_count(threads, positive = TRUE), "threads", call = call)
+  check_input(checkmate::check_int(threads, lower = 1, upper = 1024), "threads", call = call)
   as.integer(threads)
 }
 

@@ -40,11 +40,7 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' @export
 attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
-  control <- merge_control(attribution_control, control)
-  check_attribution_control(control)
-  ais <- fit$control$ais
-  ais[names(control$ais)] <- control$ais
-  control$ais <- fill_ais_control(ais, "control$ais")
+  control <- fill_attribution_control(control, fit$control$ais, length(fit$measurements$conditions))
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
@@ -104,12 +100,19 @@ largest_correlation <- function(fit, members) {
   max(r[outer(m$condition[columns], m$condition[columns], "!=")])
 }
 
-check_attribution_control <- function(control, call = rlang::caller_env()) {
-  check_input(checkmate::check_count(control$surrogates, positive = TRUE), "control$surrogates", call = call)
-  check_input(checkmate::check_number(control$smallest_shift, lower = 0, upper = 0.49), "control$smallest_shift", call = call)
-  check_input(checkmate::check_number(control$level, lower = 0, upper = 1), "control$level", call = call)
-  check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE), "control$least_log10_bf", call = call)
-  check_input(checkmate::check_list(control$ais), "control$ais", call = call)
+# The sampler of the calibration, `ais`, with what the attribution's options change.
+fill_attribution_control <- function(control, ais, conditions, what = "control", call = rlang::caller_env()) {
+  control <- merge_control(attribution_control, control, what, call = call)
+  named <- function(option) paste0(what, "$", option)
+  check_input(checkmate::check_count(control$surrogates, positive = TRUE), named("surrogates"), call = call)
+  # A surrogate takes a millisecond at least.
+  check_size(named("surrogates"), control$surrogates, matrix_gb(control$surrogates, conditions),
+             hours = 1e-3 * control$surrogates / 3600, call = call)
+  check_input(checkmate::check_number(control$smallest_shift, lower = 0, upper = 0.49), named("smallest_shift"), call = call)
+  check_input(checkmate::check_number(control$level, lower = 0, upper = 1), named("level"), call = call)
+  check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE), named("least_log10_bf"), call = call)
+  control$ais <- fill_ais_control(merge_control(ais, control$ais, named("ais"), names(ais_control), call), named("ais"), call)
+  control
 }
 
 # Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).

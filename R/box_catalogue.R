@@ -11,6 +11,8 @@
 #' box_catalogue(c("Te", "Gv", "Ws", "Wd", "RHP"))
 #' @export
 box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn"), azimuth = 180) {
+  check_input(checkmate::check_character(columns, any.missing = FALSE), "columns")
+  check_input(checkmate::check_number(azimuth, finite = TRUE), "azimuth")
   outer <- c("front", "back", "left", "right", "roof")
   facing <- c(front = azimuth, back = azimuth + 180, left = azimuth + 90, right = azimuth - 90, roof = NA)
   change_all <- function(model, ...) Reduce(function(m, name) change_component(m, name, ...), outer, model)

@@ -81,7 +81,7 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
 # What a calibration is made of before it is made: list(emulator, measurements, rows, control, priors, seed).
 calibration_setting <- function(emulator, measurements, control, seed, call = rlang::caller_env()) {
   rows <- emulated_rows(emulator, measurements, call)
-  control <- fill_calibration_control(control, measurements, length(rows), call)
+  control <- fill_calibration_control(control, measurements, length(rows), call = call)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
                  discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion, amplitude = control$amplitude,
                  correlation_times = control$error_times, ratios = control$error_ratios, reach = control$reach)
@@ -101,9 +101,11 @@ emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
   rows
 }
 
-fill_calibration_control <- function(control, measurements, n, call = rlang::caller_env()) {
-  control <- merge_control(calibration_control, control, call = call)
-  control$ais <- fill_ais_control(merge_control(calibration_control$ais, control$ais, "control$ais", names(ais_control), call), "control$ais", call = call)
+fill_calibration_control <- function(control, measurements, n, what = "control", call = rlang::caller_env()) {
+  control <- merge_control(calibration_control, control, what, call = call)
+  named <- function(option) paste0(what, "$", option)
+  ais <- merge_control(calibration_control$ais, control$ais, named("ais"), names(ais_control), call)
+  control$ais <- fill_ais_control(ais, named("ais"), call = call)
   step <- measurements$step_h
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
   if (is.null(control$amplitude)) control["amplitude"] <- measurements$noise_sd
@@ -112,19 +114,21 @@ fill_calibration_control <- function(control, measurements, n, call = rlang::cal
     control[["time_constants"]] <- c(0, taus[taus <= n * step / 6])
   }
   if (is.null(control$error_times)) control[["error_times"]] <- c(2, 8) * step
-  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",
+  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), named("confidence"),
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
-  check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1), "control$inclusion", call = call)
-  check_input(checkmate::check_number(control$amplitude, lower = 1e-12, finite = TRUE), "control$amplitude", call = call)
-  check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), "control$time_constants", call = call)
-  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE, max.len = 3), "control$error_times", call = call)
-  check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), "control$error_ratios", call = call)
-  check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1, any.missing = FALSE, unique = TRUE), "control$reach",
+  check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1), named("inclusion"), call = call)
+  check_input(checkmate::check_number(control$amplitude, lower = 1e-12, finite = TRUE), named("amplitude"), call = call)
+  check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), named("time_constants"), call = call)
+  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE, max.len = 3), named("error_times"), call = call)
+  check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), named("error_ratios"), call = call)
+  check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1, any.missing = FALSE, unique = TRUE), named("reach"),
               "Give numbers above 0; {.code Inf} is a free discrepancy.", call = call)
-  for (name in c("error_draws", "check", "exact")) {
-    if (is.null(control[[name]])) next
-    check_input(checkmate::check_count(control[[name]], positive = name == "error_draws"), paste0("control$", name), call = call)
-  }
+  check_input(checkmate::check_count(control$error_draws, positive = TRUE), named("error_draws"), call = call)
+  check_size(named("error_draws"), control$error_draws, matrix_gb(n, control$error_draws, copies = 4), call = call)
+  check_input(checkmate::check_count(control$check), named("check"), call = call)
+  check_input(checkmate::check_count(control$exact, null.ok = TRUE), named("exact"), call = call)
+  for (name in c("check", "exact")) check_run_number(control[[name]] %||% 0, length(measurements$raw$hours), named(name), call)
+  check_settings_size(control, length(measurements$condition), what, call)
   control
 }
 

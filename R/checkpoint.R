@@ -5,9 +5,7 @@
 checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
   if (is.null(folder)) return(function(name, value) value)
   check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
-  if (file.exists(folder) && !dir.exists(folder)) {
-    abort_input("{.arg checkpoint} = {.file {folder}} is a file, not a folder.", call = call)
-  }
+  check_folder_possible(folder, "checkpoint", call)
   key <- list(plain(arguments), as.character(utils::packageVersion("amiss")))
   function(name, value) {
     id <- content_hash(list(key, name))
@@ -18,6 +16,15 @@ checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
     keep_value(value, file, id)
     value
   }
+}
+
+# Whether a folder is there, or can be made, and written.
+check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
+  there <- folder
+  while (!file.exists(there) && there != dirname(there)) there <- dirname(there)
+  if (dir.exists(there) && file.access(there, 2) == 0) return(invisible(TRUE))
+  abort_input("{.arg {name}} = {.file {folder}} cannot be used: {.file {there}} is {if (dir.exists(there)) 'not yours to write' else 'a file, not a folder'}.",
+              call = call)
 }
 
 # NULL if there is none, or none that is whole and of this key.

@@ -8,6 +8,7 @@ command_parser <- function() {
     option("threads", "threads to use (1); results do not depend on it", default = "1", metavar = "N"),
     option("seed", "seed of the random numbers; overrides that of the study", metavar = "N"),
     switch("trust", "run the R files that the study names, and read files outside its folder"),
+    switch("large", "run even what is estimated to need more than a day or 4 GB"),
     switch("quiet", "no progress on stderr"),
     switch("version", "the version, and nothing else"),
     optparse::make_option(c("-h", "--help"), help = "this text, and nothing else", action = "store_true", default = FALSE)),
@@ -27,6 +28,8 @@ run_command <- function(words) {
     writeLines(told)
     return(0)
   }
+  before <- options(amiss.allow_large = asked$large || isTRUE(getOption("amiss.allow_large")))
+  on.exit(options(before))
   tryCatch({
     result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads, quiet = asked$quiet, trust = asked$trust)
     if (!asked$quiet) print(result)
@@ -53,14 +56,14 @@ read_command <- function(words, parser) {
   if (is.null(asked$out)) stop("'--out DIR' is needed")
   if (!file.exists(names[2])) stop("the study file '", names[2], "' does not exist")
   asked$study <- names[2]
-  asked$threads <- whole_number(asked$threads, "threads", 1)
-  if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0)
+  asked$threads <- whole_number(asked$threads, "threads", 1, 1024)
+  if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0, .Machine$integer.max)
   asked
 }
 
-whole_number <- function(text, option, least) {
+whole_number <- function(text, option, least, most) {
   number <- suppressWarnings(as.numeric(text))
-  whole <- checkmate::test_number(number, lower = least, upper = 2^53, finite = TRUE) && number == round(number)
-  if (!whole) stop("'--", option, "' needs a whole number of at least ", least, ", not '", text, "'")
+  whole <- checkmate::test_int(number, lower = least, upper = most)
+  if (!whole) stop("'--", option, "' needs a whole number from ", least, " to ", most, ", not '", text, "'")
   number
 }

@@ -56,16 +56,15 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   method <- if (missing(method)) comparison_methods[1] else method
   check_input(checkmate::check_choice(method, comparison_methods), "method")
   check_truth(truth)
-  control <- merge_control(comparison_control, control)
-  if (method == "paper" && length(control$attribution)) {
-    abort_input(c("{.arg control$attribution} belongs to {.code method = \"history\"}.", i = "The paper's index comes with its calibration: leave it out."))
-  }
+  control <- fill_comparison_control(control, measurements, method)
+  check_runs_asked(runs, measurements)
+  for (model in models) check_enough_runs(runs, length(free_parameters(model)))
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   settings <- list(calibrate = switch(method, paper = calibrate_paper, history = calibrate), measurements = measurements, runs = runs,
                    control = control, seed = seed, threads = threads)
-  settings$keep <- checkpoint_keeper(checkpoint, c(settings[c("measurements", "runs", "control", "seed")], method = method))
   say <- progress(quiet)
+  settings$keep <- checkpoint_keeper(checkpoint, c(settings[c("measurements", "runs", "control", "seed")], method = method))
   compared <- sapply(names(models), function(name) {
     say("Calibrating {.strong {name}}")
     model <- compared_model(models[[name]], name, settings)
@@ -78,6 +77,16 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   tables$parameters <- bind_models(compared, function(model) parameter_rows(model$fit))
   structure(list(format_version = format_version, method = method, models = compared, tables = tables, measurements = measurements,
                  truth = truth, seed = seed, control = control), class = "amiss_comparison")
+}
+
+fill_comparison_control <- function(control, measurements, method, call = rlang::caller_env()) {
+  control <- merge_control(comparison_control, control, call = call)
+  if (method == "paper" && length(control$attribution)) {
+    abort_input(c("{.arg control$attribution} belongs to {.code method = \"history\"}.", i = "The paper's index comes with its calibration: leave it out."),
+                call = call)
+  }
+  check_stage_controls(control, measurements, method, call)
+  control
 }
 
 compared_model <- function(simulator, name, settings) {
@@ -315,5 +324,10 @@ check_truth <- function(truth, call = rlang::caller_env()) {
   check_input(checkmate::check_subset(c("simulator", "values"), names(truth)), "truth",
               "Give a list of a {.code simulator} and its {.code values}.", call = call)
   check_simulator(truth$simulator, call)
-  check_input(checkmate::check_numeric(truth$values, any.missing = FALSE, names = "unique"), "truth$values", call = call)
+  check_input(checkmate::check_numeric(truth$values, finite = TRUE, any.missing = FALSE, names = "unique"), "truth$values", call = call)
+  absent <- setdiff(names(free_parameters(truth$simulator)), names(truth$values))
+  if (length(absent)) {
+    abort_input(c("{.arg truth$values} has no value for {.val {absent}}.", i = "Name a value for every free parameter of {.arg truth$simulator}."),
+                call = call)
+  }
 }

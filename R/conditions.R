@@ -24,21 +24,59 @@ warn_result <- function(message, .envir = parent.frame()) {
   cli::cli_warn(message, class = c("amiss_warning_result", "amiss_warning"), .envir = .envir)
 }
 
-# checkmate's verdict (TRUE or a sentence) turned into the package's own condition.
+# The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own condition. The value that it
+# checks, its first argument, is told.
 check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) {
+  check <- substitute(verdict)
+  checks <- is.call(check) && is.call(check[[1]]) && identical(check[[1]][[2]], quote(checkmate))
+  value <- if (checks) eval(check[[2]], parent.frame())
+  if (isTRUE(verdict) && checks && as.character(check[[1]][[3]]) %in% number_checks) verdict <- plain_number(value)
   if (isTRUE(verdict)) return(invisible(TRUE))
-  abort_input(c("{.arg {name}} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)), call = call)
+  told <- if (checks) value_words(value)
+  abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)), call = call)
+}
+
+# For checkmate dates, times and empty texts are numbers, too.
+number_checks <- paste0("check_", c("number", "count", "int", "numeric"))
+
+plain_number <- function(x) {
+  if (!is.character(x) && !inherits(x, c("Date", "POSIXt", "difftime"))) return(TRUE)
+  sprintf("Must be a plain number, not of class '%s'", class(x)[1])
+}
+
+# " = value", or nothing for what is not told in a few words.
+value_words <- function(x) {
+  if (is.null(x) || is.atomic(x) && !is.object(x) && is.null(dim(x)) && length(x) <= 5) paste0(" = ", seen(x)) else ""
+}
+
+# A value in a few words, whatever it is.
+seen <- function(x) {
+  if (is.null(x) || is.atomic(x) && !is.object(x) && length(x) <= 5) {
+    return(substr(deparse1(as.vector(unname(x)), control = "keepNA"), 1, 60))
+  }
+  if (is.factor(x) && length(x) == 1) return(paste("the factor", dQuote(x, FALSE)))
+  paste0("<", class(x)[1], if (is.vector(x)) paste(" of length", length(x)), ">")
 }
 
 # Options travel as one list: defaults overwritten by what the user names; an unknown name is an error.
 merge_control <- function(defaults, control, what = "control", known = names(defaults), call = rlang::caller_env()) {
-  if (is.null(control)) control <- list()
-  check_input(checkmate::check_list(control), what, call = call)
-  unknown <- setdiff(names(control), known)
-  if (length(control) > 0 && (is.null(names(control)) || any(names(control) == "") || length(unknown) > 0)) {
+  check_input(checkmate::check_list(control, null.ok = TRUE), what, "Give a list of named options.", call = call)
+  check_option_names(control, known, what, call)
+  defaults[names(control)] <- control
+  defaults
+}
+
+check_option_names <- function(control, known, what, call) {
+  names <- rlang::names2(control)
+  if (any(names == "")) {
+    abort_input(c("Every option in {.arg {what}} needs its name; number {which(names == '')[1]} has none.",
+                  i = "Known options: {.val {known}}."), call = call)
+  }
+  unknown <- setdiff(names, known)
+  if (length(unknown)) {
     abort_input(c("{.arg {what}} has {cli::qty(unknown)} unknown option{?s}: {.val {unknown}}.",
                   i = "Known options: {.val {known}}."), call = call)
   }
-  defaults[names(control)] <- control
-  defaults
+  twice <- names[duplicated(names)]
+  if (length(twice)) abort_input("{.arg {what}} has the option {.val {twice[1]}} twice.", call = call)
 }

@@ -77,8 +77,9 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   }
   check_input(checkmate::check_number(noise_sd, lower = 0, finite = TRUE), "noise_sd")
   control <- fill_emulator_control(control)
-  check_runs_differ(ensemble)
   threads <- check_threads(threads)
+  check_runs_differ(ensemble)
+  check_training_size(ncol(ensemble$outputs), "ensemble (runs)")
   basis <- call_engine(make_basis_(ensemble$outputs, c(control, noise_sd = noise_sd)))
   basis$discarded_sd <- discarded_sd(basis, ensemble$outputs)
   trained <- call_engine(train_emulator_(region_inputs(ensemble$region, ensemble$unit), basis, control, engine_context(1, threads)))
@@ -107,18 +108,26 @@ check_runs_differ <- function(ensemble, call = rlang::caller_env()) {
   }
 }
 
-fill_emulator_control <- function(control, call = rlang::caller_env()) {
-  control <- merge_control(emulator_control, control, call = call)
-  check_input(checkmate::check_choice(control$selection, c("ard", "forward")), "control$selection", call = call)
-  check_input(checkmate::check_number(control$significance, lower = 1e-12, upper = 0.5), "control$significance", call = call)
+fill_emulator_control <- function(control, what = "control", call = rlang::caller_env()) {
+  control <- merge_control(emulator_control, control, what, call = call)
+  named <- function(option) paste0(what, "$", option)
+  check_input(checkmate::check_number(control$explained, lower = 1e-6, upper = 1), named("explained"), call = call)
+  check_input(checkmate::check_number(control$noise_fraction, lower = 1e-12, finite = TRUE), named("noise_fraction"), call = call)
+  check_input(checkmate::check_int(control$max_vectors, lower = 2, upper = 1e4), named("max_vectors"), call = call)
+  check_input(checkmate::check_int(control$starts, lower = 1, upper = 1e4), named("starts"), call = call)
+  check_input(checkmate::check_int(control$searches, lower = 1, upper = control$starts), named("searches"),
+              "There can be no more searches than {.code starts}.", call = call)
+  check_input(checkmate::check_int(control$max_evaluations, lower = 1, upper = 1e6), named("max_evaluations"), call = call)
+  check_input(checkmate::check_choice(control$selection, c("ard", "forward")), named("selection"), call = call)
+  check_input(checkmate::check_number(control$significance, lower = 1e-12, upper = 0.5), named("significance"), call = call)
   for (prior in c("s2", "eta2", "beta")) {
-    check_input(checkmate::check_numeric(control[[prior]], lower = 1, finite = TRUE, len = 2, any.missing = FALSE), paste0("control$", prior),
+    check_input(checkmate::check_numeric(control[[prior]], lower = 1, finite = TRUE, len = 2, any.missing = FALSE), named(prior),
                 "Give the two shapes of a beta distribution; below 1 its density has no greatest value.", call = call)
   }
-  lambda <- as.numeric(control$lambda)
-  check_input(checkmate::check_numeric(lambda, lower = 0, finite = TRUE, len = 2), "control$lambda",
+  check_input(checkmate::check_numeric(control$lambda, lower = 0, finite = TRUE, len = 2), named("lambda"),
               "Give shape and rate of a gamma distribution; the rate may be NA.", call = call)
-  if (is.na(lambda[1]) || lambda[1] <= 0) abort_input("The shape of {.arg control$lambda} must be positive; got {.val {lambda[1]}}.", call = call)
+  lambda <- as.numeric(control$lambda)
+  if (is.na(lambda[1]) || lambda[1] <= 0) abort_input("The shape of {.arg {named('lambda')}} must be positive; got {.val {lambda[1]}}.", call = call)
   control$lambda <- lambda
   control
 }
@@ -209,7 +218,7 @@ tidy.amiss_emulator <- function(x, ...) {
 #' @export
 predict.amiss_emulator <- function(object, newdata, ...) {
   rlang::check_dots_empty()
-  newdata <- as.matrix(newdata)
+  if (is.data.frame(newdata)) newdata <- as.matrix(newdata)
   check_input(checkmate::check_matrix(newdata, "numeric", any.missing = FALSE, min.rows = 1), "newdata")
   absent <- setdiff(names(object$parameters), colnames(newdata))
   if (length(absent)) abort_input("{.arg newdata} lacks {cli::qty(absent)}column{?s} {.val {absent}}.")

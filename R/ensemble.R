@@ -21,6 +21,7 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
   check_simulator(simulator)
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  check_run_number(runs, length(measurements$raw$hours))
   threads <- check_threads(threads)
   parameters <- free_parameters(simulator)
   if (!length(parameters)) abort_input(c("The simulator has no free parameter.", i = "Replace a number by {.fun free}."))
@@ -63,6 +64,7 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  check_run_number(runs, length(fit$measurements$raw$hours))
   threads <- check_threads(threads)
   if (is.null(ensemble$simulator)) {
     abort_input(c("The runs of this ensemble were made elsewhere, and so must more of them be.",
@@ -137,8 +139,9 @@ without_simulator <- function(emulator) {
 #' head(predict(fit, use = "validate"))
 #' @export
 ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL, time = NULL) {
-  design <- as.matrix(design)
+  if (is.data.frame(design)) design <- as.matrix(design)
   check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"), "design")
+  check_all_finite(design, "design")
   storage.mode(design) <- "double"
   outputs <- check_runs(outputs, "outputs", nrow(design))
   if (!is.null(validation)) validation <- check_runs(validation, "validation", nrow(design))
@@ -148,7 +151,7 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
     for (name in colnames(design)) check_varies(name, design[, name])
     parameters <- lapply(colnames(design), function(name) free(name, uniform(min(design[, name]), max(design[, name]))))
   }
-  check_input(checkmate::check_list(parameters), "parameters")
+  check_input(checkmate::check_list(parameters), "parameters", "Give a list of parameters, each made by {.fun free}.")
   parameters <- named_parameters(parameters)
   check_design_columns(colnames(design), names(parameters))
   values <- design[, names(parameters), drop = FALSE]
@@ -164,7 +167,7 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
 }
 
 check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
-  outputs <- as.matrix(outputs)
+  if (is.data.frame(outputs)) outputs <- as.matrix(outputs)
   check_input(checkmate::check_matrix(outputs, "numeric", min.rows = 1), name, call = call)
   storage.mode(outputs) <- "double"
   if (runs != ncol(outputs)) {
@@ -173,6 +176,13 @@ check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
                   i = "Give the outputs as one column per run."), call = call)
   }
   unname(outputs)
+}
+
+# The first value that is not finite, by row and column.
+check_all_finite <- function(x, name, call = rlang::caller_env()) {
+  bad <- which(!is.finite(x), arr.ind = TRUE)
+  if (!nrow(bad)) return(invisible())
+  abort_input("{.arg {name}} is {x[bad[1, 1], bad[1, 2]]} in row {bad[1, 1]} of column {.val {colnames(x)[bad[1, 2]]}}; finite numbers are needed.", call = call)
 }
 
 check_design_columns <- function(columns, parameters, call = rlang::caller_env()) {

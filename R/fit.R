@@ -74,6 +74,7 @@ logLik.amiss_fit <- function(object, ...) {
 update.amiss_fit <- function(object, emulator = object$emulator, measurements = object$measurements, control = NULL,
                              seed = object$seed, threads = 1, ...) {
   rlang::check_dots_empty()
+  check_input(checkmate::check_list(control, null.ok = TRUE), "control", "Give a list of named options.")
   again <- if (inherits(object, "amiss_paper_calibration")) calibrate_paper else calibrate
   again(emulator, measurements, utils::modifyList(given_control(object), as.list(control)),
         seed = seed, threads = threads)

@@ -16,9 +16,11 @@
 #' heat_loss_coefficient(box, values)
 #' @export
 heat_loss_coefficient <- function(simulator, values, drivers = numeric(), outside = 10, inside = 30) {
-  check_zone(simulator)
-  if (is.null(dim(values))) values <- t(values)
+  check_zone(simulator, "simulator")
+  if (is.numeric(values) && is.null(dim(values))) values <- t(values)
+  if (is.data.frame(values)) values <- as.matrix(values)
   check_input(checkmate::check_matrix(values, "numeric", any.missing = FALSE, min.rows = 1), "values")
+  check_all_finite(values, "values")
   check_values(colnames(values), names(zone_parameters(simulator)), rlang::current_env())
   check_input(checkmate::check_numeric(drivers, finite = TRUE, any.missing = FALSE, names = if (length(drivers)) "unique"), "drivers")
   check_input(checkmate::check_number(outside, finite = TRUE), "outside")

@@ -24,7 +24,7 @@
 mechanism <- function(name, edit, boundary, sentence) {
   check_input(checkmate::check_string(name, min.chars = 1), "name")
   if (!inherits(edit, "amiss_ensemble")) check_input(checkmate::check_function(edit, nargs = 1), "edit")
-  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
+  check_columns_named(boundary)
   check_input(checkmate::check_string(sentence, min.chars = 1), "sentence")
   structure(list(name = name, edit = edit, boundary = boundary, sentence = sentence), class = "amiss_mechanism")
 }
@@ -35,7 +35,8 @@ mechanism <- function(name, edit, boundary, sentence) {
 catalogue <- function(...) {
   mechanisms <- list(...)
   if (!all(vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))) {
-    abort_input(c("Every entry of a catalogue must be a mechanism.", i = "Make each with {.fun mechanism}."))
+    other <- which(!vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))[1]
+    abort_input(c("Every entry of a catalogue must be a mechanism; number {other} is {seen(mechanisms[[other]])}.", i = "Make each with {.fun mechanism}."))
   }
   names(mechanisms) <- vapply(mechanisms, `[[`, "", "name")
   if (anyDuplicated(names(mechanisms))) abort_input("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}} stands twice in the catalogue.")

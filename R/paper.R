@@ -83,20 +83,21 @@ paper_trust <- function(outside, inside) {
   list(trusted = is.null(why), verdict = if (is.null(why)) inside$verdict else paste(why, collapse = "; "))
 }
 
-fill_paper_control <- function(control, n, call = rlang::caller_env()) {
-  control <- merge_control(paper_control, control, call = call)
-  control$ais <- fill_ais_control(control$ais, "control$ais", call = call)
+fill_paper_control <- function(control, n, what = "control", call = rlang::caller_env()) {
+  control <- merge_control(paper_control, control, what, call = call)
+  named <- function(option) paste0(what, "$", option)
+  control$ais <- fill_ais_control(control$ais, named("ais"), call = call)
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
-  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), "control$confidence",
+  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), named("confidence"),
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
-  check_input(checkmate::check_flag(control$shared_lambda), "control$shared_lambda", call = call)
+  check_input(checkmate::check_flag(control$shared_lambda), named("shared_lambda"), call = call)
   for (prior in c("alpha", "t2")) {
-    check_input(checkmate::check_numeric(control[[prior]], lower = 1e-6, finite = TRUE, len = 2, any.missing = FALSE), paste0("control$", prior),
+    check_input(checkmate::check_numeric(control[[prior]], lower = 1e-6, finite = TRUE, len = 2, any.missing = FALSE), named(prior),
                 "Give the two shapes of a beta distribution.", call = call)
   }
-  check_input(checkmate::check_number(control$fictitious_seed, lower = 0, upper = 2^53), "control$fictitious_seed", call = call)
-  check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999), "control$probability", call = call)
-  check_input(checkmate::check_number(control$tolerance, lower = 0, upper = 1), "control$tolerance", "In nats; 0 for dense values.", call = call)
+  check_seed(control$fictitious_seed, named("fictitious_seed"), call)
+  check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999), named("probability"), call = call)
+  check_input(checkmate::check_number(control$tolerance, lower = 0, upper = 1), named("tolerance"), "In nats; 0 for dense values.", call = call)
   control
 }
 

@@ -80,9 +80,9 @@ check_level <- function(level, name, call = rlang::caller_env()) {
 picked_parameters <- function(fit, parm, call = rlang::caller_env()) {
   names <- colnames(fit$values)
   if (is.null(parm)) return(names)
-  ok <- if (is.numeric(parm)) all(parm %in% seq_along(names)) else all(parm %in% names)
-  if (!ok) {
-    unknown <- setdiff(parm, c(names, seq_along(names)))
+  known <- if (is.numeric(parm)) seq_along(names) else names
+  if (!is.atomic(parm) || !length(parm) || !all(parm %in% known)) {
+    unknown <- if (is.atomic(parm)) as.character(setdiff(parm, known)) else class(parm)
     abort_input(c("{.arg parm} names what is no parameter of this model: {.val {unknown}}.",
                   i = "Its parameters: {.val {names}}."), call = call)
   }
@@ -166,5 +166,6 @@ as_draws.amiss_fit <- as_draws_df.amiss_fit
 # Halves of a chain that stood in the order of a parameter would disagree.
 equal_draws <- function(fit, n, call = rlang::caller_env()) {
   check_input(checkmate::check_count(n, positive = TRUE), "draws", call = call)
+  check_run_number(n, ncol(fit$values), "draws", call)
   fit$values[even_draws(fit, n)[with_seed(fit$seed, sample.int(n))], , drop = FALSE]
 }

@@ -43,8 +43,10 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
                               interval = c("prediction", "confidence"), level = 0.95, seed = object$seed,
                               threads = 1, ...) {
   rlang::check_dots_empty()
-  use <- match.arg(use, several.ok = TRUE)
-  interval <- match.arg(interval)
+  check_input(checkmate::check_character(use, min.len = 1), "use")
+  check_input(checkmate::check_subset(use, c("calibrate", "validate")), "use")
+  interval <- if (missing(interval)) "prediction" else interval
+  check_input(checkmate::check_choice(interval, c("prediction", "confidence")), "interval")
   check_level(level, "level")
   check_input(checkmate::check_count(draws, positive = TRUE), "draws")
   threads <- check_threads(threads)
@@ -58,6 +60,7 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
   if (is.data.frame(newdata)) use <- "new"
   rows <- rows_used(record, use)
   if (!length(rows)) abort_input("The measurements have no row to {.val {use}}.")
+  check_run_number(draws, length(record$raw$hours), "draws")
   picked <- even_draws(object, draws)
   if (is.null(object$emulator$simulator) && is.null(newdata)) {
     return(predict_given(object, picked, rows, use, discrepancy, interval, level, seed, threads))
@@ -219,6 +222,7 @@ prediction_scores <- function(prediction) {
 simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) {
   rlang::check_dots_empty()
   check_input(checkmate::check_count(nsim, positive = TRUE), "nsim")
+  check_run_number(nsim, length(object$measurements$raw$hours), "nsim")
   require_simulator(object)
   threads <- check_threads(threads)
   seed <- pick_seed(seed)

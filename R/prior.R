@@ -25,6 +25,9 @@ new_prior <- function(family, parameters, lower, upper, call) {
     abort_input(c("A {family} prior needs lower < upper; got lower = {.val {lower}}, upper = {.val {upper}}.",
                   i = "Exchange or widen the limits."), call = call)
   }
+  if (family %in% c("uniform", "triangular", "beta") && !is.finite(upper - lower)) {
+    abort_input("A {family} prior from {.val {lower}} to {.val {upper}} is wider than numbers go.", call = call)
+  }
   prior <- structure(list(family = family, parameters = parameters, lower = lower, upper = upper), class = "amiss_prior")
   mass <- diff(untruncated_cdf(prior, c(lower, upper)))
   if (!is.finite(mass) || mass < 1e-8) {

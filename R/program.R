@@ -39,22 +39,24 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
                               time_limit = 600, retries = 0, cache = tools::R_user_dir("amiss", "cache"), version = "",
                               name = "program") {
   check_input(checkmate::check_character(command, any.missing = FALSE, min.len = 1), "command")
+  check_input(checkmate::check_string(command[1], min.chars = 1), "command[1]", "Name the program.")
   if (!is.function(output)) {
     check_input(checkmate::check_character(output, len = 2, any.missing = FALSE), "output")
     check_input(checkmate::check_names(names(output), permutation.of = c("file", "column")), "output",
                 "Give {.code c(file = \"out.csv\", column = \"Ti\")} or a function of the run's directory.")
   }
-  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
+  check_columns_named(boundary)
   check_input(checkmate::check_string(drivers, min.chars = 1), "drivers")
-  check_input(checkmate::check_number(time_limit, lower = 0, finite = TRUE), "time_limit")
-  check_input(checkmate::check_count(retries), "retries")
+  check_input(checkmate::check_number(time_limit, lower = 1e-3, finite = TRUE), "time_limit", "It is in seconds.")
+  check_input(checkmate::check_int(retries, lower = 0, upper = 1000), "retries")
   check_input(checkmate::check_string(cache, min.chars = 1), "cache")
+  check_input(checkmate::check_string(name), "name")
   templates <- read_templates(templates)
   files <- file.exists(command) & !dir.exists(command) & !command %in% names(templates)
   command[files] <- normalizePath(command[files])
   simulator <- structure(list(
     format_version = format_version, name = name, command = command, output = output, templates = templates,
-    parameters = named_parameters(list(...)), boundary = boundary, drivers = drivers, time_limit = time_limit,
+    parameters = named_parameters(list(...)), boundary = unique(boundary), drivers = drivers, time_limit = time_limit,
     retries = retries, cache = normalizePath(cache, mustWork = FALSE), version = version), class = "amiss_program_simulator")
   check_placeholders(simulator)
 }
@@ -80,6 +82,7 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
 #' @export
 with_template <- function(simulator, templates, ..., boundary = character()) {
   check_input(checkmate::check_class(simulator, "amiss_program_simulator"), "simulator", "Make one with {.fun program_simulator}.")
+  check_columns_named(boundary)
   added <- read_templates(templates, simulator$templates)
   simulator$templates[names(added)] <- added
   simulator$parameters <- named_parameters(c(unname(simulator$parameters), list(...)))
@@ -87,28 +90,18 @@ with_template <- function(simulator, templates, ..., boundary = character()) {
   check_placeholders(simulator)
 }
 
-named_parameters <- function(parameters, call = rlang::caller_env()) {
-  if (!length(parameters) || !all(vapply(parameters, inherits, TRUE, "amiss_free"))) {
-    abort_input(c("Every parameter must be made by {.fun free}, and there must be one.",
-                  i = "For example {.code free(\"gain\", uniform(0, 2))}."), call = call)
-  }
-  names(parameters) <- vapply(parameters, `[[`, "", "name")
-  twice <- names(parameters)[duplicated(names(parameters))]
-  if (length(twice)) abort_input("Parameter {.val {twice[1]}} is declared twice.", call = call)
-  parameters
-}
-
 # The lines of each template; `present` are those that a function may change.
 read_templates <- function(templates, present = list(), call = rlang::caller_env()) {
-  templates <- as.list(templates)
+  if (is.character(templates)) templates <- as.list(templates)
+  check_input(checkmate::check_list(templates, null.ok = TRUE, names = if (length(templates)) "unique"), "templates",
+              "Give a named list: file = path, or text in {.fun I}.", call = call)
   if (!length(templates)) return(list())
-  check_input(checkmate::check_names(names(templates), type = "unique"), "templates", call = call)
   sapply(names(templates), function(file) {
     x <- templates[[file]]
     if (is.function(x) && !is.null(present[[file]])) return(as.character(x(present[[file]])))
     if (inherits(x, "AsIs")) return(as.character(x))
     if (checkmate::test_string(x) && file.exists(x)) return(readLines(x, warn = FALSE))
-    abort_input(c("Template {.val {file}} cannot be read: {if (is.function(x)) 'there is none that its function could change' else paste('there is no file', x)}.",
+    abort_input(c("Template {.val {file}} cannot be read: {if (is.function(x)) 'there is none that its function could change' else paste('there is no file', if (checkmate::test_string(x)) x else seen(x))}.",
                   i = "Give the path of a file, or text in {.fun I}."), call = call)
   }, simplify = FALSE)
 }
@@ -161,6 +154,8 @@ driver_names.amiss_program_simulator <- function(simulator) simulator$boundary
 #' @export
 simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L,
                                                   time = step_h * seq_len(nrow(drivers)), ...) {
+  check_run_dots(...)
+  check_row_times(time, nrow(drivers))
   program <- Sys.which(simulator$command[1])
   if (!nzchar(program)) {
     abort_input(c("The program {.file {simulator$command[1]}} of {.val {simulator$name}} is not there.",

@@ -29,9 +29,15 @@
 calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL, threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_count(rounds), "rounds")
+  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
   check_input(checkmate::check_count(runs, positive = TRUE, null.ok = TRUE), "runs")
+  check_runs_asked(runs %||% 40, measurements)
+  check_training_size((runs %||% 40) * 1.3^rounds, "rounds", rounds)
   control <- merge_control(list(emulator = list(), calibration = list()), control)
-  refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), threads, runs = runs)$fit
+  fill_emulator_control(control$emulator, "control$emulator")
+  n <- length(used_rows(measurements, "calibrate"))
+  fill_calibration_control(control$calibration, measurements, n, "control$calibration")
+  refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), check_threads(threads), runs = runs)$fit
 }
 
 good_effective <- 1 / 3  # effective share of the runs at posterior draws from which no more is refined

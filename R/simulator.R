@@ -43,8 +43,9 @@
 function_simulator <- function(f, ..., boundary = character(), name = "simulator") {
   check_run_function(f, "info")
   parameters <- named_parameters(list(...))
-  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
-  structure(list(format_version = format_version, name = name, f = f, parameters = parameters, boundary = boundary),
+  check_columns_named(boundary)
+  check_input(checkmate::check_string(name), "name")
+  structure(list(format_version = format_version, name = name, f = f, parameters = parameters, boundary = unique(boundary)),
             class = "amiss_function_simulator")
 }
 
@@ -55,7 +56,8 @@ with_parameters <- function(model, ..., f = NULL, boundary = character(), name =
   check_input(checkmate::check_class(model, "amiss_function_simulator"), "model", "A {.fn zone} has edits of its own.")
   if (!is.null(f)) check_run_function(f, c("info", "base"))
   added <- named_parameters(list(...))
-  check_input(checkmate::check_character(boundary, any.missing = FALSE), "boundary")
+  check_columns_named(boundary)
+  check_input(checkmate::check_string(name), "name")
   for (parameter in added[names(added) %in% names(model$parameters)]) {
     if (identical(parameter$prior, model$parameters[[parameter$name]]$prior)) next
     abort_input(c("Parameter {.val {parameter$name}} is in the model already, with another prior.",
@@ -106,10 +108,17 @@ check_run_function <- function(f, offered, call = rlang::caller_env()) {
   }
 }
 
+# Names of driver columns.
+check_columns_named <- function(boundary, call = rlang::caller_env()) {
+  check_input(checkmate::check_character(boundary, min.chars = 1, any.missing = FALSE), "boundary",
+              "Give the names of columns of the drivers.", call = call)
+}
+
 # Parameters made by free(), under their names.
 named_parameters <- function(parameters, call = rlang::caller_env()) {
-  if (!length(parameters) || !all(vapply(parameters, inherits, TRUE, "amiss_free"))) {
-    abort_input(c("Every parameter must be made by {.fun free}; got {length(parameters)} argument{?s}.",
+  other <- Filter(function(x) !inherits(x, "amiss_free"), parameters)
+  if (!length(parameters) || length(other)) {
+    abort_input(c("Every parameter must be made by {.fun free}; got {if (length(other)) seen(other[[1]]) else 'none'}.",
                   i = "For example {.code free(\"gain\", uniform(0, 2))}."), call = call)
   }
   names(parameters) <- vapply(parameters, `[[`, "", "name")
@@ -160,7 +169,52 @@ driver_names <- function(simulator) UseMethod("driver_names")
 
 #' @rdname free_parameters
 #' @export
-simulate_runs <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) UseMethod("simulate_runs")
+simulate_runs <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+  check_run_request(simulator, values, drivers, step_h, hold, threads)
+  UseMethod("simulate_runs")
+}
+
+check_run_request <- function(simulator, values, drivers, step_h, hold, threads, call = rlang::caller_env()) {
+  check_simulator(simulator, call)
+  check_named_columns(values, "values", names(free_parameters(simulator)), call)
+  check_named_columns(drivers, "drivers", driver_names(simulator), call)
+  check_input(checkmate::check_number(step_h, lower = 1e-9, finite = TRUE), "step_h", call = call)
+  check_input(checkmate::check_numeric(hold, null.ok = TRUE), "hold", call = call)
+  if (!length(hold) %in% c(0, nrow(drivers))) {
+    abort_input("{.arg hold} has {length(hold)} value{?s}; one for each of the {nrow(drivers)} row{?s} of the drivers is needed.", call = call)
+  }
+  check_threads(threads, call)
+}
+
+# A matrix of numbers with these columns among its own.
+check_named_columns <- function(x, name, needed, call = rlang::caller_env()) {
+  check_input(checkmate::check_matrix(x, if (NCOL(x) > 0) "numeric", min.rows = 1), name, call = call)
+  absent <- setdiff(needed, colnames(x))
+  if (length(absent)) {
+    abort_input(c("{.arg {name}} has no column {.val {absent}}.", i = "Columns there: {.val {colnames(x)}}."), call = call)
+  }
+  twice <- colnames(x)[duplicated(colnames(x))]
+  if (length(twice)) abort_input("{.arg {name}} has the column {.val {twice[1]}} twice.", call = call)
+}
+
+# Beside what the method knows, only what every simulator is given.
+check_run_dots <- function(..., call = rlang::caller_env()) {
+  unknown <- setdiff(rlang::names2(list(...)), c("time", "segment"))
+  if (length(unknown)) abort_input("{.fun simulate_runs} has no argument {.arg {unknown}}.", call = call)
+}
+
+# One time for each row.
+check_row_times <- function(time, rows, call = rlang::caller_env()) {
+  if (length(time) != rows) {
+    abort_input("{.arg time} has {length(time)} value{?s}; one for each of the {rows} row{?s} of the drivers is needed.", call = call)
+  }
+}
+
+#' @export
+free_parameters.default <- function(simulator) check_simulator(simulator)
+
+#' @export
+driver_names.default <- function(simulator) check_simulator(simulator)
 
 #' @export
 free_parameters.amiss_function_simulator <- function(simulator) simulator$parameters
@@ -171,6 +225,8 @@ driver_names.amiss_function_simulator <- function(simulator) simulator$boundary
 #' @export
 simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L,
                                                    time = step_h * seq_len(nrow(drivers)), segment = 1L, ...) {
+  check_run_dots(...)
+  check_row_times(time, nrow(drivers))
   info <- list(step_h = step_h, time = time, segment = segment, hold = hold %||% rep(NA_real_, nrow(drivers)))
   runs <- matrix(NaN, nrow(drivers), nrow(values))
   stopped <- list()
@@ -215,6 +271,7 @@ driver_names.amiss_zone <- function(simulator) zone_boundary(simulator)
 
 #' @export
 simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+  check_run_dots(...)
   simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
 }
 

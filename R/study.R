@@ -42,6 +42,9 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' @export
 run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE, trust = FALSE) {
   started <- proc.time()[["elapsed"]]
+  if (!is.null(out)) check_input(checkmate::check_string(out, min.chars = 1), "out")
+  if (!is.null(seed)) pick_seed(seed)
+  check_threads(threads)
   study <- read_study(path, quiet, trust)
   seed <- pick_seed(seed %||% study$seed)
   check_study_control(study)
@@ -73,6 +76,7 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
 #' @export
 read_study <- function(path, quiet = TRUE, trust = FALSE) {
   check_input(checkmate::check_file_exists(path, access = "r"), "path")
+  check_input(checkmate::check_flag(quiet), "quiet")
   check_input(checkmate::check_flag(trust), "trust")
   study <- read_study_file(path)
   check_study_fields(study, path)
@@ -95,11 +99,8 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
 
 # The options that can be checked before anything is computed.
 check_study_control <- function(study, call = rlang::caller_env()) {
-  control <- merge_control(if (is.null(study$models)) upgrade_control else comparison_control, study$control, call = call)
-  fill_emulator_control(control$emulator, call)
-  calibration <- if (identical(study$method, "paper")) paper_control else calibration_control
-  merge_control(calibration, control$calibration, "control$calibration", call = call)
-  merge_control(attribution_control, control$attribution, "control$attribution", call = call)
+  if (is.null(study$models)) fill_upgrade_control(study$control, study$measurements, call)
+  else fill_comparison_control(study$control, study$measurements, study$method, call)
 }
 
 check_study_fields <- function(study, path, call = rlang::caller_env()) {

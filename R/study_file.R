@@ -9,6 +9,7 @@ read_study_file <- function(path, call = rlang::caller_env()) {
   refuse <- function(why) {
     abort_input(c("The study file {.file {path}} cannot be read as YAML.", x = "{why}"), call = call)
   }
+  check_study_text(text, refuse)
   lines <- strsplit(text, "\r?\n")[[1]]
   if (any(startsWith(lines, "%TAG"))) refuse("Tags cannot be declared in a study.")
   written <- grep("^(%|\\s*(#|$))", lines, value = TRUE, invert = TRUE)
@@ -16,14 +17,29 @@ read_study_file <- function(path, call = rlang::caller_env()) {
   if (any(marks > 1 & !(marks == length(written) & startsWith(written[marks], "...")))) refuse("It holds several documents; give each its own file.")
   tags <- new.env()
   study <- tryCatch(yaml::yaml.load(text, eval.expr = FALSE, handlers = c(plain_words, noted_tags(text, tags))),
-                    error = function(e) refuse(conditionMessage(e)))
+                    error = function(e) refuse(conditionMessage(e)), warning = function(w) refuse(conditionMessage(w)))
   if (length(tags)) refuse(paste("It has the tag", ls(tags)[1], "which is not known."))
   check_study_size(study, refuse)
   study
 }
 
+# The parser takes minutes for what is nested very deep. Brackets in texts count too: a hundred are in no study.
+check_study_text <- function(text, refuse) {
+  if (nchar(text, "bytes") > 1e6) refuse("It is larger than 1 MB.")
+  signs <- utf8ToInt(text)
+  open <- cumsum(signs %in% utf8ToInt("[{") - signs %in% utf8ToInt("]}"))
+  if (any(open > 100) || grepl("(?:[-?:] ){100}", text, perl = TRUE)) {
+    refuse(paste("It is nested deeper than", deepest_study, "levels."))
+  }
+}
+
 # YAML 1.1 takes yes, no, on, off, y and n for logical; here they stay text, so that a column may be called y.
 plain_words <- list(
+  int = function(word) {
+    # Larger ones than R's integers stay numbers.
+    number <- suppressWarnings(as.integer(word))
+    if (is.na(number)) as.numeric(word) else number
+  },
   "bool#yes" = function(word) if (tolower(word) == "true") TRUE else word,
   "bool#no" = function(word) if (tolower(word) == "false") FALSE else word)
 

@@ -69,22 +69,15 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
   check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
   check_given(c(if (given) list(base = simulator), lapply(catalogue, `[[`, "edit")), measurements)
-  control <- merge_control(upgrade_control, control)
-  check_input(checkmate::check_count(control$max_steps), "control$max_steps")
-  check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive")
-  check_input(checkmate::check_number(control$refine, lower = 0, upper = 0.8), "control$refine")
-  check_input(checkmate::check_count(control$rounds), "control$rounds")
-  check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin")
-  if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening")
-  check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  control <- fill_upgrade_control(control, measurements)
+  check_runs_asked(runs, measurements, control$rounds, control$refine)
   if (!given) check_enough_runs(runs - round(control$refine * runs), length(free_parameters(simulator)), of = runs)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  warn_absent_drivers(catalogue, measurements)
   say <- progress(quiet)
-
   settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
+  warn_absent_drivers(catalogue, measurements)
   say("Calibrating the base model")
   current <- measured_model(fit_fully(simulator, "base", settings), "base", NULL, NULL, settings)
   report_model(current, say)
@@ -125,6 +118,35 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
                  named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models), stopped_because = stopped,
                  measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
+}
+
+fill_upgrade_control <- function(control, measurements, call = rlang::caller_env()) {
+  control <- merge_control(upgrade_control, control, call = call)
+  check_input(checkmate::check_count(control$max_steps), "control$max_steps", call = call)
+  check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive", call = call)
+  check_input(checkmate::check_number(control$refine, lower = 0, upper = 0.8), "control$refine", call = call)
+  check_input(checkmate::check_count(control$rounds), "control$rounds", call = call)
+  check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin", call = call)
+  if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening", call)
+  check_stage_controls(control, measurements, call = call)
+  control
+}
+
+# The options of the stages, as these will take them.
+check_stage_controls <- function(control, measurements, method = "history", call = rlang::caller_env()) {
+  fill_emulator_control(control$emulator, "control$emulator", call)
+  n <- length(used_rows(measurements, "calibrate"))
+  if (method == "paper") return(fill_paper_control(control$calibration, n, "control$calibration", call))
+  calibration <- fill_calibration_control(control$calibration, measurements, n, "control$calibration", call)
+  fill_attribution_control(control$attribution, calibration$ais, length(measurements$conditions), "control$attribution", call)
+}
+
+# Runs at the rows of the measurements, and an emulator of them; each round of refinement makes 1.3 times as many.
+check_runs_asked <- function(runs, measurements, rounds = 0, refine = 0, call = rlang::caller_env()) {
+  check_input(checkmate::check_count(runs, positive = TRUE), "runs", call = call)
+  check_run_number(runs, length(measurements$raw$hours), call = call)
+  check_training_size(runs, call = call)
+  check_training_size(max(40, refine * runs) * 1.3^rounds, "control$rounds", rounds, call)
 }
 
 # A model simulated, trained and calibrated by `settings$calibrate`. Every model of a study is drawn on the same design
@@ -189,7 +211,8 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
   })
 }
 
-progress <- function(quiet) {
+progress <- function(quiet, call = rlang::caller_env()) {
+  check_input(checkmate::check_flag(quiet), "quiet", call = call)
   if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
 }
 

@@ -26,8 +26,15 @@ synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude =
                               cloudiness = 0.3, wind = 3.5, wind_direction = 240, azimuth = 180, seed = NULL) {
   check_input(checkmate::check_number(days, lower = 1, finite = TRUE), "days")
   check_input(checkmate::check_number(step_h, lower = 1 / 60, upper = 6), "step_h")
+  check_size("days", days, matrix_gb(24 * days / step_h, 30))
+  check_input(checkmate::check_number(day_of_year, lower = 0, upper = 366), "day_of_year")
+  check_input(checkmate::check_number(latitude, lower = -90, upper = 90), "latitude", "It is in degrees, north of the equator.")
+  check_input(checkmate::check_number(temperature, lower = -90, upper = 60), "temperature", "It is in degrees Celsius.")
+  check_input(checkmate::check_number(daily_range, lower = 0, upper = 60), "daily_range")
+  check_input(checkmate::check_number(wind_direction, lower = -360, upper = 360), "wind_direction", "It is in degrees.")
+  check_input(checkmate::check_number(azimuth, lower = -360, upper = 360), "azimuth", "It is in degrees.")
   check_input(checkmate::check_number(cloudiness, lower = 0, upper = 1), "cloudiness")
-  check_input(checkmate::check_number(wind, lower = 0, finite = TRUE), "wind")
+  check_input(checkmate::check_number(wind, lower = 0, upper = 200), "wind")
   with_seed(pick_seed(seed), {
     n <- round(24 * days / step_h)
     hour <- seq_len(n) * step_h
@@ -78,7 +85,11 @@ red_noise <- function(n, time_h, step_h) {
 #' @export
 rolbs <- function(n, step_h = 0.25, power = 100, lengths = c(1, 2, 4, 8, 16), seed = NULL) {
   check_input(checkmate::check_count(n, positive = TRUE), "n")
-  check_input(checkmate::check_numeric(lengths, lower = step_h, min.len = 1, any.missing = FALSE), "lengths")
+  check_size("n", n, matrix_gb(n, 4))
+  check_input(checkmate::check_number(step_h, lower = 1e-6, finite = TRUE), "step_h")
+  check_input(checkmate::check_number(power, finite = TRUE), "power")
+  check_input(checkmate::check_numeric(lengths, lower = step_h, upper = 1e6 * step_h, min.len = 1, any.missing = FALSE), "lengths",
+              "They are hours, at least one step and at most a million.")
   with_seed(pick_seed(seed), {
     on <- logical(0)
     while (length(on) < n) {

@@ -97,22 +97,22 @@ check_field <- function(value, rule, where, field, call) {
   switch(rule$kind,
     number = check_number_field(value, rule, where, field, call),
     column = if (!(rule$optional && is.null(value)) && !checkmate::test_string(value, min.chars = 1)) {
-      abort_input(c("{where}: {.field {field}} must be the name of a column of the data; got {.val {value}}.",
+      abort_input(c("{where}: {.field {field}} must be the name of a column of the data; got {seen(value)}.",
                     i = if (rule$optional) "Use {.code NULL} for none."), call = call)
     },
     choice = if (!checkmate::test_choice(value, rule$choices)) {
-      abort_input("{where}: {.field {field}} must be one of {.val {rule$choices}}; got {.val {value}}.", call = call)
+      abort_input("{where}: {.field {field}} must be one of {.val {rule$choices}}; got {seen(value)}.", call = call)
     },
     layers = check_layers(value, where, call))
 }
 
 check_number_field <- function(value, rule, where, field, call) {
   if (is_free(value) || isTRUE(rule$missing) && checkmate::test_scalar_na(value)) return(invisible())
-  inside <- checkmate::test_number(value, finite = TRUE) && value <= rule$upper &&
+  inside <- checkmate::test_number(value, finite = TRUE) && isTRUE(plain_number(value)) && value <= rule$upper &&
     (if (rule$open) value > rule$lower else value >= rule$lower)
   if (inside) return(invisible())
   limits <- paste0(if (rule$open) "(" else "[", rule$lower, ", ", rule$upper, "]")
-  abort_input("{where}: {.field {field}} must be one number in {limits} or {.fn free}; got {.val {value}}.",
+  abort_input("{where}: {.field {field}} must be one number in {limits} or {.fn free}; got {seen(value)}.",
               call = call)
 }
 
@@ -271,8 +271,8 @@ new_zone <- function(components, own, call = rlang::caller_env()) {
 #' @name zone_edits
 NULL
 
-check_zone <- function(zone, call = rlang::caller_env()) {
-  check_input(checkmate::check_class(zone, "amiss_zone"), "zone", "Make one with {.fn zone}.", call = call)
+check_zone <- function(zone, name = "zone", call = rlang::caller_env()) {
+  check_input(checkmate::check_class(zone, "amiss_zone"), name, "Make one with {.fn zone}.", call = call)
 }
 
 #' @rdname zone_edits
@@ -285,7 +285,7 @@ component <- function(zone, name) {
 find_component <- function(zone, name, call) {
   known <- names(zone$components)
   if (!checkmate::test_choice(name, known)) {
-    abort_input(c("The zone has no component {.val {name}}.", i = "Known components: {.val {known}}."), call = call)
+    abort_input(c("The zone has no component {.arg name} = {seen(name)}.", i = "Known components: {.val {known}}."), call = call)
   }
   zone$components[[name]]
 }
@@ -436,8 +436,8 @@ column_fields <- function(x) {
 #' @export
 zone_resolve <- function(zone, values = numeric()) {
   parameters <- names(zone_parameters(zone))
-  check_values(names(values), parameters, rlang::current_env())
   check_input(checkmate::check_numeric(values, any.missing = FALSE, finite = TRUE), "values")
+  check_values(names(values), parameters, rlang::current_env())
   resolve_zone(zone, free_fields(unclass(zone)), values, rlang::current_env())
 }
 
@@ -487,11 +487,12 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
   call <- rlang::current_env()
   parameters <- names(zone_parameters(zone))
   if (is.null(values)) values <- matrix(0, 1, 0)
-  check_input(checkmate::check_matrix(values, mode = "numeric", any.missing = FALSE), "values")
+  check_input(checkmate::check_matrix(values, mode = "numeric", any.missing = FALSE, min.rows = 1), "values")
   check_values(colnames(values), parameters, call)
+  check_named_columns(values, "values", parameters, call)
   check_drivers(zone, drivers, call)
   check_input(checkmate::check_number(step_s, lower = 1e-3, finite = TRUE), "step_s")
-  check_input(checkmate::check_count(threads, positive = TRUE), "threads")
+  threads <- check_threads(threads)
   if (is.null(hold)) hold <- numeric()
   check_input(checkmate::check_numeric(hold), "hold")
   if (!length(hold) %in% c(0, nrow(drivers)) || any(is.infinite(hold))) {
@@ -499,13 +500,14 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
                   i = "The drivers have {nrow(drivers)} rows."))
   }
   control <- check_zone_control(control, call)
+  check_zone_size(zone, nrow(values), nrow(drivers), step_s, control, call)
   # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between them.
   fields <- free_fields(unclass(zone))
   extremes <- vapply(parameters, function(p) range(values[, p]), numeric(2))
   for (i in seq_len(if (nrow(values) > 1) 2 else 1)) resolve_zone(zone, fields, extremes[i, ], call)
   storage.mode(drivers) <- "double"
   call_engine(zone_simulate_(index_zone(unclass(zone), colnames(drivers)), lapply(fields, `[[`, "path"), field_values(fields, values),
-                             drivers, step_s, as.numeric(hold), control, engine_context(0, as.integer(threads))), call)
+                             drivers, step_s, as.numeric(hold), control, engine_context(0, threads)), call)
 }
 
 check_drivers <- function(zone, drivers, call) {
@@ -527,9 +529,9 @@ check_drivers <- function(zone, drivers, call) {
 check_zone_control <- function(control, call) {
   control <- merge_control(zone_control, control, call = call)
   for (option in c("max_substep_s", "cells", "initial_hours")) {
-    check_input(checkmate::check_number(control[[option]], lower = 1e-3, finite = TRUE), option, call = call)
+    check_input(checkmate::check_number(control[[option]], lower = 1e-3, upper = 1e9), paste0("control$", option), call = call)
   }
-  check_input(checkmate::check_count(control$spinup), "spinup", call = call)
+  check_input(checkmate::check_count(control$spinup), "control$spinup", call = call)
   control
 }
 

@@ -121,7 +121,7 @@ test_that("options are checked", {
   m <- linear_measurements()
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
   expect_error(calibrate(emulator, m, list(chains = 3)), "unknown option", class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1), "control\\$ais\\$chains.*Seen: 1", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1), "control\\$ais\\$chains` = 1 cannot", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(confidence = 3)), "confidence", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, threads = 0), "threads", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(reach = c(0, Inf))), "reach", class = "amiss_error_input")

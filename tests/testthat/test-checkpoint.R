@@ -53,7 +53,11 @@ test_that("what cannot be written is told and does not stop the run", {
   blocked <- file.path(folder, "afile")
   writeLines("", blocked)
   expect_error(checkpoint_keeper(blocked, list()), "is a file", class = "amiss_error_input")
-  expect_message(expect_equal(checkpoint_keeper(file.path(blocked, "sub"), list())("a", 5), 5), "could not be kept")
+  expect_error(checkpoint_keeper(file.path(blocked, "sub"), list()), "is a file, not a folder", class = "amiss_error_input")
+  later <- file.path(folder, "later")
+  keep <- checkpoint_keeper(later, list())
+  writeLines("", later)  # in its place since the run began
+  expect_message(expect_equal(keep("a", 5), 5), "could not be kept")
 })
 
 test_that("a process killed while it writes leaves nothing that is taken for whole", {

@@ -101,6 +101,6 @@ test_that("bad arguments are refused", {
   expect_error(calibrate_refined(runs, m, rounds = -1), "rounds", class = "amiss_error_input")
   expect_error(calibrate_refined(runs, m, control = list(check = 3)), "unknown option.*check",
                class = "amiss_error_input")
-  expect_error(calibrate_refined(runs, m, control = list(calibration = list(check = 1.5))), "control\\$check",
+  expect_error(calibrate_refined(runs, m, control = list(calibration = list(check = 1.5))), "control\\$calibration\\$check` = 1.5",
                class = "amiss_error_input")
 })

@@ -130,7 +130,7 @@ test_that("the command's words are checked", {
     strsplit(told, "\n")[[1]][1]
   }
   for (seed in c("Inf", "1.5", "NaN", "1e20", "x")) expect_match(said("--seed", seed), "'--seed' needs a whole number", fixed = TRUE)
-  expect_match(said("--threads", "0"), "at least 1, not '0'")
+  expect_match(said("--threads", "0"), "from 1 to 1024, not '0'")
   expect_match(said("--colour"), "colour")
   expect_match(said("another.yml"), "one study file")
   expect_output(expect_equal(run_command(c("run", "--help")), 0), "--trust")
