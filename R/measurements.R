@@ -72,6 +72,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   check_input(checkmate::check_number(warmup, lower = 0, finite = TRUE), "warmup")
   check_input(checkmate::check_number(fill_gaps, lower = 0, finite = TRUE), "fill_gaps")
   terms <- boundary_terms(boundary)
+  check_record(data, time, target, terms, name, unit)
   require_columns(data, c(time, target, terms$name))
   if (any(terms$name %in% c(time, target))) {
     abort_input(c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
@@ -124,6 +125,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                   i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
   }
   noise <- noise_level(noise_sd, coarse, raw$y)
+  check_target_values(y, target, calibrate)
   structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise$sd,
                  noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
@@ -142,7 +144,9 @@ boundary_terms <- function(boundary, call = rlang::caller_env()) {
   check_input(checkmate::check_character(labels, min.len = 1, any.missing = FALSE, unique = TRUE), "boundary",
               "Give a formula such as {.code ~ Te + circular(Wd)}.", call = call)
   is_circular <- grepl("^circular\\(.*\\)$", labels)
-  list(name = trimws(sub("^circular\\((.*)\\)$", "\\1", labels)), circular = is_circular)
+  names <- trimws(sub("^circular\\((.*)\\)$", "\\1", labels))
+  if (inherits(boundary, "formula")) names <- gsub("^`|`$", "", names)
+  list(name = names, circular = is_circular)
 }
 
 require_columns <- function(data, columns, call = rlang::caller_env()) {
@@ -209,7 +213,7 @@ rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {
 average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
   per_step <- 1L
   if (!is.null(average)) {
-    check_input(checkmate::check_number(average, lower = 0, finite = TRUE), "average", call = call)
+    check_input(checkmate::check_number(average, lower = 1e-6, upper = 1e6), "average", call = call)
     per_step <- as.integer(round(average / raw$step_h))
     if (per_step < 1 || abs(per_step * raw$step_h - average) > 1e-6 * average) {
       abort_input("{.arg average} = {average} h is not a whole multiple of the data's step of {signif(raw$step_h, 4)} h.", call = call)
@@ -306,7 +310,7 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 #'   data in this method: Monari (2022). Residuals: Davison and Hinkley (1997), Bootstrap methods and their application.
 #' @export
 bootstrap_noise <- function(replicates = 1000, detrend = FALSE, seed = 1) {
-  check_input(checkmate::check_count(replicates), "replicates")
+  check_input(checkmate::check_int(replicates, lower = 0, upper = 1e6), "replicates")
   if (replicates < 50) abort_input("{.arg replicates} = {replicates} is too few for a standard deviation; give at least 50.")
   check_input(checkmate::check_flag(detrend), "detrend")
   structure(list(replicates = as.integer(replicates), detrend = detrend, seed = pick_seed(seed)), class = "amiss_bootstrap_noise")

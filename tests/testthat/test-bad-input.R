@@ -26,7 +26,8 @@ rows_by_kind <- function() c(
   rows_of("function_simulator", f = "positive", boundary = "columns", name = "string"),
   rows_of("heat_loss_coefficient", simulator = "object", values = "matrix", outside = "number", inside = "number"),
   rows_of("lognormal", meanlog = "number", sdlog = "positive", lower = "limit", upper = "limit"),
-  rows_of("measurements", data = "object", time = "string", target = "string", warmup = "not_negative"),
+  rows_of("measurements", data = "object", time = "string", target = "string", warmup = "not_negative",
+          name = "string", unit = "string"),
   rows_of("mechanism", name = "filled_string", edit = "positive", boundary = "columns", sentence = "filled_string"),
   rows_of("normal", mean = "number", sd = "positive", lower = "limit", upper = "limit"),
   rows_of("paper_box", model = "choice", azimuth = "number"),
@@ -154,6 +155,10 @@ rows_of_their_own <- function() {
     bad("measurements", "noise_sd", NULL), bad("measurements", "average", 0.3, "average.*0.3"), bad("measurements", "average", "day"),
     bad("measurements", "calibrate", "hour <", "calibrate.*hour <"), bad("measurements", "calibrate", TRUE),
     bad("measurements", "validate", 1:60), bad("measurements", "validate", rep(TRUE, 60), "both calibrate"),
+    bad("measurements", "data", cbind(o$record, Te = 1), "column \"Te\" more than once"), bad("measurements", "target", "hour", "both the column"),
+    bad("measurements", "boundary", ~ Te + circular(Te), "Te\" stands twice in boundary"), bad("measurements", "average", 1e300),
+    bad("measurements", "data", transform(o$record, Ti = 20), "Target \"Ti\" is 20 in all 45 rows"), bad("bootstrap_noise", "replicates", 1e9),
+    bad("measurements", "data", transform(o$record, Ti = ifelse(hour > 30, -9999, Ti)), "-9999 in 30 rows, the first 31"),
     bad("mechanism", "edit", function() 1),
     bad("predict", "newdata", "new"), bad("predict", "newdata", data.frame(Te = 1), "time"), bad("predict", "use", "tomorrow", "use = \"tomorrow\""),
     bad("program_simulator", "output", "out.csv"), bad("program_simulator", "output", c(a = "b", c = "d")),
@@ -277,7 +282,7 @@ test_that("a study nested without end is refused at once", {
 })
 
 # Arguments that take anything, or nothing.
-takes_all <- list(circular = "x", measurements = c("name", "unit"), program_simulator = "version", glance = "x", tidy = "x", augment = "x", autoplot = "object", report = "quiet")
+takes_all <- list(circular = "x", program_simulator = "version", glance = "x", tidy = "x", augment = "x", autoplot = "object", report = "quiet")
 
 test_that("every argument of every exported function is in the table", {
   rows <- c(rows_by_kind(), rows_of_controls(), rows_of_their_own())
@@ -297,6 +302,12 @@ test_that("a size is refused with its estimate, and allowed where that is asked 
   expect_error(check_size("draws", 1e9, gb = 5), "`draws` = 1e+09 would take about 5 GB of memory", class = "amiss_error_input", fixed = TRUE)
   withr::local_options(amiss.allow_large = TRUE)
   expect_true(check_size("draws", 1e9, gb = 5))
+})
+
+test_that("a boundary condition may have any name in backticks", {
+  data <- linear_data(60)
+  names(data)[2] <- "T e"
+  expect_identical(linear_measurements(data, boundary = ~ `T e` + Gv)$conditions, c("T e", "Gv"))
 })
 
 test_that("a likelihood that is seldom undefined is told of", {
