@@ -8,6 +8,7 @@
 #' @useDynLib amiss, .registration = TRUE
 #' @importFrom Rcpp evalCpp
 #' @importFrom rlang %||% .data
+#' @importFrom stats coef confint fitted logLik nobs predict residuals simulate update vcov
 #' @importFrom generics tidy glance augment
 #' @importFrom ggplot2 autoplot
 #' @aliases amiss-package

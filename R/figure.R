@@ -143,4 +143,3 @@ condition_values <- function(measurements, name) {
 score_of <- function(upgrade, use, score) vapply(upgrade_stages(upgrade), function(s) s$scores[[use]][[score]], 0)
 
 has_validation <- function(upgrade) !anyNA(score_of(upgrade, "validate", "rmse"))
-

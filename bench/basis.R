@@ -13,6 +13,7 @@ with_mechanisms <- function(study, names) Reduce(function(model, name) study$cat
 cases <- list(list(house = "N2"), list(house = "N2", added = "neighbour coupling"), list(house = "O5"),
               list(house = "O5", added = "south solar aperture"),
               list(house = "O5", added = c("south solar aperture", "neighbour coupling")))
+if (smoke) cases <- cases[1]
 
 evidence <- function(case, label, runs, vectors = NULL, rounds = 2) {
   study <- read_study(system.file("studies", sprintf("twinhouse_%s.yml", case$house), package = "amiss"))

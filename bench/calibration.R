@@ -10,7 +10,7 @@
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
 out <- option("out", "calibration.json")
-draws <- as.integer(option("draws", "200"))
+draws <- as.integer(option("draws", "200", smallest = "20"))
 first <- 1e5 * as.integer(option("seed", "1"))
 workers <- as.integer(option("workers", "2"))
 figure <- option("figure", sub("(\\.json)?$", ".png", out))

@@ -10,7 +10,7 @@ here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE
 source(file.path(here, "options.R"))
 suppressPackageStartupMessages(library(amiss))
 out <- option("out", "emulator_coverage.json")
-designs <- as.integer(option("designs", "10"))
+designs <- as.integer(option("designs", "10", smallest = "1"))
 first <- as.integer(option("seed", "9001"))
 
 between <- function(u, lower, upper) as.data.frame(sweep(sweep(u, 2, upper - lower, "*"), 2, lower, "+"))
@@ -91,6 +91,7 @@ cases <- rbind(expand.grid(name = c("borehole", "friedman", "otl", "wing", "pist
                expand.grid(name = c("smooth3", "kink", "step"), runs = c(40, 200), noise = 0, stringsAsFactors = FALSE),
                expand.grid(name = c("borehole", "friedman", "otl", "wing", "piston"), runs = 200, noise = 0.05, stringsAsFactors = FALSE),
                expand.grid(name = c("smooth3", "kink", "step"), runs = 40, noise = 0.05, stringsAsFactors = FALSE))
+if (smoke) cases <- cases[cases$runs == 40, ]
 cat(sprintf("%-22s %5s %19s %19s %15s %19s %8s\n", "function", "M", "90 % hold", "95 % hold", "square", "interval score", "RMSE"))
 rows <- Map(function(name, runs, noise) {
   all <- vapply(first + seq_len(designs) - 1L, function(seed) one_design(functions[[name]], runs, noise, seed), numeric(12))

@@ -6,7 +6,7 @@ here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE
 for (part in c("options.R", "evidence/cases.R")) source(file.path(here, part))
 suppressPackageStartupMessages(library(amiss))
 
-repeats <- as.integer(option("repeats", "23"))
+repeats <- as.integer(option("repeats", "23", smallest = "2"))
 first <- as.integer(option("seed", "1"))
 out <- option("out", "evidence.json")
 

@@ -10,7 +10,7 @@
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
 asked <- strsplit(option("family", "box"), ",", fixed = TRUE)[[1]]
-worlds <- as.integer(option("worlds", "24"))
+worlds <- as.integer(option("worlds", "24", smallest = "1"))
 first <- as.integer(option("seed", "1"))
 out <- option("out", "hidden_effects.json")
 workers <- option("workers")

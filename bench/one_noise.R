@@ -49,7 +49,7 @@ cases <- list(list(name = "hardly believed (c = 2/N)", confidence = 2 / sbc_step
               list(name = "firmly believed (c = 1)", confidence = 1, noise = NULL),
               list(name = "hardly believed, three times as large", confidence = 2 / sbc_steps, noise = 0.9))
 rows <- do.call(rbind, lapply(cases, function(case) {
-  values <- t(vapply(seq_len(as.integer(option("records", "8"))), one_noise, numeric(3), case$confidence, case$noise))
+  values <- t(vapply(seq_len(as.integer(option("records", "8", smallest = "1"))), one_noise, numeric(3), case$confidence, case$noise))
   difference <- values[, 1:2] - values[, 3]
   data.frame(noise = case$name, log_evidence = colnames(difference), mean = colMeans(difference), lowest = apply(difference, 2, min),
              highest = apply(difference, 2, max), records = nrow(values), row.names = NULL)

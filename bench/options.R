@@ -1,9 +1,12 @@
-# Command line of a benchmark: --name value. Sourced by the commands of this folder.
+# Command line of a benchmark: --name value, and --smoke for the smallest work that goes through all of it (tools/smoke).
+# Sourced by the commands of this folder.
 arguments <- commandArgs(trailingOnly = TRUE)
+smoke <- "--smoke" %in% arguments
+arguments <- arguments[arguments != "--smoke"]
 
-option <- function(name, default = NULL) {
+option <- function(name, default = NULL, smallest = default) {
   at <- match(paste0("--", name), arguments)
-  if (is.na(at)) return(default)
+  if (is.na(at)) return(if (smoke) smallest else default)
   if (at == length(arguments)) stop("--", name, " needs a value", call. = FALSE)
   arguments[at + 1]
 }

@@ -7,9 +7,9 @@
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
-noise_seeds <- seq_len(as.integer(option("seeds", "20")))
+noise_seeds <- seq_len(as.integer(option("seeds", "20", smallest = "1")))
 rivals <- utils::head(noise_seeds, as.integer(option("rivals", length(noise_seeds))))
-sampler_seeds <- seq_len(as.integer(option("samplers", "10")))
+sampler_seeds <- seq_len(as.integer(option("samplers", "10", smallest = "1")))
 out <- option("out", "paper.json")
 keep <- paste0(out, ".fits")
 dir.create(keep, showWarnings = FALSE, recursive = TRUE)

@@ -9,7 +9,7 @@
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
 family <- option("family", "network")
-seeds <- as.integer(option("seed", "71001")) + seq_len(as.integer(option("worlds", "24"))) - 1L
+seeds <- as.integer(option("seed", "71001")) + seq_len(as.integer(option("worlds", "24", smallest = "1"))) - 1L
 workers <- option("workers")
 parts <- file.path(normalizePath(here), "hidden_effects",
                    paste0(c("worlds", "least_squares", "network", "runoff", "wrong", "families"), ".R"))

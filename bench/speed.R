@@ -11,7 +11,7 @@ source(file.path(here, "options.R"))
 root <- normalizePath(file.path(here, ".."))
 out <- option("out", "speed.json")
 known <- c("history", "kernel", "ais", "emulator", "study", "peers", "growth", "instructions")
-parts <- strsplit(option("only", paste(known, collapse = ",")), ",")[[1]]
+parts <- strsplit(option("only", paste(known, collapse = ","), smallest = "history"), ",")[[1]]
 unknown <- setdiff(parts, known)
 if (length(unknown)) stop("--only knows ", paste(known, collapse = ", "), "; got ", paste(unknown, collapse = ", "), call. = FALSE)
 suppressPackageStartupMessages(library(amiss))

@@ -2,7 +2,8 @@
 `%||%` <- function(x, y) if (is.null(x) || length(x) == 0) y else x
 
 odds <- function(log10_bf) {
-  size <- if (is.finite(log10_bf) && abs(log10_bf) < 6) format(round(10^abs(log10_bf), 1), big.mark = ",") else "over a million"
+  size <- if (is.finite(log10_bf) && abs(log10_bf) < 6) format(round(10^abs(log10_bf), 1),
+                                                               big.mark = ",") else "over a million"
   sprintf("odds of %s to 1 %s it (log10 Bayes factor %.1f)", size, if (log10_bf >= 0) "for" else "against", log10_bf)
 }
 
@@ -32,7 +33,8 @@ describe_gain <- function(gain) {
     from_to("Error (RMSE) on data held out", numbers(gain$rmse_validation)),
     if (length(coverage) %in% 1:2 && !anyNA(coverage)) {
       sprintf("Share of data held out within the 95 %% band: %s",
-              paste0(sprintf("%.0f %%", 100 * coverage), if (length(coverage) == 2) c(" before", " after"), collapse = ", "))
+              paste0(sprintf("%.0f %%", 100 * coverage), if (length(coverage) == 2) c(" before", " after"),
+                     collapse = ", "))
     })
 }
 

@@ -4,6 +4,7 @@
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 library="$root/build/library"  # the package, and packages that the system lacks
 export LC_ALL=C.UTF-8
+export NOT_CRAN="${NOT_CRAN:-true}"  # testthat's word for "all tests": figures by snapshot and the second tier too
 export R_LIBS="$library${R_LIBS:+:$R_LIBS}"
 
 say() { printf '\n== %s\n' "$*"; }

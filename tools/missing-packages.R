@@ -12,11 +12,11 @@ if (runtime) {  # the package itself and its report
   keep <- name %in% c(imported, "knitr", "rmarkdown")
   name <- name[keep]
   minimum <- minimum[keep]
-} else {  # what tools/document needs besides
-  name <- c(name, "roxygen2")
-  minimum <- c(minimum, "7.2.0")
+} else {  # what tools/document and tools/format need besides
+  name <- c(name, "roxygen2", "lintr")
+  minimum <- c(minimum, "7.2.0", "3.0.0")
 }
-if (arguments[2] == "bench") {  # the hidden-effect benchmark runs on workers, with a random forest among its rivals
+if (arguments[2] == "bench") {  # workers of the hidden-effect benchmark, a random forest among its rivals
   extra <- c("future", "future.apply", "ranger")
   name <- c(name, extra)
   minimum <- c(minimum, rep("0", length(extra)))

@@ -1,5 +1,6 @@
 # Evidence against closed forms and quadrature, on the cases of bench/evidence.R: a few repeats of each here, the whole
 # table where AMISS_EXTENDED_TESTS is "true". The cases lie in the source tree, not in the package.
+skip_on_cran()  # second tier: tools/test --quick
 extended <- identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true")
 cases_file <- testthat::test_path("..", "..", "bench", "evidence", "cases.R")
 

@@ -1,6 +1,7 @@
 # A fixed subset of the worlds of bench/hidden_effects: every kind of effect, and none, hidden in five to seven days of data.
 # Of 24 worlds at least 22 must come out right: the effect's mechanism named (either of two), nothing where there is
 # nothing, and what the catalogue does not hold not blamed on it with confidence. AMISS_WORLD_SEED moves all seeds.
+skip_on_cran()  # second tier: tools/test --quick
 bench <- test_path("..", "..", "bench", "hidden_effects")
 
 hidden_worlds <- function(scope) {

@@ -61,6 +61,7 @@ test_that("a world follows from its seed, with all that scoring needs", {
 })
 
 test_that("mechanisms stack: parameters are never lost, and where each is at zero the base model is left", {
+  skip_on_cran()
   scope <- families_scope()
   for (family in c("network", "runoff")) {
     for (seed in 1:3) {
@@ -96,6 +97,7 @@ test_that("a prior that was changed survives a mechanism", {
 })
 
 test_that("the models' coarser steps stay below the noise: a simulator with the true values gives the truth", {
+  skip_on_cran()
   scope <- families_scope()
   for (family in c("network", "runoff")) {
     kinds <- scope$families[[family]]$kinds
@@ -109,6 +111,7 @@ test_that("the models' coarser steps stay below the noise: a simulator with the 
 })
 
 test_that("least squares with what is really there reaches the noise, and without it does not", {
+  skip_on_cran()
   scope <- families_scope()
   some <- list(network = c("none", "solar gain on the air", "heater state"),
                runoff = c("none", "overflow threshold", "snow store"))
@@ -135,6 +138,7 @@ test_that("least squares with what is really there reaches the noise, and withou
 })
 
 test_that("a wrong base leaves what its parameters cannot follow, whether an effect is hidden or not", {
+  skip_on_cran()
   scope <- families_scope()
   worlds <- lapply(1:12, function(seed) scope$family_world("wrong", seed, days = 5))
   hidden <- vapply(worlds, function(w) length(w$kinds) > 0, NA)
@@ -203,6 +207,7 @@ family_worlds <- function(scope) {
 }
 
 test_that("what is hidden in worlds of each family is found, and nothing else is named", {
+  skip_on_cran()
   scope <- families_scope()
   worlds <- family_worlds(scope)
   rows <- parallel::mclapply(seq_len(nrow(worlds)), function(i) {

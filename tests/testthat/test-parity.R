@@ -1,4 +1,5 @@
 # bench/parity/cases.R says what is compared, and how far it may differ on another machine.
+skip_on_cran()  # second tier: tools/test --quick
 test_that("every stage gives what it gave", {
   folder <- test_path("..", "..", "bench", "parity")
   if (!dir.exists(folder)) skip("bench/ is not part of the installed package")

@@ -1,3 +1,4 @@
+skip_on_cran()  # second tier: tools/test --quick
 test_that("the posterior of SEPIA's ball drop is SEPIA's", {
   script <- test_path("..", "..", "bench", "peers", "ball_drop.R")
   if (!file.exists(script)) skip("bench/ is not part of the installed package")

@@ -1,4 +1,5 @@
 # The checks of bench/calibration.R: a short form with fixed seeds, and the long one when AMISS_EXTENDED_TESTS is "true".
+skip_on_cran()  # second tier: tools/test --quick
 bench <- test_path("..", "..", "bench", "calibration")
 extended <- identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true")
 checks <- new.env()

@@ -253,7 +253,7 @@ write_comparison_study <- function(folder, ...) {
          line = function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
                                    offset, free("gain", uniform(0, 1)), boundary = "Te"))', file.path(folder, "models.R"))
   writeLines('source("values.R", local = TRUE)$value', file.path(folder, "made.R"))
-  writeLines('data.frame(hour = 1:80, Te = 10 + 5 * sin(1:80 / 4), Gv = pmax(0, 300 * sin(1:80 / 5)), Ti = 24 + 2 * sin(1:80 / 4) + with_seed(3, rnorm(80, 0, 0.1)))',
+  writeLines("data.frame(hour = 1:80, Te = 10 + 5 * sin(1:80 / 4), Gv = pmax(0, 300 * sin(1:80 / 5)), Ti = 24 + 2 * sin(1:80 / 4) + with_seed(3, rnorm(80, 0, 0.1)))",
              file.path(folder, "values.R"))
   write_study_file(folder, data = "made.R", models = "models.R", calibrate = "hour <= 60", validate = "hour > 60", runs = 12,
                    control = list(calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 12, importance_draws = 200))), ...,

@@ -1,3 +1,4 @@
+skip_on_cran()  # second tier: tools/test --quick
 test_that("candidates that come near the best are calibrated in full, the others coarsely", {
   upgrade <- small_upgrade()
   table <- upgrade$candidates
