@@ -1,7 +1,7 @@
 # What a table of measurements must not hold, beside what cannot be read.
 
 # Codes of loggers for a value that is missing.
-missing_codes <- c(-9999, -99999, 9999, 99999)
+missing_codes <- c(-9999, -99999)
 
 check_record <- function(data, time, target, terms, name, unit, call = rlang::caller_env()) {
   check_input(checkmate::check_string(name), "name", call = call)
