@@ -9,9 +9,9 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present model
 #' lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for these responses, in
-#' amounts that are free, tells which mechanisms cannot come to what adoption asks for, or to the best so far: their full Bayes
-#' factor is taken to be at most twice as large (in decades), and the margin. They go no further (`candidates$judged_by` is
-#' `"response"`); the others are tried in the order of that evidence.
+#' amounts that are free, tells which mechanisms promise what adoption asks for: their full Bayes factor is taken to be at most
+#' twice as large (in decades), and the margin. Those are calibrated, the best first; the others only if one of those could be
+#' adopted, as it must be compared with every rival. `candidates$judged_by` is `"response"` for those that were not.
 #'
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the parameters,
 #' two thirds of all, and compared with the present model calibrated in the same way; then in full, with the other runs made
@@ -245,17 +245,24 @@ try_mechanisms <- function(current, catalogue, settings, say) {
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
 
-# Coarse calibrations (screen_model()) of the mechanisms that are not out of reach, those whose responses promise most first.
+# Coarse calibrations (screen_model()): of the mechanisms whose responses promise enough, the best first; if one of them could be
+# adopted, of all others too, since what is adopted must have been compared with every rival.
 screened_mechanisms <- function(current, trials, responses, settings, say) {
   coarse <- as_coarse(current$fit)
   screens <- list()
-  for (name in if (is.null(responses)) names(trials) else names(trials)[order(-responses$log10_bf, na.last = FALSE)]) {
-    fits <- lapply(screens, `[[`, "fit")
-    if (out_of_reach(responses[name, ], fits, coarse, settings$control) || length(fits) && settings$spent()) next
-    screens[[name]] <- naming_mechanism(name, screen_model(trials[[name]], trial_name(current, name), settings,
-                                                           hopeless(fits, coarse, settings$control)))
-    report_candidate(name, screens[[name]]$fit, coarse, say)
+  screen <- function(names) {
+    for (name in names) {
+      fits <- lapply(screens, `[[`, "fit")
+      if (length(fits) && settings$spent()) next
+      screens[[name]] <<- naming_mechanism(name, screen_model(trials[[name]], trial_name(current, name), settings,
+                                                              hopeless(fits, coarse, settings$control)))
+      report_candidate(name, screens[[name]]$fit, coarse, say)
+    }
   }
+  ordered <- if (is.null(responses)) names(trials) else names(trials)[order(-responses$log10_bf, na.last = FALSE)]
+  behind <- vapply(ordered, function(name) out_of_reach(responses[name, ], settings$control), NA)
+  screen(ordered[!behind])
+  if (length(contenders(lapply(screens, `[[`, "fit"), coarse, settings$control))) screen(ordered[behind])
   screens
 }
 
@@ -282,14 +289,12 @@ seen_responses <- function(current, trials, settings) {
   settings$keep(list("responses", current$name, lapply(trials, plain)), response_factors(current$fit, trials, settings))
 }
 
-# Whether the full evidence of a mechanism, of which its responses are a part, could not come to what adoption asks for or to the
-# best so far. Responses at one place of the parameters' space show a good half of the evidence that the mechanism earns with
-# the parameters free to follow: it may be twice as large, and more by the margin.
-out_of_reach <- function(response, fits, reference, control) {
+# Whether the full evidence of a mechanism, of which its response is a part, is unlikely to come to what adoption asks for. A
+# response at one place of the parameters' space shows a good half of what the mechanism earns with the parameters free to follow:
+# it may be twice as large, and more by the margin.
+out_of_reach <- function(response, control) {
   if (is.null(response) || is.na(response$log10_bf)) return(FALSE)
-  reach <- 2 * max(0, response$log10_bf) + 3 * (response$upper95 - response$log10_bf) / 1.96 + control$margin
-  best <- vapply(fits, function(fit) factor_of(fit, reference)$log10_bf, 0)
-  reach < max(control$decisive, best)
+  2 * max(0, response$log10_bf) + 3 * (response$upper95 - response$log10_bf) / 1.96 + control$margin < control$decisive
 }
 
 # Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by more than
