@@ -37,6 +37,10 @@ tangent_posterior_ <- function(data, priors, x0, run, slopes, draws, ais, contex
     .Call(`_amiss_tangent_posterior_`, data, priors, x0, run, slopes, draws, ais, context)
 }
 
+response_evidence_ <- function(data, priors, tangent, responses, ais, context) {
+    .Call(`_amiss_response_evidence_`, data, priors, tangent, responses, ais, context)
+}
+
 run_likelihood_ <- function(data, priors, points, runs, context_list) {
     .Call(`_amiss_run_likelihood_`, data, priors, points, runs, context_list)
 }

@@ -1,6 +1,6 @@
 # Finished work kept in files, so that an interrupted run goes on where it stopped.
 
-# A function that returns a value kept under a key, or evaluates and keeps it. What is kept belongs to one set of
+# A function that returns a value kept under a key, or evaluates and keeps it, with the runs that it took. What is kept belongs to one set of
 # arguments only: its hash is the file's name. What cannot be kept or read again costs time, never the run.
 checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
   if (is.null(folder)) return(function(name, value) value)
@@ -11,10 +11,15 @@ checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
     id <- content_hash(list(key, name))
     file <- file.path(folder, paste0("amiss-", id, ".rds"))
     kept <- read_kept(file, id)
-    if (!is.null(kept)) return(kept$value)
+    if (!is.null(kept)) {
+      count_runs(kept$value$runs)
+      return(kept$value$value)
+    }
+    before <- runs_so_far()
     force(value)
-    keep_value(value, file, id)
-    value
+    keep_value(list(value = value, runs = runs_so_far() - before), file, id)
+    # As it will be read again: which environments are one and which are copies is part of later keys.
+    unserialize(serialize(value, NULL))
   }
 }
 
@@ -117,7 +122,8 @@ bindings <- function(x, names, seen) {
   names <- sort(names, method = "radix")
   value <- function(name) {
     if (rlang::env_binding_are_active(x, name)) return("active")
-    tryCatch(plain(get(name, x, inherits = FALSE), seen), error = function(e) "none")
+    tryCatch(plain(if (name == "...") eval(quote(list(...)), x) else get(name, x, inherits = FALSE), seen),
+             error = function(e) "none")
   }
   stats::setNames(lapply(names, value), names)
 }

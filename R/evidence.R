@@ -32,6 +32,11 @@ bayes_factor <- function(model, reference) {
     abort_input(c("The two models were calibrated on different records; their evidences cannot be compared.",
                   i = "Calibrate both on the same measurements."))
   }
+  factor_of(model, reference)
+}
+
+# The same of any two evidences of one record, each with its standard error.
+factor_of <- function(model, reference) {
   log10_bf <- (model$log_evidence - reference$log_evidence) / log(10)
   se <- sqrt(model$standard_error^2 + reference$standard_error^2) / log(10)
   interval <- log10_bf + c(-1.96, 1.96) * se

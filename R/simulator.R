@@ -283,6 +283,14 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
   }
 }
 
+# Runs of simulators in this session, by which a study says what it cost.
+ledger <- new.env(parent = emptyenv())
+ledger$runs <- 0
+
+runs_so_far <- function() ledger$runs
+
+count_runs <- function(runs) ledger$runs <- ledger$runs + runs
+
 # Runs over the segments that hold rows of the wanted uses, averaged like the measurements: one row for each used row.
 simulate_measured <- function(simulator, values, measurements, uses, threads, call = rlang::caller_env()) {
   raw <- measurements$raw
@@ -293,6 +301,7 @@ simulate_measured <- function(simulator, values, measurements, uses, threads, ca
                   i = "Columns there: {.val {colnames(raw$drivers)}}."), call = call)
   }
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
+  count_runs(nrow(values))
   out <- matrix(NaN, length(measurements$y), nrow(values))
   wanted <- which(measurements$block %in% rows)
   for (segment in unique(measurements$segment[rows])) {

@@ -241,11 +241,11 @@ result_list.amiss_upgrade <- function(x) {
   candidate_list <- function(i) {
     row <- x$candidates[i, ]
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
-         probability = row$probability, trusted = row$trusted, screened = row$screened, parameters = table_rows(row$parameters[[1]]))
+         probability = row$probability, trusted = row$trusted, screened = row$screened, judged_by = row$judged_by, parameters = table_rows(row$parameters[[1]]))
   }
   cause <- x$named_cause
   if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
-  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s,
+  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s, runs_total = x$runs_total,
        diagnosis = diagnosis_verdict(x), models = lapply(x$models, model_list), candidates = lapply(seq_len(NROW(x$candidates)), candidate_list),
        named_cause = cause, gain = x$gain, stopped_because = x$stopped_because)
 }

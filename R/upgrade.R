@@ -1,4 +1,4 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
+upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine = 1 / 3, rounds = 8, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
                         screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, gradient = FALSE, importance_draws = 0))
 
 #' The loop: show, name the cause, extend, measure
@@ -7,13 +7,19 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
 #' and the loop begins again with the extended model. Held-out rows only measure; they decide nothing.
 #'
+#' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present model
+#' lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for these responses, in
+#' amounts that are free, tells which mechanisms promise what adoption asks for: their full Bayes factor is taken to be at most
+#' twice as large (in decades), and the margin. Those are calibrated, the best first; the others only if one of those could be
+#' adopted, as it must be compared with every rival. `candidates$judged_by` is `"response"` for those that were not.
+#'
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the parameters,
 #' two thirds of all, and compared with the present model calibrated in the same way; then in full, with the other runs made
 #' where the coarse posterior lies ([refine_ensemble()]) and the emulator checked by runs of the simulator and refined
 #' ([calibrate_refined()]), those that could come within `margin` of the best, if any could come
 #' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and, if `screening` asks
 #' for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their coarse Bayes factor;
-#' `candidates$screened` says which.
+#' `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those calibrated in full.
 #'
 #' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out, and
@@ -25,14 +31,15 @@ upgrade_control <- list(max_steps = 3, decisive = 2, refine = 1 / 3, rounds = 8,
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
 #'   none), `rounds` (of refinement where the check by runs asks for it; 8), `decisive` (log10 Bayes factor that a mechanism must earn, with
-#'   its interval above zero; 2), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
+#'   its interval above zero; 2), `runs_total` (budget: once so many runs of the simulator have been made, no further mechanism is
+#'   calibrated than those begun; `NULL`: none), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
 #'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
 #' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
 #' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried, the
-#'   named cause, the gain, and why the loop stopped. Each model that adopted a mechanism has a `verdict` of its own: `"named"`; `"likely"`,
+#'   named cause, the gain, why the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism has a `verdict` of its own: `"named"`; `"likely"`,
 #'   where something of its `doubts` speaks against it; or `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its
 #'   standard error): then it takes the place of something else. `confounded_with` names parameters that are correlated beyond
 #'   0.4 with those that it brought: other parts of the model that could do the same.
@@ -76,6 +83,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   threads <- check_threads(threads)
   say <- progress(quiet)
   settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
+  before <- runs_so_far()
+  settings$spent <- function() !is.null(control$runs_total) && runs_so_far() - before >= control$runs_total
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   warn_absent_drivers(catalogue, measurements)
   say("Calibrating the base model")
@@ -93,6 +102,10 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     left <- left[vapply(catalogue[left], applies, NA, settings$adopted)]
     if (!length(left)) {
       stopped <- "no runs that are left hold what has been adopted"
+      break
+    }
+    if (settings$spent()) {
+      stopped <- sprintf("the budget of %d runs of the simulator was spent", control$runs_total)
       break
     }
     if (length(models) > control$max_steps) {
@@ -117,6 +130,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   models <- judge_models(models, candidates, catalogue, measurements, control)
   structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
                  named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models), stopped_because = stopped,
+                 runs_total = runs_so_far() - before,
                  measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
 }
 
@@ -126,6 +140,7 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive", call = call)
   check_input(checkmate::check_number(control$refine, lower = 0, upper = 0.8), "control$refine", call = call)
   check_input(checkmate::check_count(control$rounds), "control$rounds", call = call)
+  check_input(checkmate::check_count(control$runs_total, positive = TRUE, null.ok = TRUE), "control$runs_total", call = call)
   check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin", call = call)
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening", call)
   check_stage_controls(control, measurements, call = call)
@@ -238,26 +253,71 @@ trial_order <- function(catalogue, attribution) {
   names(catalogue)[order(-weight)]
 }
 
-# Every mechanism as an extension of the current model: fits, and the table of their Bayes factors.
+# Every mechanism as an extension of the current model: fits of those worth one, and the table of all Bayes factors.
 try_mechanisms <- function(current, catalogue, settings, say) {
-  screening <- !is.null(settings$control$screening)
-  coarse <- as_coarse(current$fit)
-  fits <- screens <- list()
-  for (name in names(catalogue)) {
-    trial <- extend(model_of(current$fit), catalogue[[name]], settings$adopted)
-    made <- rlang::try_fetch(if (screening) screen_model(trial, paste(current$name, "+", name), settings, hopeless(fits, coarse, settings$control))
-                             else fit_fully(trial, paste(current$name, "+", name), settings),
-                             amiss_error = function(e) rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL))
-    if (screening) screens[[name]] <- made
-    fits[[name]] <- if (screening) made$fit else made
-    report_candidate(name, fits[[name]], if (screening) coarse else current$fit, say)
+  trials <- lapply(catalogue, extend, simulator = model_of(current$fit), adopted = settings$adopted)
+  if (is.null(settings$control$screening)) {
+    return(tried_in_full(current, trials, NULL, names(trials), settings, say))
   }
-  full <- if (screening) contenders(fits, coarse, settings$control) else names(fits)
-  if (screening) for (name in full) {
-    fits[[name]] <- fit_fully(model_of(fits[[name]]), paste(current$name, "+", name), settings, first = screens[[name]])
+  responses <- seen_responses(current, trials, settings)
+  if (!is.null(responses)) say("  {sum(responses$runs)} runs show what the mechanisms could explain")
+  screens <- screened_mechanisms(current, trials, responses, settings, say)
+  full <- contenders(lapply(screens, `[[`, "fit"), as_coarse(current$fit), settings$control)
+  tried_in_full(current, trials, screens, full, settings, say, responses)
+}
+
+trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
+
+# Coarse calibrations (screen_model()): of the mechanisms whose responses promise enough, the best first; if one of them could be
+# adopted, of all others too, since what is adopted must have been compared with every rival.
+screened_mechanisms <- function(current, trials, responses, settings, say) {
+  coarse <- as_coarse(current$fit)
+  screens <- list()
+  screen <- function(names) {
+    for (name in names) {
+      fits <- lapply(screens, `[[`, "fit")
+      if (length(fits) && settings$spent()) next
+      screens[[name]] <<- naming_mechanism(name, screen_model(trials[[name]], trial_name(current, name), settings,
+                                                              hopeless(fits, coarse, settings$control)))
+      report_candidate(name, screens[[name]]$fit, coarse, say)
+    }
+  }
+  ordered <- if (is.null(responses)) names(trials) else names(trials)[order(-responses$log10_bf, na.last = FALSE)]
+  behind <- vapply(ordered, function(name) out_of_reach(responses[name, ], settings$control), NA)
+  screen(ordered[!behind])
+  if (length(contenders(lapply(screens, `[[`, "fit"), coarse, settings$control))) screen(ordered[behind])
+  screens
+}
+
+# list(fits, table) of the mechanisms `full` calibrated in full, and of the others as they are.
+tried_in_full <- function(current, trials, screens, full, settings, say, responses = NULL) {
+  fits <- lapply(screens, `[[`, "fit")
+  for (name in full) {
+    fits[[name]] <- naming_mechanism(name, fit_fully(trials[[name]], trial_name(current, name), settings, first = screens[[name]]))
     report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
   }
-  list(fits = fits, table = trial_table(fits, current, full))
+  list(fits = fits, table = trial_table(fits, current, full, responses))
+}
+
+naming_mechanism <- function(name, code) {
+  rlang::try_fetch(code, amiss_error = function(e) {
+    rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e,
+                 class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
+  })
+}
+
+# What the mechanisms could explain (response_factors()), a row for each; NULL where runs are given and none can be made.
+seen_responses <- function(current, trials, settings) {
+  if (inherits(trials[[1]], "amiss_ensemble")) return(NULL)
+  settings$keep(list("responses", current$name, lapply(trials, plain)), response_factors(current$fit, trials, settings))
+}
+
+# Whether the full evidence of a mechanism, of which its response is a part, is unlikely to come to what adoption asks for. A
+# response at one place of the parameters' space shows a good half of what the mechanism earns with the parameters free to follow:
+# it may be twice as large, and more by the margin.
+out_of_reach <- function(response, control) {
+  if (is.null(response) || is.na(response$log10_bf)) return(FALSE)
+  2 * max(0, response$log10_bf) + 3 * (response$upper95 - response$log10_bf) / 1.96 + control$margin < control$decisive
 }
 
 # Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by more than
@@ -281,21 +341,31 @@ report_candidate <- function(what, fit, reference, say) {
 # Candidates whose coarse evidence could come near the best, if any could come near adoption. It is taken as uncertain by three
 # standard errors and by the nats that annealing lies behind the second estimator: where chains lag, a mode may be missed.
 contenders <- function(fits, reference, control) {
+  if (!length(fits)) return(character())
   bf <- do.call(rbind, lapply(fits, bayes_factor, reference))
   lag <- vapply(fits, function(f) max(0, f$posterior$second[[1]] - f$posterior$annealed[[1]], na.rm = TRUE), 0)
   reach <- bf$log10_bf + 3 * (bf$upper95 - bf$log10_bf) / 1.96 + lag / log(10) + control$margin
   names(fits)[reach >= max(bf$log10_bf, control$decisive)]
 }
 
-trial_table <- function(fits, current, full) {
+# Bayes factors of all mechanisms against the current model: in full, by the coarse calibration, or by the responses alone.
+trial_table <- function(fits, current, full, responses = NULL) {
   rows <- lapply(names(fits), function(name) {
     reference <- if (name %in% full) current$fit else as_coarse(current$fit)
-    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], reference), trusted = fits[[name]]$trust$trusted)
+    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], reference), trusted = fits[[name]]$trust$trusted,
+                      judged_by = if (name %in% full) "calibration" else "screening")
     row$parameters <- list(added_parameters(fits[[name]], current$fit))
     row
   })
+  by_response <- responses[!rownames(responses) %in% names(fits), ]
+  if (NROW(by_response)) {
+    seen <- data.frame(from = current$name, mechanism = rownames(by_response), by_response[names(by_response) != "runs"], trusted = FALSE,
+                       judged_by = "response", row.names = NULL)
+    seen$parameters <- rep(list(added_parameters(current$fit, current$fit)), nrow(seen))
+    rows <- c(rows, list(seen))
+  }
   table <- do.call(rbind, rows)
-  table$screened <- !table$mechanism %in% full
+  table$screened <- table$judged_by != "calibration"
   # Equal prior probability for no change and for each mechanism.
   log_odds <- c(0, table$log10_bf) * log(10)
   probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))

@@ -137,6 +137,22 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// response_evidence_
+Rcpp::List response_evidence_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& tangent, const Eigen::MatrixXd& responses, const Rcpp::List& ais, const Rcpp::List& context);
+RcppExport SEXP _amiss_response_evidence_(SEXP dataSEXP, SEXP priorsSEXP, SEXP tangentSEXP, SEXP responsesSEXP, SEXP aisSEXP, SEXP contextSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type tangent(tangentSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type responses(responsesSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type ais(aisSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
+    rcpp_result_gen = Rcpp::wrap(response_evidence_(data, priors, tangent, responses, ais, context));
+    return rcpp_result_gen;
+END_RCPP
+}
 // run_likelihood_
 Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& points, const Eigen::MatrixXd& runs, const Rcpp::List& context_list);
 RcppExport SEXP _amiss_run_likelihood_(SEXP dataSEXP, SEXP priorsSEXP, SEXP pointsSEXP, SEXP runsSEXP, SEXP context_listSEXP) {
@@ -236,6 +252,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 6},
     {"_amiss_tangent_posterior_", (DL_FUNC) &_amiss_tangent_posterior_, 8},
+    {"_amiss_response_evidence_", (DL_FUNC) &_amiss_response_evidence_, 6},
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},

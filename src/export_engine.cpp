@@ -6,6 +6,7 @@
 #include "engine/attribution/Attribution.hpp"
 #include "engine/basis/Basis.hpp"
 #include "engine/calibration/Calibration.hpp"
+#include "engine/calibration/ResponseEvidence.hpp"
 #include "engine/calibration/TangentPosterior.hpp"
 #include "engine/discrepancy/FilterBank.hpp"
 #include "engine/discrepancy/HistoryModel.hpp"
@@ -229,6 +230,16 @@ Rcpp::List tangent_posterior_(const Rcpp::List& data, const Rcpp::List& priors, 
   const Eigen::Index conditions = result.history.front().t.size();
   add_points(out, result.history, static_cast<int>(conditions));
   return out;
+}
+
+// Evidence of a calibration's tangent and of the responses (N x k) to a change of the simulator.
+// [[Rcpp::export]]
+Rcpp::List response_evidence_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& tangent,
+                              const Eigen::MatrixXd& responses, const Rcpp::List& ais,
+                              const Rcpp::List& context) {
+  return convert::ais_list(response_evidence(make_history_data(data), make_history_priors(priors),
+                                             convert::simulator(tangent), responses,
+                                             convert::ais_options(ais), convert::context(context)));
 }
 
 // Log-likelihood of runs of the simulator itself (N x n), each at its point of the history posterior.

@@ -21,7 +21,8 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
               verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
               log10_bf = max(upgrade$candidates$log10_bf[upgrade$candidates$from == upgrade$models[[1]]$name]),
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
-              rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall)
+              rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall,
+              runs_total = upgrade$runs_total)
   if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world), list(paper_condition = paper_condition(world, runs)))
   row
 }
