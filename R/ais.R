@@ -1,4 +1,5 @@
-ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision = 0.1, chains = NULL, sweeps = NULL, max_sweeps = 30,
+ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision = 0.1, chains = NULL, sweeps = NULL,
+                    max_sweeps = 30,
                     ess_drop = 0.7, gradient = FALSE, resample = TRUE, importance_draws = 1000, max_components = 3)
 
 #' Annealed importance sampling of any posterior
@@ -8,8 +9,8 @@ ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision 
 #'
 #' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for each, how the chains
 #' move and how often. Then all is frozen and fresh, independent groups of chains give the estimate: unbiased, with an
-#' interval by bootstrap over the groups. A second estimator (an importance sample from a Student-t mixture fitted to the
-#' draws or, where none comes close, annealing from that mixture) must agree, and is reported where it is the more
+#' interval by bootstrap over the groups. A second estimator (an importance sample from a Student-t mixture fitted to
+#' the draws or, where none comes close, annealing from that mixture) must agree, and is reported where it is the more
 #' precise one. Groups or draws are added until the standard error is at most `precision`.
 #'
 #' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
@@ -21,15 +22,17 @@ ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision 
 #' @param control List of options:
 #'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at least 32);
 #'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below `precision` (0.1);
-#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned records
-#'     of [calibrate_paper()] 1; 30);
+#' * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned
+#'     records of [calibrate_paper()] 1; 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
-#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE` in [calibrate()], along the parameters, where
-#'     they follow a posterior that is curved at up to twice the cost; `FALSE` elsewhere). [ais()] makes them if it is given a gradient;
+#' * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE` in [calibrate()], along the parameters,
+#'     where they follow a posterior that is curved at up to twice the cost; `FALSE` elsewhere). [ais()] makes them if
+#'     it is given a gradient;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
 #'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
-#' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95 %),
-#'   `annealed` and `second` (estimate and standard error of each estimator), `ladder`, `evaluations`, `trusted`, `verdict`.
+#' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95
+#'   %), `annealed` and `second` (estimate and standard error of each estimator), `ladder`, `evaluations`, `trusted`,
+#'   `verdict`.
 #' @examples
 #' y <- c(1.2, 0.7, 1.9)
 #' ais(function(z) vapply(z[, "mean"], function(m) sum(dnorm(y, m, 1, log = TRUE)), 0),
@@ -69,7 +72,8 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
     density <- vapply(seq_along(priors), function(p) prior_density(priors[[p]], values[, p]), numeric(nrow(unit)))
     unname(slope / matrix(density, nrow(unit)))
   }
-  result <- call_engine(ais_(at_unit, if (!is.null(gradient)) slope_at_unit, length(priors), control, engine_context(seed, 1)))
+  result <- call_engine(ais_(at_unit, if (!is.null(gradient)) slope_at_unit, length(priors), control,
+                             engine_context(seed, 1)))
   tell_undefined(tally)
   result$draws <- to_values(result$unit)
   result$unit <- NULL
@@ -83,7 +87,8 @@ usable_likelihood <- function(x, values, tally, call) {
     abort_input("{.arg log_likelihood} must return numbers; it returned {.cls {class(x)}}.", call = call)
   }
   if (length(x) != nrow(values)) {
-    abort_input(c("{.arg log_likelihood} returned another number of values than it got points: {length(x)} for {nrow(values)}.",
+    abort_input(
+      c("{.arg log_likelihood} returned another number of values than it got points: {length(x)} for {nrow(values)}.",
                   i = "It gets a matrix, one point a row."), call = call)
   }
   at <- function(i) point_words(values[i, , drop = FALSE])
@@ -96,14 +101,16 @@ usable_likelihood <- function(x, values, tally, call) {
   if (tally$undefined > largest_failed_share * tally$points) {
     abort_numerical(c("{.arg log_likelihood} is not a number at {tally$undefined} of the first {tally$points} points.",
                       x = "The first is at {tally$where}.",
-                      i = "Narrow the priors to where it is defined, or return -Inf where the data are impossible."), call = call)
+                      i = "Narrow the priors to where it is defined, or return -Inf where the data are impossible."),
+                      call = call)
   }
   as.numeric(x)
 }
 
 tell_undefined <- function(tally) {
   if (tally$undefined == 0) return(invisible())
-  warn_result(c("{.arg log_likelihood} was not a number at {tally$undefined} of {tally$points} points, which count as impossible.",
+  warn_result(c(
+    "{.arg log_likelihood} was not a number at {tally$undefined} of {tally$points} points, which count as impossible.",
                 x = "The first is at {tally$where}."))
 }
 
@@ -131,7 +138,8 @@ fill_ais_control <- function(control, what = "control", call = rlang::caller_env
   check("max_sweeps", filled$max_sweeps, max(1, filled$sweeps), "It may not lie below {.code sweeps}.")
   check_input(checkmate::check_number(filled$precision, lower = 1e-6, finite = TRUE), paste0(what, "$precision"),
               "It is a standard error in nats.", call = call)
-  check_input(checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999), paste0(what, "$ess_drop"), call = call)
+  check_input(checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999), paste0(what, "$ess_drop"),
+              call = call)
   for (flag in c("gradient", "resample")) {
     check_input(checkmate::check_flag(filled[[flag]]), paste0(what, "$", flag), call = call)
   }
@@ -142,5 +150,6 @@ fill_ais_control <- function(control, what = "control", call = rlang::caller_env
 #' @export
 print.amiss_ais <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Posterior} of {ncol(x$draws)} parameter{?s}: log evidence {round(x$log_evidence, 2)} [{round(x$interval[1], 2)}, {round(x$interval[2], 2)}] ({x$estimator})")
-  cli::cli_bullets(c("*" = "{x$evaluations} likelihood values, {round(x$ess)} effective draws", "*" = x$verdict, ">" = "next: {.code $draws} with {.code $weights}"))
+  cli::cli_bullets(c("*" = "{x$evaluations} likelihood values, {round(x$ess)} effective draws", "*" = x$verdict,
+                     ">" = "next: {.code $draws} with {.code $weights}"))
 })

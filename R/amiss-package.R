@@ -3,7 +3,8 @@
 #' The way the data goes: [measurements()] and a simulator ([zone()], [function_simulator()]) give an ensemble
 #' ([simulate_design()], or [ensemble()] for runs made elsewhere); [train_emulator()], [calibrate()],
 #' [attribute_discrepancy()] follow. [upgrade_model()] runs the whole loop with a [catalogue()] of [mechanism()]s,
-#' [compare_models()] sets several simulators against each other, [report()] writes either down, and [run_study()] does all of it from one file.
+#' [compare_models()] sets several simulators against each other, [report()] writes either down, and [run_study()] does
+#' all of it from one file.
 #'
 #' @useDynLib amiss, .registration = TRUE
 #' @importFrom Rcpp evalCpp
@@ -42,7 +43,8 @@ check_seed <- function(seed, name, call = rlang::caller_env()) {
 # Evaluates an expression under a seed of its own and leaves R's generator as it was.
 with_seed <- function(seed, expression) {
   old <- globalenv()$.Random.seed
-  on.exit(if (is.null(old)) rm(list = ".Random.seed", envir = globalenv()) else assign(".Random.seed", old, envir = globalenv()))
+  on.exit(if (is.null(old)) rm(list = ".Random.seed", envir = globalenv()) else assign(".Random.seed", old,
+                                                                                       envir = globalenv()))
   set.seed(as.integer(seed), kind = "Mersenne-Twister", normal.kind = "Inversion", sample.kind = "Rejection")
   expression
 }

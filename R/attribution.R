@@ -1,30 +1,33 @@
 attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05, least_log10_bf = 0.5,
-                            ais = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.3, importance_draws = 500))
+                            ais = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12,
+                                       precision = 0.3, importance_draws = 500))
 
 #' Which boundary conditions drive the discrepancy
 #'
-#' For each condition: the evidence that the model loses when its discrepancy may not answer to the condition, its share, and a
-#' p-value from surrogates (all conditions shifted in time together, which keeps their
-#' autocorrelation and their correlation with one another), for all conditions together by the step-down method of Westfall
-#' and Young (1993), whose least p-value does not grow with the number of conditions.
+#' For each condition: the evidence that the model loses when its discrepancy may not answer to the condition, its
+#' share, and a p-value from surrogates (all conditions shifted in time together, which keeps their autocorrelation and
+#' their correlation with one another), for all conditions together by the step-down method of Westfall and Young
+#' (1993), whose least p-value does not grow with the number of conditions.
 #'
-#' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those that can
-#' be dropped alone the smallest set is sought that cannot be dropped together. Such a group is tested like a condition, and its members are named
-#' together: what they say cannot be told apart in this record.
+#' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those
+#' that can be dropped alone the smallest set is sought that cannot be dropped together. Such a group is tested like a
+#' condition, and its members are named together: what they say cannot be told apart in this record.
 #'
-#' *Share.* A set of conditions takes a part of the misfit away, its sum of squares
-#' weighed by the covariance of error and simulator. The share of a condition
-#' is its Shapley value: what it adds to those before it, averaged over all orders of the conditions and over the
-#' posterior. So shares are not negative and add up to what all conditions explain together, also where conditions are
-#' correlated; two conditions that say the same share evenly. Beyond 10 conditions that act, 400 random orders stand for all.
+#' *Share.* A set of conditions takes a part of the misfit away, its sum of squares weighed by the covariance of error
+#' and simulator. The share of a condition is its Shapley value: what it adds to those before it, averaged over all
+#' orders of the conditions and over the posterior. So shares are not negative and add up to what all conditions explain
+#' together, also where conditions are correlated; two conditions that say the same share evenly. Beyond 10 conditions
+#' that act, 400 random orders stand for all.
 #'
 #' @param fit A calibration ([calibrate()]).
-#' @param control List of options: `surrogates` (99; 39 where no condition earns enough evidence to matter), `smallest_shift` (0.05 of the record), `level` (0.05),
-#'   `least_log10_bf` (0.5: what a condition must earn besides its p-value), and `ais` for the sampler.
+#' @param control List of options: `surrogates` (99; 39 where no condition earns enough evidence to matter),
+#'   `smallest_shift` (0.05 of the record), `level` (0.05), `least_log10_bf` (0.5: what a condition must earn besides
+#'   its p-value), and `ais` for the sampler.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition; `group` names the conditions that it
-#'   cannot be told apart from (`NA` for none), and `significant` of a member is that of the group. `groups` is a list, one
-#'   element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and `correlation`, the largest between two members.
+#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition; `group` names the
+#'   conditions that it cannot be told apart from (`NA` for none), and `significant` of a member is that of the group.
+#'   `groups` is a list, one element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and
+#'   `correlation`, the largest between two members.
 #' @source Westfall and Young (1993), Resampling-based multiple testing, Wiley.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -59,12 +62,15 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   result <- with_hidden_groups(attributed(control$least_log10_bf), attributed, own)
   log10_bf <- result$sets$lost / log(10)
   significant <- result$significant
-  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf[own], standard_error = result$sets$standard_error[own] / log(10),
-                      share = colMeans(result$shares), p_value = result$adjusted[own], p_value_single = result$p_value[own],
+  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf[own],
+                      standard_error = result$sets$standard_error[own] / log(10),
+                      share = colMeans(result$shares), p_value = result$adjusted[own],
+                      p_value_single = result$p_value[own],
                       significant = significant[own], trusted = result$sets$trusted[own], group = NA_character_)
   groups <- lapply(setdiff(seq_along(log10_bf), own), function(k) {
     members <- result$sets$conditions[[k]] + 1L
-    list(conditions = conditions[members], log10_bf_dropped = log10_bf[k], p_value = result$adjusted[k], significant = significant[k],
+    list(conditions = conditions[members], log10_bf_dropped = log10_bf[k], p_value = result$adjusted[k],
+         significant = significant[k],
          correlation = largest_correlation(fit, members))
   })
   for (group in groups) {
@@ -76,7 +82,8 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   }
   table <- table[order(-table$log10_bf_dropped, -table$share), ]
   rownames(table) <- NULL
-  structure(list(format_version = format_version, table = table, groups = groups, surrogates = nrow(result$null_statistics),
+  structure(list(format_version = format_version, table = table, groups = groups,
+                 surrogates = nrow(result$null_statistics),
                  statistic = result$statistic, null_statistics = result$null_statistics,
                  control = control, seed = seed), class = "amiss_attribution")
 }
@@ -108,10 +115,12 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
   # A surrogate takes a millisecond at least.
   check_size(named("surrogates"), control$surrogates, matrix_gb(control$surrogates, conditions),
              hours = 1e-3 * control$surrogates / 3600, call = call)
-  check_input(checkmate::check_number(control$smallest_shift, lower = 0, upper = 0.49), named("smallest_shift"), call = call)
+  check_input(checkmate::check_number(control$smallest_shift, lower = 0, upper = 0.49), named("smallest_shift"),
+              call = call)
   check_input(checkmate::check_number(control$level, lower = 0, upper = 1), named("level"), call = call)
   check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE), named("least_log10_bf"), call = call)
-  control$ais <- fill_ais_control(merge_control(ais, control$ais, named("ais"), names(ais_control), call), named("ais"), call)
+  control$ais <- fill_ais_control(merge_control(ais, control$ais, named("ais"), names(ais_control), call), named("ais"),
+                                  call)
   control
 }
 
@@ -144,7 +153,8 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
 # Which conditions cannot be told apart, and what would.
 group_words <- function(attribution) {
   vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
-    sprintf("%s cannot be told apart in this record (correlation %.3f): measure while %s differ", listed(g$conditions), g$correlation,
+    sprintf("%s cannot be told apart in this record (correlation %.3f): measure while %s differ", listed(g$conditions),
+            g$correlation,
             if (length(g$conditions) == 2) "the two" else "they")
   }, "")
 }

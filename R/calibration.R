@@ -1,44 +1,50 @@
-calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf), time_constants = NULL,
-                            error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, check = 40,
-                            exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12, precision = 0.2, gradient = TRUE))
+calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf),
+                            time_constants = NULL,
+                            error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32,
+                            check = 40,
+                            exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12,
+                                                     precision = 0.2, gradient = TRUE))
 
 #' Calibrate a simulator on measurements
 #'
 #' The joint posterior of the parameters, the error and the discrepancy, given the whole record, sampled by annealed
 #' importance sampling. Its normalising constant is the evidence of the model, as a density of the calibration record.
 #'
-#' *Model.* The record is the simulation, plus a discrepancy that answers to the history of the boundary conditions, plus an
-#' autocorrelated error, in one covariance: nothing is split off, so that the evidence does not hang on the basis of the
-#' emulator. How far the discrepancy reaches into what the parameters can do is learned: `reach` is a grid of numbers kappa,
-#' equally probable beforehand; with a small one the discrepancy keeps out of the directions in which the runs differ by much
-#' more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a free discrepancy says that the model is wrong
-#' where its parameters could hide it.
+#' *Model.* The record is the simulation, plus a discrepancy that answers to the history of the boundary conditions,
+#' plus an autocorrelated error, in one covariance: nothing is split off, so that the evidence does not hang on the
+#' basis of the emulator. How far the discrepancy reaches into what the parameters can do is learned: `reach` is a grid
+#' of numbers kappa, equally probable beforehand; with a small one the discrepancy keeps out of the directions in which
+#' the runs differ by much more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a free
+#' discrepancy says that the model is wrong where its parameters could hide it.
 #'
-#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior. The
-#' emulator's error there, over the measurement error as the likelihood weighs it (autocorrelated as it was seen; if more was seen than stated, over the
-#' noise stated), is the check that counts: above a third,
-#' neither the posterior nor the evidence is trusted ([calibrate_refined()] then makes an emulator for the region and tries again). The likelihoods of `exact`
-#' such runs correct the evidence, so that it is the simulator's own; fewer than a tenth effective among them fail the check too, and so does
-#' more than a twentieth of the posterior in the outer tenth of the emulator's region. For an ensemble made elsewhere the
-#' check uses runs left out one by one, the fifth (at least 20) that lie nearest to the posterior.
+#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior.
+#' The emulator's error there, over the measurement error as the likelihood weighs it (autocorrelated as it was seen; if
+#' more was seen than stated, over the noise stated), is the check that counts: above a third, neither the posterior nor
+#' the evidence is trusted ([calibrate_refined()] then makes an emulator for the region and tries again). The
+#' likelihoods of `exact` such runs correct the evidence, so that it is the simulator's own; fewer than a tenth
+#' effective among them fail the check too, and so does more than a twentieth of the posterior in the outer tenth of the
+#' emulator's region. For an ensemble made elsewhere the check uses runs left out one by one, the fifth (at least 20)
+#' that lie nearest to the posterior.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].
 #' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
 #'   `inclusion` (prior probability that a condition drives the discrepancy at all, 0.2), `amplitude` (scale of the
-#'   half-Cauchy prior of the discrepancy's standard deviation if it does, in the target's unit; default the noise), `reach`
-#'   (see *Model*), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
-#'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept
-#'   for the discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (runs
-#'   that correct the evidence; default those of the check, 200 for a [zone()]; 0 for none), and `ais`, a list for the sampler (`pilot_chains`,
-#'   `groups`, `chains`, `sweeps`, `ess_drop`, `resample`, `importance_draws`, `max_components`).
+#'   half-Cauchy prior of the discrepancy's standard deviation if it does, in the target's unit; default the noise),
+#'   `reach` (see *Model*), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
+#'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept for the
+#'   discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (runs that
+#'   correct the evidence; default those of the check, 200 for a [zone()]; 0 for none), and `ais`, a list for the
+#'   sampler (`pilot_chains`, `groups`, `chains`, `sweeps`, `ess_drop`, `resample`, `importance_draws`,
+#'   `max_components`).
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
-#' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the parameters; `log_evidence`,
-#'   `standard_error` and `interval` its evidence; `reach` the posterior probability of each reach; `check` what the runs said of
-#'   the emulator: `error` (RMS at the record's rows), `ratio` (over the noise), `border` (share of the posterior in the outer tenth of the emulator's
-#'   region), `z2` (mean square in units of the
-#'   emulator's own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and `verdict`.
+#' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the parameters;
+#'   `log_evidence`, `standard_error` and `interval` its evidence; `reach` the posterior probability of each reach;
+#'   `check` what the runs said of the emulator: `error` (RMS at the record's rows), `ratio` (over the noise), `border`
+#'   (share of the posterior in the outer tenth of the emulator's region), `z2` (mean square in units of the emulator's
+#'   own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and
+#'   `verdict`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -65,7 +71,8 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
   data <- history_data(emulator, measurements, set$rows, control)
   result <- call_engine(calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads)))
   posterior <- result$posterior
-  fit <- structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
+  fit <- structure(list(format_version = format_version, emulator = emulator, measurements = measurements,
+                        control = control,
                         seed = set$seed, rows = set$rows, values = unit_to_values(posterior$unit, emulator$parameters),
                         weights = posterior$weights, posterior = posterior, kept = result$kept, priors = set$priors,
                         coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
@@ -83,9 +90,11 @@ calibration_setting <- function(emulator, measurements, control, seed, call = rl
   rows <- emulated_rows(emulator, measurements, call)
   control <- fill_calibration_control(control, measurements, length(rows), call = call)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
-                 discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion, amplitude = control$amplitude,
+                 discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion,
+                 amplitude = control$amplitude,
                  correlation_times = control$error_times, ratios = control$error_ratios, reach = control$reach)
-  list(emulator = emulator, measurements = measurements, rows = rows, control = control, priors = priors, seed = pick_seed(seed))
+  list(emulator = emulator, measurements = measurements, rows = rows, control = control, priors = priors,
+       seed = pick_seed(seed))
 }
 
 # The calibration rows, which must be those that the emulator was trained on.
@@ -118,16 +127,21 @@ fill_calibration_control <- function(control, measurements, n, what = "control",
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
   check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1), named("inclusion"), call = call)
   check_input(checkmate::check_number(control$amplitude, lower = 1e-12, finite = TRUE), named("amplitude"), call = call)
-  check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), named("time_constants"), call = call)
-  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE, max.len = 3), named("error_times"), call = call)
-  check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1, any.missing = FALSE), named("error_ratios"), call = call)
-  check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1, any.missing = FALSE, unique = TRUE), named("reach"),
+  check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1,
+                                       any.missing = FALSE), named("time_constants"), call = call)
+  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE,
+                                       max.len = 3), named("error_times"), call = call)
+  check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1,
+                                       any.missing = FALSE), named("error_ratios"), call = call)
+  check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1, any.missing = FALSE, unique = TRUE),
+              named("reach"),
               "Give numbers above 0; {.code Inf} is a free discrepancy.", call = call)
   check_input(checkmate::check_count(control$error_draws, positive = TRUE), named("error_draws"), call = call)
   check_size(named("error_draws"), control$error_draws, matrix_gb(n, control$error_draws, copies = 4), call = call)
   check_input(checkmate::check_count(control$check), named("check"), call = call)
   check_input(checkmate::check_count(control$exact, null.ok = TRUE), named("exact"), call = call)
-  for (name in c("check", "exact")) check_run_number(control[[name]] %||% 0, length(measurements$raw$hours), named(name), call)
+  for (name in c("check", "exact"))
+    check_run_number(control[[name]] %||% 0, length(measurements$raw$hours), named(name), call)
   check_settings_size(control, length(measurements$condition), what, call)
   control
 }
@@ -140,15 +154,18 @@ filter_responses <- function(measurements, time_constants) {
 
 history_data <- function(emulator, measurements, rows, control) {
   responses <- filter_responses(measurements, control$time_constants)
-  list(y = measurements$y[rows], basis = emulator$basis$vectors, moves = simulator_moves(emulator), responses = responses[rows, , drop = FALSE],
+  list(y = measurements$y[rows], basis = emulator$basis$vectors, moves = simulator_moves(emulator),
+       responses = responses[rows, , drop = FALSE],
        condition = rep(measurements$condition - 1L, each = length(control$time_constants)),
        time = measurements$hours[rows], new_segment = segment_starts(measurements, rows))
 }
 
 # What a person should know before using it.
 fit_trust <- function(fit) {
-  why <- c(if (!fit$posterior$trusted) fit$posterior$verdict, if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
-           if (fit$posterior$trusted && fit$standard_error > 1) "not trusted: corrected by the runs, the evidence has a standard error of more than one nat")
+  why <- c(if (!fit$posterior$trusted) fit$posterior$verdict,
+           if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
+           if (fit$posterior$trusted && fit$standard_error > 1)
+             "not trusted: corrected by the runs, the evidence has a standard error of more than one nat")
   list(trusted = is.null(why), verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }
 
@@ -167,7 +184,10 @@ reach_words <- function(fit) {
   if (length(fit$reach) < 2) {
     return(if (free > 0) "the discrepancy is free" else paste("the discrepancy's reach is held at", names(fit$reach)))
   }
-  if (free >= 0.9) return(sprintf("the discrepancy reaches into what the parameters can do (probability %.2f): the model is wrong where its parameters could hide it", free))
-  if (free <= 0.1) return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))
+  if (free >= 0.9)
+    return(sprintf("the discrepancy reaches into what the parameters can do (probability %.2f): the model is wrong where its parameters could hide it",
+                   free))
+  if (free <= 0.1)
+    return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))
   sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)
 }

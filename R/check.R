@@ -21,7 +21,8 @@ checked_by_runs <- function(fit, threads) {
 }
 
 # The runs of the check serve the exact evidence; where they cost milliseconds, more are made for it.
-default_exact <- function(fit) if (inherits(fit$emulator$simulator, "amiss_zone")) max(200, fit$control$check) else fit$control$check
+default_exact <- function(fit) if (inherits(fit$emulator$simulator,
+                                            "amiss_zone")) max(200, fit$control$check) else fit$control$check
 
 # Runs of the simulator at n draws spread evenly over the posterior: list(draws, times, runs, failed), failed ones left
 # out. A draw of more weight than one of n is run once, and counts as often as it was drawn.
@@ -29,7 +30,8 @@ posterior_runs <- function(fit, n, threads) {
   drawn <- even_draws(fit, n)
   draws <- unique(drawn)
   times <- tabulate(match(drawn, draws))
-  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate", threads))
+  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, fit$values[draws, , drop = FALSE],
+                                                  fit$measurements, "calibrate", threads))
   failed <- colSums(!is.finite(runs)) > 0
   if (mean(failed) > largest_failed_share) {
     worst <- draws[failed][1]
@@ -41,13 +43,15 @@ posterior_runs <- function(fit, n, threads) {
 }
 
 # The check tells of failed runs itself.
-suppress_run_warnings <- function(code) withCallingHandlers(code, amiss_warning_input = function(w) rlang::cnd_muffle(w))
+suppress_run_warnings <- function(code) withCallingHandlers(code,
+                                                            amiss_warning_input = function(w) rlang::cnd_muffle(w))
 
 emulation_check <- function(fit, made) {
   emulator <- fit$emulator
   w <- emulated_coefficients(emulator, posterior_unit(fit)[made$draws, , drop = FALSE])
   error <- made$runs - tcrossprod(emulator$basis$vectors, w$mean)
-  new_check(fit, error, series_variance(emulator$basis, w$variance), made$failed, "runs of the simulator at posterior draws",
+  new_check(fit, error, series_variance(emulator$basis, w$variance), made$failed,
+            "runs of the simulator at posterior draws",
             mean = as.numeric(made$runs %*% made$times) / sum(made$times))
 }
 
@@ -60,7 +64,8 @@ check_by_left_out <- function(fit) {
   near <- order(rowSums(sweep(inputs, 2, centre)^2))[seq_len(min(nrow(inputs), max(20, ceiling(nrow(inputs) / 5))))]
   error <- tcrossprod(fit$emulator$basis$vectors, loo$error[near, , drop = FALSE])
   error <- sqrt(error^2 + fit$emulator$basis$discarded_sd^2)
-  new_check(fit, error, series_variance(fit$emulator$basis, loo$variance[near, , drop = FALSE]), 0, "runs left out, those nearest to the posterior")
+  new_check(fit, error, series_variance(fit$emulator$basis, loo$variance[near, , drop = FALSE]), 0,
+            "runs left out, those nearest to the posterior")
 }
 
 new_check <- function(fit, error, variance, failed, by, mean = NULL) {
@@ -72,15 +77,17 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
   told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by, format(signif(ratio, 2)),
                   if (failed) sprintf(" (%d more failed)", failed) else "")
   verdict <- if (ratio > largest_error_ratio) paste0(told, ", more than a third: it is not good enough")
-             else if (!passed) sprintf("%s, but the posterior reaches the end of the region where it holds (%.0f %%)", told, 100 * border)
+             else if (!passed) sprintf("%s, but the posterior reaches the end of the region where it holds (%.0f %%)",
+                                       told, 100 * border)
              else told
-  list(runs = ncol(error), failed = failed, error = rms, noise = noise, ratio = ratio, z2 = mean(error^2 / variance), effective = NA_real_,
+  list(runs = ncol(error), failed = failed, error = rms, noise = noise, ratio = ratio, z2 = mean(error^2 / variance),
+       effective = NA_real_,
        border = border, passed = passed, verdict = verdict, mean = mean)
 }
 
-# RMS of errors (rows x n) in units of the measurement error as the likelihood weighs it, autocorrelated as it was seen: with its
-# covariance V, the root of e' V^-1 e / N, by which a smooth error counts less where the measurement error is smooth. Where the error
-# seen is larger than the noise stated (it then holds more than noise), in units of that.
+# RMS of errors (rows x n) in units of the measurement error as the likelihood weighs it, autocorrelated as it was seen:
+# with its covariance V, the root of e' V^-1 e / N, by which a smooth error counts less where the measurement error is
+# smooth. Where the error seen is larger than the noise stated (it then holds more than noise), in units of that.
 error_over_noise <- function(fit, error) {
   posterior <- fit$posterior
   picked <- systematic_draws(fit$weights, 8)
@@ -92,7 +99,8 @@ error_over_noise <- function(fit, error) {
   points <- list(setting = posterior$setting[each], variance = posterior$variance[each],
                  t = matrix(0, length(each), ncol(posterior$t)))
   runs <- cbind(0, error)[, rep(seq_len(ncol(error) + 1), length(picked)), drop = FALSE]
-  log_l <- matrix(call_engine(run_likelihood_(data, priors, points, runs, engine_context(fit$seed, 1))), ncol(error) + 1)
+  log_l <- matrix(call_engine(run_likelihood_(data, priors, points, runs, engine_context(fit$seed, 1))),
+                  ncol(error) + 1)
   squares <- 2 * sweep(-log_l[-1, , drop = FALSE], 2, log_l[1, ], "+")
   seen <- sqrt(sum(fit$weights * posterior$variance * (1 + error_share(fit))))
   sqrt(mean(squares) / nrow(error)) * max(1, seen / fit$measurements$noise_sd)
@@ -109,7 +117,8 @@ error_ratios_of <- function(fit, draws) {
   matrix(vapply(parts, function(part) ratios[digit(part) + 1], numeric(length(draws))), length(draws))
 }
 
-# Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior; with the simulator itself nothing is discarded.
+# Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior; with the simulator itself nothing is
+# discarded.
 exact_evidence <- function(fit, made, threads) {
   own <- made$draws
   posterior <- fit$posterior
@@ -125,11 +134,12 @@ exact_evidence <- function(fit, made, threads) {
   fit$check$effective <- effective
   if (fit$check$passed && effective < least_effective) {
     fit$check$passed <- FALSE
-    fit$check$verdict <- sprintf("%s, but few of these runs are as likely as it says (effective share %.2f)", fit$check$verdict, effective)
+    fit$check$verdict <- sprintf("%s, but few of these runs are as likely as it says (effective share %.2f)",
+                                 fit$check$verdict, effective)
   }
   correction <- max(log_ratio) + log(mean(ratio))
-  # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the upper half it is that of
-  # lognormal ratios; how far the two are apart is part of the error.
+  # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the upper half it is
+  # that of lognormal ratios; how far the two are apart is part of the error.
   above <- pmax(log_ratio - stats::median(log_ratio), 0)
   lognormal <- stats::median(log_ratio) + mean(above^2)  # twice the mean square of one half, over two
   error <- sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2)

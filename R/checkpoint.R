@@ -1,7 +1,8 @@
 # Finished work kept in files, so that an interrupted run goes on where it stopped.
 
-# A function that returns a value kept under a key, or evaluates and keeps it, with the runs that it took. What is kept belongs to one set of
-# arguments only: its hash is the file's name. What cannot be kept or read again costs time, never the run.
+# A function that returns a value kept under a key, or evaluates and keeps it, with the runs that it took. What is kept
+# belongs to one set of arguments only: its hash is the file's name. What cannot be kept or read again costs time, never
+# the run.
 checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
   if (is.null(folder)) return(function(name, value) value)
   check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
@@ -36,7 +37,10 @@ check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
 read_kept <- function(file, id) {
   if (!file.exists(file)) return(NULL)
   kept <- tryCatch(suppressWarnings(unpack(readRDS(file), id)), error = function(e) NULL)
-  if (is.null(kept)) cli::cli_inform(c("!" = "The kept file {.file {file}} is damaged or not from this package; its work is done again."), class = "amiss_message_kept")
+  if (is.null(kept))
+    cli::cli_inform(
+      c("!" = "The kept file {.file {file}} is damaged or not from this package; its work is done again."),
+                    class = "amiss_message_kept")
   kept
 }
 
@@ -47,7 +51,8 @@ pack <- function(value, id) {
 }
 
 unpack <- function(packed, id) {
-  whole <- is.list(packed) && identical(packed$amiss, "kept") && identical(packed$id, id) && identical(packed$hash, rlang::hash(packed$bytes))
+  whole <- is.list(packed) && identical(packed$amiss, "kept") && identical(packed$id, id) &&
+    identical(packed$hash, rlang::hash(packed$bytes))
   if (whole) list(value = unserialize(packed$bytes))
 }
 
@@ -62,7 +67,9 @@ keep_value <- function(value, file, id, write = saveRDS) {
     write(packed, part)
     identical(readRDS(part), packed) && file.rename(part, file)
   }), error = function(e) FALSE)
-  if (!done) cli::cli_inform(c("!" = "A finished model could not be kept in {.file {folder}}; the run goes on without it.", i = "Is the disk full?"), class = "amiss_message_kept")
+  if (!done)
+    cli::cli_inform(c("!" = "A finished model could not be kept in {.file {folder}}; the run goes on without it.",
+                      i = "Is the disk full?"), class = "amiss_message_kept")
 }
 
 # Removes what a keeper made in a folder, and the folder if nothing else is in it.
@@ -84,8 +91,9 @@ remove_empty <- function(folder) {
 # The same for equal contents in every session: version 2 knows no compact forms of vectors.
 content_hash <- function(x) rlang::hash(serialize(x, NULL, version = 2))
 
-# A value as plain lists that are equal where it would work alike: functions as their text and all that they capture, by value,
-# environments as their contents. Packages are their version, and of the global environment only what a function names.
+# A value as plain lists that are equal where it would work alike: functions as their text and all that they capture, by
+# value, environments as their contents. Packages are their version, and of the global environment only what a function
+# names.
 plain <- function(x, seen = new.env()) {
   if (is.environment(x)) return(plain_environment(x, seen))
   if (is.primitive(x)) return(deparse(x))

@@ -3,7 +3,8 @@
 command_parser <- function() {
   option <- function(name, help, ...) optparse::make_option(paste0("--", name), help = help, ...)
   switch <- function(name, help) option(name, help, action = "store_true", default = FALSE)
-  optparse::OptionParser(usage = "usage: amiss run STUDY.yml --out DIR [options]\n       amiss --help | --version", add_help_option = FALSE, option_list = list(
+  optparse::OptionParser(usage = "usage: amiss run STUDY.yml --out DIR [options]\n       amiss --help | --version",
+                         add_help_option = FALSE, option_list = list(
     option("out", "folder for report.html, figures/, result.rds and result.json", metavar = "DIR"),
     option("threads", "threads to use (1); results do not depend on it", default = "1", metavar = "N"),
     option("seed", "seed of the random numbers; overrides that of the study", metavar = "N"),
@@ -11,7 +12,8 @@ command_parser <- function() {
     switch("large", "run even what is estimated to need more than a day or 4 GB"),
     switch("quiet", "no progress on stderr"),
     switch("version", "the version, and nothing else"),
-    optparse::make_option(c("-h", "--help"), help = "this text, and nothing else", action = "store_true", default = FALSE)),
+    optparse::make_option(c("-h", "--help"), help = "this text, and nothing else", action = "store_true",
+                          default = FALSE)),
     description = "\nRuns the study and writes its results into DIR.")
 }
 
@@ -31,7 +33,8 @@ run_command <- function(words) {
   before <- options(amiss.allow_large = asked$large || isTRUE(getOption("amiss.allow_large")))
   on.exit(options(before))
   tryCatch({
-    result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads, quiet = asked$quiet, trust = asked$trust)
+    result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads, quiet = asked$quiet,
+                        trust = asked$trust)
     if (!asked$quiet) print(result)
     0
   }, error = function(e) {

@@ -4,37 +4,39 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 
 #' Compare models by their evidence, and what practice does beside it
 #'
-#' Every model is simulated on one design seed, trained and calibrated on the same record. What comes out is the evidence
-#' with its interval, Bayes factors in the words of the paper's table 1, posterior probabilities (equal ones beforehand),
-#' what each model's discrepancy answers to, and its parameters. Beside them stand the criteria by which models are chosen
-#' today, so that one sees where they mislead.
+#' Every model is simulated on one design seed, trained and calibrated on the same record. What comes out is the
+#' evidence with its interval, Bayes factors in the words of the paper's table 1, posterior probabilities (equal ones
+#' beforehand), what each model's discrepancy answers to, and its parameters. Beside them stand the criteria by which
+#' models are chosen today, so that one sees where they mislead.
 #'
-#' *The criteria.* The root mean squared error is that of the simulation averaged over the posterior, in calibration and on
-#' held-out rows. Likelihood, AIC, BIC and likelihood ratio are taken where the simulator itself (not its emulator) has the
-#' least squared error within the priors, as if errors were independent and normal with one unknown variance: k counts the
-#' parameters and that variance, as `AIC()` of an [lm()] does. The likelihood ratio is that against the last earlier model
-#' that is nested: whose parameters all stand in this one with the same priors. By names alone it cannot be known whether
-#' the smaller model is a special case of the larger within the priors; where an added parameter ends at the edge of its
-#' range the chi-square distribution of the statistic does not hold, and `lr_note` says so. None of these criteria knows
-#' that a simulation has a discrepancy; `autocorrelation` (of the least-squares errors at one step) shows how far they are
-#' from the independence that they take for granted.
+#' *The criteria.* The root mean squared error is that of the simulation averaged over the posterior, in calibration and
+#' on held-out rows. Likelihood, AIC, BIC and likelihood ratio are taken where the simulator itself (not its emulator)
+#' has the least squared error within the priors, as if errors were independent and normal with one unknown variance: k
+#' counts the parameters and that variance, as `AIC()` of an [lm()] does. The likelihood ratio is that against the last
+#' earlier model that is nested: whose parameters all stand in this one with the same priors. By names alone it cannot
+#' be known whether the smaller model is a special case of the larger within the priors; where an added parameter ends
+#' at the edge of its range the chi-square distribution of the statistic does not hold, and `lr_note` says so. None of
+#' these criteria knows that a simulation has a discrepancy; `autocorrelation` (of the least-squares errors at one step)
+#' shows how far they are from the independence that they take for granted.
 #'
 #' @param models A named list of simulators.
 #' @param measurements The [measurements()].
 #' @param method `"paper"`: [calibrate_paper()] with its variance index; `"history"`: [calibrate()] and
 #'   [attribute_discrepancy()].
 #' @param runs Runs of the simulator for each model.
-#' @param control List of lists: `emulator`, `calibration` and `attribution` (of `"history"` only), as the stages take them.
-#' @param truth Of a synthetic record: a list of the `simulator` and the named `values` that made it, to be marked in tables
-#'   and figures; `NULL` if it is not known.
+#' @param control List of lists: `emulator`, `calibration` and `attribution` (of `"history"` only), as the stages take
+#'   them.
+#' @param truth Of a synthetic record: a list of the `simulator` and the named `values` that made it, to be marked in
+#'   tables and figures; `NULL` if it is not known.
 #' @inheritParams upgrade_model
-#' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`, `attribution`, `prediction`, `scores`,
-#'   `best` (the least-squares parameters) and, of a [zone()], draws of its `heat_loss` coefficient), and the tables that
-#'   `tidy()` gives:
-#'   * `"evidence"`: `log10_evidence` with its interval, `trusted`, `log10_bf` against the model that is next best, with its
-#'     interval and `word`, `log10_bf_first` against the first model of the list, posterior `probability`, and `rank`;
-#'   * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`, `aic`, `bic`, `nested`, `lr`,
-#'     `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`;
+#' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`, `attribution`, `prediction`,
+#'   `scores`, `best` (the least-squares parameters) and, of a [zone()], draws of its `heat_loss` coefficient), and the
+#'   tables that `tidy()` gives:
+#' * `"evidence"`: `log10_evidence` with its interval, `trusted`, `log10_bf` against the model that is next best, with
+#'     its interval and `word`, `log10_bf_first` against the first model of the list, posterior `probability`, and
+#'     `rank`;
+#' * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`, `aic`, `bic`, `nested`,
+#'     `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`;
 #'   * `"ranking"`: the rank of each model by each criterion;
 #'   * `"attribution"` and `"parameters"`, with the column `model`.
 #' @examples
@@ -49,7 +51,8 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #'                control = list(calibration = list(ais = list(pilot_chains = 48, groups = 4))))
 #' @seealso [heat_loss_coefficient()], [report()], [figures]
 #' @export
-compare_models <- function(models, measurements, method = c("paper", "history"), runs = 150, control = NULL, seed = NULL, threads = 1,
+compare_models <- function(models, measurements, method = c("paper", "history"), runs = 150, control = NULL,
+                           seed = NULL, threads = 1,
                            quiet = FALSE, checkpoint = NULL, truth = NULL) {
   check_models(models)
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
@@ -61,10 +64,12 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   for (model in models) check_enough_runs(runs, length(free_parameters(model)))
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
-  settings <- list(calibrate = switch(method, paper = calibrate_paper, history = calibrate), measurements = measurements, runs = runs,
+  settings <- list(calibrate = switch(method, paper = calibrate_paper, history = calibrate),
+                   measurements = measurements, runs = runs,
                    control = control, seed = seed, threads = threads)
   say <- progress(quiet)
-  settings$keep <- checkpoint_keeper(checkpoint, c(settings[c("measurements", "runs", "control", "seed")], method = method))
+  settings$keep <- checkpoint_keeper(checkpoint,
+                                     c(settings[c("measurements", "runs", "control", "seed")], method = method))
   compared <- sapply(names(models), function(name) {
     say("Calibrating {.strong {name}}")
     model <- compared_model(models[[name]], name, settings)
@@ -75,14 +80,16 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   tables$ranking <- ranking_table(tables)
   tables$attribution <- bind_models(compared, function(model) model$attribution)
   tables$parameters <- bind_models(compared, function(model) parameter_rows(model$fit))
-  structure(list(format_version = format_version, method = method, models = compared, tables = tables, measurements = measurements,
+  structure(list(format_version = format_version, method = method, models = compared, tables = tables,
+                 measurements = measurements,
                  truth = truth, seed = seed, control = control), class = "amiss_comparison")
 }
 
 fill_comparison_control <- function(control, measurements, method, call = rlang::caller_env()) {
   control <- merge_control(comparison_control, control, call = call)
   if (method == "paper" && length(control$attribution)) {
-    abort_input(c("{.arg control$attribution} belongs to {.code method = \"history\"}.", i = "The paper's index comes with its calibration: leave it out."),
+    abort_input(c("{.arg control$attribution} belongs to {.code method = \"history\"}.",
+                  i = "The paper's index comes with its calibration: leave it out."),
                 call = call)
   }
   check_stage_controls(control, measurements, method, call)
@@ -91,13 +98,16 @@ fill_comparison_control <- function(control, measurements, method, call = rlang:
 
 compared_model <- function(simulator, name, settings) {
   fit <- rlang::try_fetch(fit_model(simulator, name, settings), amiss_error = function(e) {
-    rlang::abort(paste0("Model \"", name, "\" could not be calibrated."), parent = e, class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
+    rlang::abort(paste0("Model \"", name, "\" could not be calibrated."), parent = e,
+                 class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
   })
   settings$keep(list("compared", name, plain(simulator)), {
     attribution <- if (inherits(fit, "amiss_paper_calibration")) fit$index
-                   else attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)$table
+                   else attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
+                                              threads = settings$threads)$table
     prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)
-    list(name = name, fit = fit, attribution = attribution, prediction = prediction, scores = prediction_scores(prediction),
+    list(name = name, fit = fit, attribution = attribution, prediction = prediction,
+         scores = prediction_scores(prediction),
          best = least_squares(fit, settings$threads), heat_loss = posterior_heat_loss(fit))
   })
 }
@@ -133,22 +143,29 @@ evidence_table <- function(models) {
   rival <- integer(length(models))
   rival[order] <- if (length(models) > 1) c(order[2], order[-length(order)]) else NA
   factors <- do.call(rbind, lapply(seq_along(models), function(i) {
-    if (is.na(rival[i])) data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_, word = NA_character_) else against(i, rival[i])
+    if (is.na(rival[i])) data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_,
+                                    word = NA_character_) else against(i, rival[i])
   }))
-  data.frame(model = names(models), log10_evidence = value / ten, lower95 = interval[1, ] / ten, upper95 = interval[2, ] / ten,
-             trusted = vapply(models, function(m) m$fit$trust$trusted, NA), against = names(models)[rival], log10_bf = factors$log10_bf,
+  data.frame(model = names(models), log10_evidence = value / ten, lower95 = interval[1, ] / ten,
+             upper95 = interval[2, ] / ten,
+             trusted = vapply(models, function(m) m$fit$trust$trusted, NA), against = names(models)[rival],
+             log10_bf = factors$log10_bf,
              bf_lower95 = factors$lower95, bf_upper95 = factors$upper95, word = factors$word,
-             log10_bf_first = (value - value[1]) / ten, probability = exp(value - max(value)) / sum(exp(value - max(value))),
+             log10_bf_first = (value - value[1]) / ten,
+             probability = exp(value - max(value)) / sum(exp(value - max(value))),
              rank = rank(-value), row.names = NULL)
 }
 
 criteria_table <- function(models) {
   criteria <- do.call(rbind, lapply(models, function(m) likelihood_criteria(m$best)))
   ratios <- do.call(rbind, lapply(seq_along(models), function(i) likelihood_ratio(models, criteria, i)))
-  correlation <- vapply(models, function(m) lag_correlation(m$best$error, segment_starts(m$fit$measurements, m$fit$rows)), 0)
+  correlation <- vapply(models,
+                        function(m) lag_correlation(m$best$error, segment_starts(m$fit$measurements, m$fit$rows)), 0)
   score <- function(use) vapply(models, function(m) m$scores[[use]][["rmse"]], 0)
-  data.frame(model = names(models), rmse_calibration = score("calibrate"), rmse_validation = score("validate"), criteria, ratios,
-             autocorrelation = correlation, converged = vapply(models, function(m) m$best$converged, NA), row.names = NULL)
+  data.frame(model = names(models), rmse_calibration = score("calibrate"), rmse_validation = score("validate"),
+             criteria, ratios,
+             autocorrelation = correlation, converged = vapply(models, function(m) m$best$converged, NA),
+             row.names = NULL)
 }
 
 criterion_names <- c(evidence = "evidence", rmse_calibration = "RMSE in calibration", rmse_validation = "RMSE held out",
@@ -157,8 +174,10 @@ criterion_names <- c(evidence = "evidence", rmse_calibration = "RMSE in calibrat
 # Ranks by each criterion, 1 the best.
 ranking_table <- function(tables) {
   criteria <- tables$criteria
-  ranks <- data.frame(model = criteria$model, evidence = tables$evidence$rank, rmse_calibration = rank(criteria$rmse_calibration),
-                      rmse_validation = rank(criteria$rmse_validation, na.last = "keep"), log_likelihood = rank(-criteria$log_likelihood),
+  ranks <- data.frame(model = criteria$model, evidence = tables$evidence$rank,
+                      rmse_calibration = rank(criteria$rmse_calibration),
+                      rmse_validation = rank(criteria$rmse_validation, na.last = "keep"),
+                      log_likelihood = rank(-criteria$log_likelihood),
                       aic = rank(criteria$aic), bic = rank(criteria$bic))
   ranks[vapply(ranks, function(x) !all(is.na(x)), NA)]
 }
@@ -234,20 +253,26 @@ model_doubts <- function(model) {
   fit <- model$fit
   emulator <- fit$emulator
   noise <- fit$measurements$noise_sd
-  beside <- function(size) sprintf("%s beside a noise of %s %s", short(size), short(noise), pretty_unit(fit$measurements$unit))
+  beside <- function(size) sprintf("%s beside a noise of %s %s", short(size), short(noise),
+                                   pretty_unit(fit$measurements$unit))
   c(if (!fit$trust$trusted) sprintf("the evidence is rough (%s).", fit$trust$verdict),
     if (emulator$basis$discarded_rms > 0.5 * noise) {
-      sprintf("the basis is coarse; what it leaves out of the runs (%s) looks like discrepancy.", beside(emulator$basis$discarded_rms))
+      sprintf("the basis is coarse; what it leaves out of the runs (%s) looks like discrepancy.",
+              beside(emulator$basis$discarded_rms))
     },
-    if (emulator$diagnostics$series_rmse > 0.5 * noise) sprintf("the emulator is rough (leave-one-out error %s).", beside(emulator$diagnostics$series_rmse)),
-    if (!model$best$converged) "the search for the least squares did not settle; its likelihood is a lower bound, and with it AIC and BIC are upper ones.")
+    if (emulator$diagnostics$series_rmse > 0.5 * noise)
+      sprintf("the emulator is rough (leave-one-out error %s).", beside(emulator$diagnostics$series_rmse)),
+    if (!model$best$converged)
+      "the search for the least squares did not settle; its likelihood is a lower bound, and with it AIC and BIC are upper ones.")
 }
 
 evidence_sentences <- function(comparison) {
   table <- comparison$tables$evidence
   best <- table[which.min(table$rank), ]
-  if (nrow(table) < 2) return(sprintf("log10 evidence of %s: %s [%s, %s].", best$model, signed(best$log10_evidence), signed(best$lower95), signed(best$upper95)))
-  sprintf("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s [%s, %s]; it holds %s of the probability.", best$model, best$against,
+  if (nrow(table) < 2) return(sprintf("log10 evidence of %s: %s [%s, %s].", best$model, signed(best$log10_evidence),
+                                      signed(best$lower95), signed(best$upper95)))
+  sprintf("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s [%s, %s]; it holds %s of the probability.",
+          best$model, best$against,
           best$word, signed(best$log10_bf), signed(best$bf_lower95), signed(best$bf_upper95), percent(best$probability))
 }
 
@@ -256,8 +281,10 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
   evidence <- x$tables$evidence
   criteria <- x$tables$criteria
   held_out <- !all(is.na(criteria$rmse_validation))
-  interval <- sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95, evidence$upper95, ifelse(evidence$trusted, "", " ?"))
-  table <- data.frame(model = evidence$model, log10_L = interval, P = sprintf("%.3f", evidence$probability), RMSE = short(criteria$rmse_calibration, 3))
+  interval <- sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95, evidence$upper95,
+                      ifelse(evidence$trusted, "", " ?"))
+  table <- data.frame(model = evidence$model, log10_L = interval, P = sprintf("%.3f", evidence$probability),
+                      RMSE = short(criteria$rmse_calibration, 3))
   if (held_out) table$held_out <- short(criteria$rmse_validation, 3)
   p_value <- ifelse(is.na(criteria$lr_p_value), "", format.pval(criteria$lr_p_value, 2, eps = 1e-4))
   table <- cbind(table, AIC = round(criteria$aic), BIC = round(criteria$bic), LR_p = p_value)
@@ -265,7 +292,8 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
   shown <- utils::head(order(evidence$rank), 6)
   say_table(table[sort(shown), ])
   doubts <- length(doubt_sentences(x))
-  told <- c(evidence_sentences(x), utils::head(disagreement_sentences(x), 1), if (doubts) paste0("Doubts: ", doubts, "; summary() tells them."))
+  told <- c(evidence_sentences(x), utils::head(disagreement_sentences(x), 1),
+            if (doubts) paste0("Doubts: ", doubts, "; summary() tells them."))
   cli::cli_bullets(stats::setNames(gsub("([{}])", "\\1\\1", told), rep("*", length(told))))
   cli::cli_bullets(c(">" = "next: {.fun summary}, {.fun tidy}, {.fun plot} or {.fun report}"))
 })
@@ -302,8 +330,10 @@ tidy.amiss_comparison <- function(x, what = "evidence", ...) {
 glance.amiss_comparison <- function(x, ...) {
   rlang::check_dots_empty()
   best <- x$tables$evidence[which.min(x$tables$evidence$rank), ]
-  data.frame(best[c("model", "log10_evidence", "lower95", "upper95", "against", "log10_bf", "word", "probability", "trusted")],
-             models = length(x$models), n = length(x$models[[1]]$fit$rows), disagreements = length(disagreements(x)) + nrow(ratio_disagreements(x)), row.names = NULL)
+  data.frame(best[c("model", "log10_evidence", "lower95", "upper95", "against", "log10_bf", "word", "probability",
+                    "trusted")],
+             models = length(x$models), n = length(x$models[[1]]$fit$rows),
+             disagreements = length(disagreements(x)) + nrow(ratio_disagreements(x)), row.names = NULL)
 }
 
 check_models <- function(models, call = rlang::caller_env()) {
@@ -324,10 +354,12 @@ check_truth <- function(truth, call = rlang::caller_env()) {
   check_input(checkmate::check_subset(c("simulator", "values"), names(truth)), "truth",
               "Give a list of a {.code simulator} and its {.code values}.", call = call)
   check_simulator(truth$simulator, call)
-  check_input(checkmate::check_numeric(truth$values, finite = TRUE, any.missing = FALSE, names = "unique"), "truth$values", call = call)
+  check_input(checkmate::check_numeric(truth$values, finite = TRUE, any.missing = FALSE, names = "unique"),
+              "truth$values", call = call)
   absent <- setdiff(names(free_parameters(truth$simulator)), names(truth$values))
   if (length(absent)) {
-    abort_input(c("{.arg truth$values} has no value for {.val {absent}}.", i = "Name a value for every free parameter of {.arg truth$simulator}."),
+    abort_input(c("{.arg truth$values} has no value for {.val {absent}}.",
+                  i = "Name a value for every free parameter of {.arg truth$simulator}."),
                 call = call)
   }
 }

@@ -24,8 +24,8 @@ warn_result <- function(message, .envir = parent.frame()) {
   cli::cli_warn(message, class = c("amiss_warning_result", "amiss_warning"), .envir = .envir)
 }
 
-# The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own condition. The value that it
-# checks, its first argument, is told.
+# The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own condition. The value that
+# it checks, its first argument, is told.
 check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) {
   check <- substitute(verdict)
   checks <- is.call(check) && is.call(check[[1]]) && identical(check[[1]][[2]], quote(checkmate))

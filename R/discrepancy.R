@@ -1,7 +1,7 @@
 #' The discrepancy over time
 #'
-#' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean of its parameters, and the
-#' whole response to the boundary conditions that the model lacks, with a 95 % band.
+#' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean of its parameters,
+#' and the whole response to the boundary conditions that the model lacks, with a 95 % band.
 #'
 #' Of a calibration as in the paper the discrepancy is that of equation 8, at the same time step; its band takes the
 #' fictitious condition, which explains nothing, for constant.
@@ -34,7 +34,8 @@ discrepancy <- function(fit) {
   new_discrepancy(fit, rowMeans(draws), limits[1, ], limits[2, ], responses)
 }
 
-# Response to the boundary conditions for each kept draw (rows x draws), given the filter bank and simulator_moves() at these rows.
+# Response to the boundary conditions for each kept draw (rows x draws), given the filter bank and simulator_moves() at
+# these rows.
 lacking_response <- function(fit, responses, moves) {
   phi <- sweep(sweep(responses, 2, fit$centre), 2, fit$scale, "/")
   phi %*% fit$coefficients - moves %*% fit$withheld
@@ -56,10 +57,12 @@ paper_discrepancy <- function(fit, draws = 24) {
   own <- fit$hyperparameters
   picked <- systematic_draws(own$weights, draws)
   means <- paper_discrepancy_(paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
-                              list(alpha = own$alpha[picked, , drop = FALSE], t2 = own$t2[picked], lambda = own$lambda[picked]))
+                              list(alpha = own$alpha[picked, , drop = FALSE], t2 = own$t2[picked],
+                                   lambda = own$lambda[picked]))
   x <- scaled_conditions(fit$measurements, fit$rows)
   basis <- qr.Q(qr(fit$emulator$basis$vectors))
-  within <- vapply(picked, function(i) conditional_variance(x, basis, own$alpha[i, ], own$t2[i], own$lambda[i]), numeric(nrow(x)))
+  within <- vapply(picked, function(i) conditional_variance(x, basis, own$alpha[i, ], own$t2[i], own$lambda[i]),
+                   numeric(nrow(x)))
   mean <- rowMeans(means)
   sd <- sqrt(rowMeans(within) + rowMeans((means - mean)^2))
   new_discrepancy(fit, mean, mean - 1.96 * sd, mean + 1.96 * sd)

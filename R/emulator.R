@@ -1,4 +1,5 @@
-emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 30, selection = "ard", significance = 0.05,
+emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 30, selection = "ard",
+                         significance = 0.05,
                          s2 = c(1, 1), eta2 = c(1, 1), beta = c(1, 1), lambda = c(2, NA), starts = 3, searches = 1,
                          max_evaluations = 120)
 
@@ -7,51 +8,53 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 #' The runs are put on a basis (singular vectors of the centred runs and a vector of ones) and each
 #' coefficient gets a Gaussian process over the parameters.
 #'
-#' *Mode.* The hyper-parameters, before variances are widened (*Errors*), are those of the greatest joint density (equation 3 of the paper): likelihood times
-#' priors, as a density of `s2`, `eta2`, `beta` (all in (0, 1)) and `lambda` themselves. The search runs on logits and
-#' logarithms, but no Jacobian enters: with the uniform default priors, `s2`, `eta2` and `beta` are those of the greatest
-#' likelihood.
+#' *Mode.* The hyper-parameters, before variances are widened (*Errors*), are those of the greatest joint density
+#' (equation 3 of the paper): likelihood times priors, as a density of `s2`, `eta2`, `beta` (all in (0, 1)) and `lambda`
+#' themselves. The search runs on logits and logarithms, but no Jacobian enters: with the uniform default priors, `s2`,
+#' `eta2` and `beta` are those of the greatest likelihood.
 #'
-#' *Selection.* `"ard"` gives each parameter its own `beta` at once. `"forward"` is the forward selection of Welch et al.
-#' (1992): all parameters share one `beta`; at each stage each of those that still share it is given its own in turn,
-#' and the one that raises the joint density most keeps it. The selection ends when twice that rise is not significant
-#' as chi-squared with one degree of freedom at `significance / k`, the best of k candidates having been taken
-#' (Bonferroni). It is greedy and costs about 17 times as many evaluations; on the boxes of [paper_box()] its leave-one-out errors
-#' are about 2 % larger.
+#' *Selection.* `"ard"` gives each parameter its own `beta` at once. `"forward"` is the forward selection of Welch et
+#' al. (1992): all parameters share one `beta`; at each stage each of those that still share it is given its own in
+#' turn, and the one that raises the joint density most keeps it. The selection ends when twice that rise is not
+#' significant as chi-squared with one degree of freedom at `significance / k`, the best of k candidates having been
+#' taken (Bonferroni). It is greedy and costs about 17 times as many evaluations; on the boxes of [paper_box()] its
+#' leave-one-out errors are about 2 % larger.
 #'
 #' *Errors.* A run's coefficient varies about the smooth part of its process by the nugget and `1 / lambda`, as those of
 #' the training runs do: both belong to the variance of a prediction and of a run left out. The series of a run also
 #' holds what the basis leaves out. Its standard deviation at each step, `basis$discarded_sd`, comes from the training
 #' runs; as the basis was chosen with them, it is raised by `M / (M - Q + 1)`, as in generalised cross-validation
-#' (Golub, Heath and Wahba 1979). The mode ignores the uncertainty of the hyper-parameters and that the covariance function
-#' is only a model: where the leave-one-out errors of a coefficient are larger than stated, all its variances are multiplied by
-#' the mean square of these errors in units of their standard deviations (Bachoc 2013). Means stay as they are. These errors are
-#' of hyper-parameters that have not seen the run left out: those of the mode, moved by one Newton step away from the density of
-#' that run (infinitesimal jackknife with the run's leverage; average information of Gilmour, Thompson and Cullis 1995). At the
-#' mode itself they would be too small (`bench/emulator_coverage.R`).
+#' (Golub, Heath and Wahba 1979). The mode ignores the uncertainty of the hyper-parameters and that the covariance
+#' function is only a model: where the leave-one-out errors of a coefficient are larger than stated, all its variances
+#' are multiplied by the mean square of these errors in units of their standard deviations (Bachoc 2013). Means stay as
+#' they are. These errors are of hyper-parameters that have not seen the run left out: those of the mode, moved by one
+#' Newton step away from the density of that run (infinitesimal jackknife with the run's leverage; average information
+#' of Gilmour, Thompson and Cullis 1995). At the mode itself they would be too small (`bench/emulator_coverage.R`).
 #'
 #' @param ensemble An ensemble: [simulate_design()] or [ensemble()].
 #' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know it: the basis
 #'   is kept fine enough that what it discards lies below it.
 #' @param control List of options: `explained` (share of variance kept, 0.99), `noise_fraction` (discarded RMS as a
 #'   share of the noise, 0.05), `max_vectors` (30); `selection` (`"ard"` or `"forward"`) and its `significance` (0.05);
-#'   `s2`, `eta2` and `beta`, the two shapes of their beta priors (each at least 1; `c(1, 1)`, uniform), and `lambda`, shape
-#'   a and rate b (squared unit of the outputs) of the gamma prior of the noise precision (`c(2, NA)`; `NA` is the square
-#'   root of the machine epsilon times the square of the largest singular value: where the basis leaves nothing
-#'   out, noise at each step of 1.7e-4 of the runs' RMS); `starts`, `searches` and `max_evaluations` of the
-#'   gradient search.
+#'   `s2`, `eta2` and `beta`, the two shapes of their beta priors (each at least 1; `c(1, 1)`, uniform), and `lambda`,
+#'   shape a and rate b (squared unit of the outputs) of the gamma prior of the noise precision (`c(2, NA)`; `NA` is the
+#'   square root of the machine epsilon times the square of the largest singular value: where the basis leaves nothing
+#'   out, noise at each step of 1.7e-4 of the runs' RMS); `starts`, `searches` and `max_evaluations` of the gradient
+#'   search.
 #' @param threads Number of threads; results do not depend on it.
-#' @return An object of class `amiss_emulator`: `basis`, `processes`, `selection` (data frame of the steps of the forward
-#'   selection: `vector`, `step`, `parameter`, `gain` of the log density), `diagnostics`, all leave-one-out, of hyper-parameters that have not seen the run (*Errors*; `coefficients`, with
-#'   `r2` and `coverage95` of each and the factor by which its variances were `widened`; `coverage95`, after widening, of all coefficients; `series_rmse`, `series_r2` and `series_coverage95` of
-#'   the reconstructed series), and `trust` (`trusted`, and `verdict`: what is wrong with it). `tidy()` gives one row for
-#'   each coefficient and parameter: its `beta` and, after forward selection, the `step` in which it got its own.
-#' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models with
-#'   high-dimensional outputs and boundary conditions. Welch, Buck, Sacks, Wynn, Mitchell and Morris (1992), Screening,
-#'   predicting, and computer experiments, Technometrics 34, 15-25. Bachoc (2013), Cross validation and maximum likelihood
-#'   estimations of hyper-parameters of Gaussian processes with model misspecification, Computational Statistics and Data
-#'   Analysis 66, 55-69. Gilmour, Thompson and Cullis (1995), Average information REML, Biometrics 51, 1440-1450. Giordano, Stephenson,
-#'   Liu, Jordan and Broderick (2019), A Swiss army infinitesimal jackknife, AISTATS.
+#' @return An object of class `amiss_emulator`: `basis`, `processes`, `selection` (data frame of the steps of the
+#'   forward selection: `vector`, `step`, `parameter`, `gain` of the log density), `diagnostics`, all leave-one-out, of
+#'   hyper-parameters that have not seen the run (*Errors*; `coefficients`, with `r2` and `coverage95` of each and the
+#'   factor by which its variances were `widened`; `coverage95`, after widening, of all coefficients; `series_rmse`,
+#'   `series_r2` and `series_coverage95` of the reconstructed series), and `trust` (`trusted`, and `verdict`: what is
+#'   wrong with it). `tidy()` gives one row for each coefficient and parameter: its `beta` and, after forward selection,
+#'   the `step` in which it got its own.
+#' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models with high-dimensional
+#'   outputs and boundary conditions. Welch, Buck, Sacks, Wynn, Mitchell and Morris (1992), Screening, predicting, and
+#'   computer experiments, Technometrics 34, 15-25. Bachoc (2013), Cross validation and maximum likelihood estimations
+#'   of hyper-parameters of Gaussian processes with model misspecification, Computational Statistics and Data Analysis
+#'   66, 55-69. Gilmour, Thompson and Cullis (1995), Average information REML, Biometrics 51, 1440-1450. Giordano,
+#'   Stephenson, Liu, Jordan and Broderick (2019), A Swiss army infinitesimal jackknife, AISTATS.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -69,7 +72,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   if (inherits(noise_sd, "amiss_measurements")) {
     rows <- used_rows(noise_sd, "calibrate")
     if (nrow(ensemble$outputs) != length(rows)) {
-      abort_input(c("The runs have {nrow(ensemble$outputs)} steps and the measurements {length(rows)} calibration rows.",
+      abort_input(
+        c("The runs have {nrow(ensemble$outputs)} steps and the measurements {length(rows)} calibration rows.",
                     i = "Give the runs at exactly these rows."))
     }
     check_same_rows(ensemble$hours, noise_sd)
@@ -82,7 +86,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   check_training_size(ncol(ensemble$outputs), "ensemble (runs)")
   basis <- call_engine(make_basis_(ensemble$outputs, c(control, noise_sd = noise_sd)))
   basis$discarded_sd <- discarded_sd(basis, ensemble$outputs)
-  trained <- call_engine(train_emulator_(region_inputs(ensemble$region, ensemble$unit), basis, control, engine_context(1, threads)))
+  trained <- call_engine(train_emulator_(region_inputs(ensemble$region, ensemble$unit), basis, control,
+                                         engine_context(1, threads)))
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   if (basis$discarded_rms > noise_sd && noise_sd > 0) {
     warn_result(c("The basis of {ncol(basis$vectors)} vectors leaves {signif(basis$discarded_rms, 3)} of the runs unexplained (RMS), more than the noise of {signif(noise_sd, 3)}.",
@@ -91,11 +96,14 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   selection <- trained$selection
   selection$parameter <- names(ensemble$parameters)[selection$parameter]
   structure(list(format_version = format_version, parameters = ensemble$parameters, simulator = ensemble$simulator,
-                 basis = basis[c("vectors", "singular_values", "explained", "discarded_rms", "discarded_ss", "discarded_sd")],
+                 basis = basis[c("vectors", "singular_values", "explained", "discarded_rms", "discarded_ss",
+                                 "discarded_sd")],
                  processes = c(trained[c("inputs", "coefficients", "hyperparameters")], list(region = ensemble$region)),
                  unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
-                 left_out = list(error = trained$coefficients - trained$loo_mean, variance = trained$loo_variance), selection = selection,
-                 diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble), control = control,
+                 left_out = list(error = trained$coefficients - trained$loo_mean, variance = trained$loo_variance),
+                 selection = selection,
+                 diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble),
+                 control = control,
                  hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
                  noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
 }
@@ -112,22 +120,27 @@ fill_emulator_control <- function(control, what = "control", call = rlang::calle
   control <- merge_control(emulator_control, control, what, call = call)
   named <- function(option) paste0(what, "$", option)
   check_input(checkmate::check_number(control$explained, lower = 1e-6, upper = 1), named("explained"), call = call)
-  check_input(checkmate::check_number(control$noise_fraction, lower = 1e-12, finite = TRUE), named("noise_fraction"), call = call)
+  check_input(checkmate::check_number(control$noise_fraction, lower = 1e-12, finite = TRUE), named("noise_fraction"),
+              call = call)
   check_input(checkmate::check_int(control$max_vectors, lower = 2, upper = 1e4), named("max_vectors"), call = call)
   check_input(checkmate::check_int(control$starts, lower = 1, upper = 1e4), named("starts"), call = call)
   check_input(checkmate::check_int(control$searches, lower = 1, upper = control$starts), named("searches"),
               "There can be no more searches than {.code starts}.", call = call)
-  check_input(checkmate::check_int(control$max_evaluations, lower = 1, upper = 1e6), named("max_evaluations"), call = call)
+  check_input(checkmate::check_int(control$max_evaluations, lower = 1, upper = 1e6), named("max_evaluations"),
+              call = call)
   check_input(checkmate::check_choice(control$selection, c("ard", "forward")), named("selection"), call = call)
-  check_input(checkmate::check_number(control$significance, lower = 1e-12, upper = 0.5), named("significance"), call = call)
+  check_input(checkmate::check_number(control$significance, lower = 1e-12, upper = 0.5), named("significance"),
+              call = call)
   for (prior in c("s2", "eta2", "beta")) {
-    check_input(checkmate::check_numeric(control[[prior]], lower = 1, finite = TRUE, len = 2, any.missing = FALSE), named(prior),
+    check_input(checkmate::check_numeric(control[[prior]], lower = 1, finite = TRUE, len = 2, any.missing = FALSE),
+                named(prior),
                 "Give the two shapes of a beta distribution; below 1 its density has no greatest value.", call = call)
   }
   check_input(checkmate::check_numeric(control$lambda, lower = 0, finite = TRUE, len = 2), named("lambda"),
               "Give shape and rate of a gamma distribution; the rate may be NA.", call = call)
   lambda <- as.numeric(control$lambda)
-  if (is.na(lambda[1]) || lambda[1] <= 0) abort_input("The shape of {.arg {named('lambda')}} must be positive; got {.val {lambda[1]}}.", call = call)
+  if (is.na(lambda[1]) || lambda[1] <= 0)
+    abort_input("The shape of {.arg {named('lambda')}} must be positive; got {.val {lambda[1]}}.", call = call)
   control$lambda <- lambda
   control
 }
@@ -150,7 +163,8 @@ emulator_diagnostics <- function(trained, basis, outputs) {
   r2 <- 1 - colSums(error^2) / pmax(colSums(scale(trained$coefficients, scale = FALSE)^2), .Machine$double.xmin)
   covered <- within95(error, trained$loo_variance)
   series <- tcrossprod(basis$vectors, error) + discarded_part(basis, outputs)
-  list(coefficients = data.frame(vector = seq_len(ncol(error)), r2 = r2, coverage95 = colMeans(covered), widened = trained$widened), coverage95 = mean(covered),
+  list(coefficients = data.frame(vector = seq_len(ncol(error)), r2 = r2, coverage95 = colMeans(covered),
+                                 widened = trained$widened), coverage95 = mean(covered),
        series_rmse = sqrt(mean(series^2)), series_r2 = 1 - sum(series^2) / sum((outputs - rowMeans(outputs))^2),
        series_coverage95 = mean(within95(series, series_variance(basis, trained$loo_variance))))
 }
@@ -179,7 +193,8 @@ print.amiss_emulator <- function(x, ...) on_stdout(x, {
   cli::cli_bullets(c("*" = "left out: {signif(x$basis$discarded_rms, 2)} RMS beside a noise of {signif(x$noise_sd, 2)}",
                      "*" = "leave-one-out: series R2 {round(d$series_r2, 5)}, RMSE {signif(d$series_rmse, 2)}; 95 % intervals hold {round(100 * d$coverage95, 1)} % of the coefficients, {round(100 * d$series_coverage95, 1)} % of the series"))
   if (x$control$selection == "forward") {
-    own <- vapply(seq_len(ncol(x$basis$vectors)), function(q) paste(x$selection$parameter[x$selection$vector == q], collapse = ", "), "")
+    own <- vapply(seq_len(ncol(x$basis$vectors)),
+                  function(q) paste(x$selection$parameter[x$selection$vector == q], collapse = ", "), "")
     shown <- seq_len(min(length(own), 8))
     cli::cli_bullets(c("*" = "own beta by forward selection, in order, of {length(x$parameters)} parameters:"))
     cli::cli_verbatim(sprintf("    vector %d: %s", shown, ifelse(nzchar(own[shown]), own[shown], "none")))
@@ -195,7 +210,8 @@ tidy.amiss_emulator <- function(x, ...) {
   p <- length(x$parameters)
   table <- data.frame(vector = rep(seq_len(q), each = p), parameter = rep(names(x$parameters), q),
                       beta = stats::plogis(as.numeric(t(x$processes$hyperparameters[, -(1:3), drop = FALSE]))))
-  table$step <- x$selection$step[match(paste(table$vector, table$parameter), paste(x$selection$vector, x$selection$parameter))]
+  table$step <- x$selection$step[match(paste(table$vector, table$parameter),
+                                       paste(x$selection$vector, x$selection$parameter))]
   table
 }
 
@@ -230,7 +246,8 @@ predict.amiss_emulator <- function(object, newdata, ...) {
                     i = "The emulator knows nothing there; run the simulator."))
     }
   }
-  unit <- vapply(names(object$parameters), function(n) prior_cdf(object$parameters[[n]]$prior, newdata[, n]), numeric(nrow(newdata)))
+  unit <- vapply(names(object$parameters), function(n) prior_cdf(object$parameters[[n]]$prior, newdata[, n]),
+                 numeric(nrow(newdata)))
   unit <- matrix(unit, nrow(newdata))
   beyond <- which(!in_region(object$processes$region, unit))
   if (length(beyond)) {

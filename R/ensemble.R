@@ -24,7 +24,8 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
   check_run_number(runs, length(measurements$raw$hours))
   threads <- check_threads(threads)
   parameters <- free_parameters(simulator)
-  if (!length(parameters)) abort_input(c("The simulator has no free parameter.", i = "Replace a number by {.fun free}."))
+  if (!length(parameters))
+    abort_input(c("The simulator has no free parameter.", i = "Replace a number by {.fun free}."))
   check_enough_runs(runs, length(parameters))
   seed <- pick_seed(seed)
   unit <- with_seed(seed, lhs::randomLHS(runs, length(parameters)))
@@ -35,12 +36,12 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 
 #' More runs where they matter
 #'
-#' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an emulator
-#' of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior lies: the
-#' ellipsoid that holds it, in the coordinates in which the priors are standard normal. Its runs follow the
-#' axes of the ellipsoid and fill it evenly; runs of `ensemble` that lie inside join them, the last 40. An emulator of them holds in the region
-#' alone, and there a few dozen runs do what hundreds spread over the priors cannot. Parameters outside count as
-#' impossible; if the posterior comes near the end of the region, the check of [calibrate()] says so.
+#' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an
+#' emulator of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior
+#' lies: the ellipsoid that holds it, in the coordinates in which the priors are standard normal. Its runs follow the
+#' axes of the ellipsoid and fill it evenly; runs of `ensemble` that lie inside join them, the last 40. An emulator of
+#' them holds in the region alone, and there a few dozen runs do what hundreds spread over the priors cannot. Parameters
+#' outside count as impossible; if the posterior comes near the end of the region, the check of [calibrate()] says so.
 #'
 #' @param ensemble An ensemble made by [simulate_design()], or by this.
 #' @param fit A calibration with the emulator trained on it ([calibrate()]).
@@ -74,11 +75,13 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
     abort_input("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the ensemble {.val {names(ensemble$parameters)}}.")
   }
   if (nrow(ensemble$outputs) != length(fit$rows)) {
-    abort_input(c("{.arg fit} was made on {length(fit$rows)} rows, the runs of {.arg ensemble} have {nrow(ensemble$outputs)}.",
+    abort_input(
+      c("{.arg fit} was made on {length(fit$rows)} rows, the runs of {.arg ensemble} have {nrow(ensemble$outputs)}.",
                   i = "Give the ensemble and the calibration of the same measurements."))
   }
   check_same_rows(ensemble$hours, fit$measurements)
-  regional_ensemble(ensemble, posterior_region(fit, if (isTRUE(fit$check$border > largest_border_share)) 1.5 else 1), fit, runs, threads)
+  regional_ensemble(ensemble, posterior_region(fit, if (isTRUE(fit$check$border > largest_border_share)) 1.5 else 1),
+                    fit, runs, threads)
 }
 
 # The ensemble of a region of the parameters' space; `fit` knows the emulator over the priors.
@@ -88,14 +91,16 @@ regional_ensemble <- function(ensemble, region, fit, runs, threads) {
   outputs <- simulate_measured(ensemble$simulator, values, fit$measurements, "calibrate", threads)
   # The last of the runs that lie inside: those of checks, where the posterior was seen last.
   own <- utils::tail(which(in_region(region, ensemble$unit)), 40)
-  new_ensemble(ensemble$parameters, rbind(ensemble$unit[own, , drop = FALSE], unit), rbind(ensemble$values[own, , drop = FALSE], values),
+  new_ensemble(ensemble$parameters, rbind(ensemble$unit[own, , drop = FALSE], unit),
+               rbind(ensemble$values[own, , drop = FALSE], values),
                cbind(ensemble$outputs[, own, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
                without_simulator(emulator_over_priors(fit$emulator)), hours = ensemble$hours)
 }
 
 # The ensemble with more runs, of its own region.
 join_runs <- function(ensemble, unit, values, outputs) {
-  new_ensemble(ensemble$parameters, rbind(ensemble$unit, unit), rbind(ensemble$values, values), cbind(ensemble$outputs, outputs),
+  new_ensemble(ensemble$parameters, rbind(ensemble$unit, unit), rbind(ensemble$values, values),
+               cbind(ensemble$outputs, outputs),
                ensemble$simulator, ensemble$seed, ensemble$region, ensemble$over_priors, hours = ensemble$hours)
 }
 
@@ -111,9 +116,9 @@ without_simulator <- function(emulator) {
 #' rows, and [upgrade_model()] judges mechanisms by them, each another set of runs.
 #'
 #' With the `measurements`, `outputs` may hold their calibration rows, calibration and validation rows in the order of
-#' the record, all rows, or all rows of the data before they were averaged: then the runs are averaged alike. With `time`
-#' rows may stand in any order, and what the measurements do not use may be there too. Either way the ensemble keeps the
-#' times of its rows, and is refused for measurements of others.
+#' the record, all rows, or all rows of the data before they were averaged: then the runs are averaged alike. With
+#' `time` rows may stand in any order, and what the measurements do not use may be there too. Either way the ensemble
+#' keeps the times of its rows, and is refused for measurements of others.
 #'
 #' @param design Matrix of parameter values, one run a row, named columns.
 #' @param outputs Matrix of outputs, one run a column: at the calibration rows of the measurements, or as said below.
@@ -140,7 +145,8 @@ without_simulator <- function(emulator) {
 #' @export
 ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL, time = NULL) {
   if (is.data.frame(design)) design <- as.matrix(design)
-  check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"), "design")
+  check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"),
+              "design")
   check_all_finite(design, "design")
   storage.mode(design) <- "double"
   outputs <- check_runs(outputs, "outputs", nrow(design))
@@ -182,7 +188,8 @@ check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
 check_all_finite <- function(x, name, call = rlang::caller_env()) {
   bad <- which(!is.finite(x), arr.ind = TRUE)
   if (!nrow(bad)) return(invisible())
-  abort_input("{.arg {name}} is {x[bad[1, 1], bad[1, 2]]} in row {bad[1, 1]} of column {.val {colnames(x)[bad[1, 2]]}}; finite numbers are needed.", call = call)
+  abort_input("{.arg {name}} is {x[bad[1, 1], bad[1, 2]]} in row {bad[1, 1]} of column {.val {colnames(x)[bad[1, 2]]}}; finite numbers are needed.",
+              call = call)
 }
 
 check_design_columns <- function(columns, parameters, call = rlang::caller_env()) {
@@ -291,10 +298,12 @@ runs_by_time <- function(runs, hours, measurements, call) {
     wanted <- used_rows(m, use)
     absent <- wanted[is.na(rows[wanted])]
     if (!length(absent) || use == "validate" && length(absent) == length(wanted)) next
-    abort_input(c(paste("The runs lack {length(absent)} of the {length(wanted)} rows of the measurements that {use}; the",
+    abort_input(
+      c(paste("The runs lack {length(absent)} of the {length(wanted)} rows of the measurements that {use}; the",
                         "first is at {format(m$time[absent[1]])}."),
                   i = paste("The runs span {signif(min(hours), 8)} to {signif(max(hours), 8)} h and the measurements",
-                            "{signif(min(m$hours), 8)} to {signif(max(m$hours), 8)} h: check time zone and step.")), call = call)
+                            "{signif(min(m$hours), 8)} to {signif(max(m$hours), 8)} h: check time zone and step.")),
+                            call = call)
   }
   if (fine) averaged_runs(runs[raw, , drop = FALSE], m) else runs[rows, , drop = FALSE]
 }
@@ -339,21 +348,26 @@ uncovered_statement <- function(ensemble) {
   if (!length(little)) return(NULL)
   spans <- vapply(little, function(p) {
     span <- format(signif(range(ensemble$values[, p]), 4))
-    sprintf("%.0f %% of the prior of %s (from %s to %s)", 100 * share[p], names(ensemble$parameters)[p], trimws(span[1]), trimws(span[2]))
+    sprintf("%.0f %% of the prior of %s (from %s to %s)", 100 * share[p], names(ensemble$parameters)[p],
+            trimws(span[1]), trimws(span[2]))
   }, "")
   paste("the runs cover only", paste(spans, collapse = ", "))
 }
 
 check_enough_runs <- function(runs, parameters, of = runs, call = rlang::caller_env()) {
   if (runs < max(5, parameters + 2)) {
-    abort_input(c("{runs} run{?s} {?is/are} too few for {parameters} parameter{?s}; at least {max(5, parameters + 2)} are needed.",
+    abort_input(c(
+      "{runs} run{?s} {?is/are} too few for {parameters} parameter{?s}; at least {max(5, parameters + 2)} are needed.",
                   i = "Ten times the number of parameters is a good start.",
-                  if (of != runs) c(i = "Of the {of} runs asked for, {runs} fill the space of the parameters; the others lie where the posterior does ({.code control$refine}).")), call = call)
+                  if (of != runs)
+                    c(i = "Of the {of} runs asked for, {runs} fill the space of the parameters; the others lie where the posterior does ({.code control$refine}).")),
+                    call = call)
   }
 }
 
 unit_to_values <- function(unit, parameters) {
-  values <- vapply(seq_along(parameters), function(p) prior_quantile(parameters[[p]]$prior, unit[, p]), numeric(nrow(unit)))
+  values <- vapply(seq_along(parameters), function(p) prior_quantile(parameters[[p]]$prior, unit[, p]),
+                   numeric(nrow(unit)))
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
 }
 
@@ -379,7 +393,8 @@ new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, reg
     unit <- unit[-failed, , drop = FALSE]
     values <- values[-failed, , drop = FALSE]
   }
-  structure(list(format_version = format_version, parameters = parameters, unit = unit, values = values, outputs = outputs,
+  structure(list(format_version = format_version, parameters = parameters, unit = unit, values = values,
+                 outputs = outputs,
                  simulator = simulator, failed = length(failed), seed = seed, region = region,
                  over_priors = over_priors, hours = hours, held_out = held_out), class = "amiss_ensemble")
 }

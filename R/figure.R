@@ -3,7 +3,8 @@
 # The first and the last model, or the only one.
 upgrade_stages <- function(upgrade) {
   k <- length(upgrade$models)
-  if (k < 2) list("the model" = upgrade$models[[1]]) else list(before = upgrade$models[[1]], after = upgrade$models[[k]])
+  if (k < 2) list("the model" = upgrade$models[[1]]) else list(before = upgrade$models[[1]],
+                                                               after = upgrade$models[[k]])
 }
 
 # One table for each stage, bound with a factor `stage` in front.
@@ -29,20 +30,24 @@ figure_height <- function(figure, width = canvas_width) {
 # Where there is nothing to draw, the title says so.
 figure_of_nothing <- function(title) with_height(ggplot2::ggplot() + figure_titles(title) + figure_theme(), 1.5)
 
-stage_lines <- function() ggplot2::scale_linetype_manual(values = c("before" = "longdash", "after" = "solid", "the model" = "solid"))
+stage_lines <- function() ggplot2::scale_linetype_manual(values = c("before" = "longdash", "after" = "solid",
+                                                                    "the model" = "solid"))
 
 title_size <- 1.13  # of the letters
 subtitle_size <- 0.9
 
 figure_theme <- function() {
   ggplot2::theme_minimal(base_size = letter_points, base_family = figure_family()) +
-    ggplot2::theme(plot.title = ggplot2::element_text(face = "bold", size = ggplot2::rel(title_size), lineheight = 1.05),
-                   plot.subtitle = ggplot2::element_text(colour = "grey30", size = ggplot2::rel(subtitle_size), lineheight = 1.1),
+    ggplot2::theme(plot.title = ggplot2::element_text(face = "bold", size = ggplot2::rel(title_size),
+                                                      lineheight = 1.05),
+                   plot.subtitle = ggplot2::element_text(colour = "grey30", size = ggplot2::rel(subtitle_size),
+                                                         lineheight = 1.1),
                    plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(),
                    panel.spacing = ggplot2::unit(14, "pt"),
                    strip.text = ggplot2::element_text(face = "bold", hjust = 0), strip.placement = "outside",
                    strip.text.y.left = ggplot2::element_text(angle = 90, hjust = 0.5), strip.clip = "off",
-                   axis.text = ggplot2::element_text(colour = "grey20"), legend.position = "top", legend.justification = "left",
+                   axis.text = ggplot2::element_text(colour = "grey20"), legend.position = "top",
+                   legend.justification = "left",
                    legend.title = ggplot2::element_blank(), legend.margin = ggplot2::margin(0, 0, 0, 0))
 }
 
@@ -77,7 +82,8 @@ signed <- function(x) ifelse(abs(x) < 9.95, sprintf("%+.1f", x), sprintf("%+.0f"
 # A few significant digits, not in powers of ten unless very far from one.
 short <- function(x, digits = 2) {
   far <- abs(x) >= 1e7 | (abs(x) < 1e-4 & x != 0)
-  text <- ifelse(far, format_each(signif(x, digits)), formatC(signif(x, digits), digits = digits, format = "fg", flag = "#", big.mark = ","))
+  text <- ifelse(far, format_each(signif(x, digits)),
+                 formatC(signif(x, digits), digits = digits, format = "fg", flag = "#", big.mark = ","))
   ifelse(is.na(x), "\u2013", sub("\\.$", "", text))
 }
 
@@ -92,7 +98,8 @@ short_axis <- function(x) {
 
 percent <- function(x) {
   digits <- trimws(formatC(100 * x, digits = 2, format = "fg"))
-  text <- ifelse(x > 0.999, "over 99.9 %", ifelse(x > 0.99, "over 99 %", ifelse(x < 0.001, "below 0.1 %", paste(digits, "%"))))
+  text <- ifelse(x > 0.999, "over 99.9 %",
+                 ifelse(x > 0.99, "over 99 %", ifelse(x < 0.001, "below 0.1 %", paste(digits, "%"))))
   ifelse(is.na(x), "\u2013", text)
 }
 
@@ -110,7 +117,8 @@ change_words <- function(before, after, unit) {
 time_label <- function(time) if (is.numeric(time)) "time [h]"
 
 time_axis <- function(time) {
-  if (!is.numeric(time)) ggplot2::scale_x_datetime(breaks = function(limits) pretty(limits, 6), date_labels = "%d %b", guide = apart)
+  if (!is.numeric(time))
+    ggplot2::scale_x_datetime(breaks = function(limits) pretty(limits, 6), date_labels = "%d %b", guide = apart)
 }
 
 # Middle of the clock hour in which an interval lies that ends at `time`.
@@ -125,7 +133,8 @@ use_names <- c(calibrate = "calibration", validate = "held out")
 prediction_rows <- function(model) {
   p <- model$prediction
   data.frame(time = p$time, use = factor(use_names[p$use], use_names), part = paste(p$use, p$segment),
-             observed = p$observed, simulated = p$mean, lower95 = p$lower95, upper95 = p$upper95, residual = p$observed - p$mean,
+             observed = p$observed, simulated = p$mean, lower95 = p$lower95, upper95 = p$upper95,
+             residual = p$observed - p$mean,
              row = seq_len(nrow(p)))
 }
 

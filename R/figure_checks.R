@@ -42,7 +42,8 @@ estimate_words <- function(results) {
   told <- function(e) sprintf("%s \u00b1 %s", format(round(e[1], 1), nsmall = 1), short(e[2]))
   words <- vapply(names(results), function(name) {
     r <- results[[name]]
-    second <- if (length(r$second) == 2 && all(is.finite(r$second))) paste0(", ", told(r$second), " by the second estimator")
+    second <- if (length(r$second) == 2 && all(is.finite(r$second))) paste0(", ", told(r$second),
+                                                                            " by the second estimator")
     paste0(name, ", ", told(r$annealed), " by annealing", second)
   }, "")
   paste0("Log evidence: ", paste(words, collapse = "; "), ".")
@@ -53,7 +54,8 @@ figure_sampler <- function(results) {
   table$panel <- factor(table$panel, unique(table$panel))
   trusted <- vapply(results, function(r) isTRUE(r$trusted), TRUE)
   title <- if (all(trusted)) "The sampler passed its own checks"
-           else paste("The sampler is not to be trusted:", sub("^not trusted: ", "", results[[which(!trusted)[1]]]$verdict))
+           else paste("The sampler is not to be trusted:",
+                      sub("^not trusted: ", "", results[[which(!trusted)[1]]]$verdict))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$beta, .data$value, colour = .data$stage, shape = .data$stage)) +
     ggplot2::geom_line(ggplot2::aes(linetype = .data$stage), linewidth = 0.8) +
     ggplot2::geom_point(size = 3) +
@@ -62,7 +64,8 @@ figure_sampler <- function(results) {
     ggplot2::scale_x_continuous(trans = "sqrt", limits = c(0, 1), breaks = c(0, 0.05, 0.25, 0.5, 1), guide = apart) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, labeller = wrap_strips(2)) +
     stage_scales() + stage_lines() +
-    figure_titles(title, paste("From the prior (0) to the posterior (1). Low values: chains that stand still, or few that",
+    figure_titles(title,
+                  paste("From the prior (0) to the posterior (1). Low values: chains that stand still, or few that",
                                "carry the weight; more chains or moves would help.",
                                estimate_words(results)), x = "weight of the measurements") +
     figure_theme()

@@ -3,7 +3,8 @@
 discrepancy_title <- function(table) {
   size <- vapply(split(table$discrepancy, table$stage), function(d) sqrt(mean(d^2)), 0)
   unit <- attr(table, "unit")
-  if (length(size) < 2) paste("The part of the error that answers to boundary conditions is typically", short(size), pretty_unit(unit))
+  if (length(size) < 2)
+    paste("The part of the error that answers to boundary conditions is typically", short(size), pretty_unit(unit))
   else paste("The part of the error that answers to boundary conditions", change_words(size[1], size[2], unit))
 }
 
@@ -12,7 +13,8 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
   unit <- discrepancies[[1]]$unit
   table <- stage_table(discrepancies, function(d) cbind(d$series, segment = d$segment))
   attr(table, "unit") <- unit
-  stage_panel <- paste0(ifelse(levels(table$stage) == "the model", "error", levels(table$stage)), if (nzchar(unit)) paste0(" [", pretty_unit(unit), "]"))
+  stage_panel <- paste0(ifelse(levels(table$stage) == "the model", "error", levels(table$stage)),
+                        if (nzchar(unit)) paste0(" [", pretty_unit(unit), "]"))
   panels <- c(stage_panel, leading$name)
   table$panel <- factor(stage_panel[as.integer(table$stage)], panels)
   reach <- range(table$residual, table$lower95, table$upper95)
@@ -21,13 +23,18 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
     ggplot2::geom_blank(ggplot2::aes(y = .data$y), corners) +
     ggplot2::geom_hline(ggplot2::aes(yintercept = 0), corners, colour = "grey40") +
     ggplot2::geom_line(ggplot2::aes(y = .data$residual, group = .data$segment), colour = "grey60", linewidth = 0.6) +
-    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$stage, group = .data$segment), alpha = 0.3) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$discrepancy, colour = .data$stage, group = .data$segment), linewidth = 0.9) +
+    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$stage,
+                                      group = .data$segment), alpha = 0.3) +
+    ggplot2::geom_line(ggplot2::aes(y = .data$discrepancy, colour = .data$stage, group = .data$segment),
+                       linewidth = 0.9) +
     leading_layer(leading, table, panels) +
     ggplot2::facet_grid(panel ~ ., scales = "free_y", switch = "y", labeller = wrap_turned(length(panels))) +
     stage_scales() +
-    figure_titles(discrepancy_title(table), paste0("Grey: measured - simulated. Coloured: the discrepancy, which answers to boundary conditions, with 95 % band.",
-                                                   if (!is.null(leading)) paste0(" Below: ", leading$name, ", which leads.")), x = time_label(table$time)) +
+    figure_titles(discrepancy_title(table), paste0(
+      "Grey: measured - simulated. Coloured: the discrepancy, which answers to boundary conditions, with 95 % band.",
+                                                   if (!is.null(leading))
+                                                     paste0(" Below: ", leading$name, ", which leads.")),
+                                                     x = time_label(table$time)) +
     time_axis(table$time) + figure_theme() + ggplot2::theme(legend.position = "none")
   with_height(figure, 1.8 + 1.9 * length(panels))
 }
@@ -64,7 +71,8 @@ figure_response <- function(upgrade, classes = 10) {
     ggplot2::geom_line(linewidth = 1.2) +
     ggplot2::geom_point(size = 3.6) +
     stage_scales() +
-    figure_titles(response_title(binned, leading$name, m$noise_sd), paste0("Small points: every time step. Large points: means over classes of ", leading$name, "."),
+    figure_titles(response_title(binned, leading$name, m$noise_sd),
+                  paste0("Small points: every time step. Large points: means over classes of ", leading$name, "."),
                   x = leading$name, y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 5)
@@ -76,12 +84,14 @@ figure_missing <- function(discrepancy, most = 4) {
   size <- sqrt(colMeans(responses^2))
   shown <- names(sort(size, decreasing = TRUE))[seq_len(min(most, length(size)))]
   table <- data.frame(time = rep(discrepancy$series$time, length(shown)), value = as.numeric(responses[, shown]),
-                      panel = factor(rep(shown, each = nrow(responses)), shown), part = rep(discrepancy$segment, length(shown)))
+                      panel = factor(rep(shown, each = nrow(responses)), shown),
+                      part = rep(discrepancy$segment, length(shown)))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, .data$value, group = .data$part)) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
     ggplot2::geom_line(colour = stage_colours[["the model"]], linewidth = 0.9) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, labeller = wrap_strips()) +
-    figure_titles(sprintf("What the model lacks is mostly a response to %s, typically %s %s", shown[1], short(size[[shown[1]]]),
+    figure_titles(sprintf("What the model lacks is mostly a response to %s, typically %s %s", shown[1],
+                          short(size[[shown[1]]]),
                           pretty_unit(discrepancy$unit)),
                   "How the target answers to each boundary condition, present and past, beyond what the model says. Above zero the model is too low, below it too high.",
                   x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +

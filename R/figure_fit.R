@@ -6,10 +6,12 @@ fit_title <- function(upgrade) {
   held <- score_of(upgrade, "validate", "rmse")
   if (length(seen) < 2) {
     title <- paste("The calibrated model is typically wrong by", short(seen), pretty_unit(unit))
-    return(if (anyNA(held)) title else paste0(title, "; on data it has not seen, by ", short(held), " ", pretty_unit(unit)))
+    return(if (anyNA(held)) title else paste0(title, "; on data it has not seen, by ", short(held), " ",
+                                              pretty_unit(unit)))
   }
   title <- paste("The typical error", change_words(seen[1], seen[2], unit))
-  if (anyNA(held)) title else paste0(title, "; on data the model has not seen it ", change_words(held[1], held[2], unit))
+  if (anyNA(held)) title else paste0(title, "; on data the model has not seen it ",
+                                     change_words(held[1], held[2], unit))
 }
 
 figure_fit <- function(upgrade) {
@@ -20,17 +22,22 @@ figure_fit <- function(upgrade) {
   measured <- table[table$stage == levels(table$stage)[1], ]
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time)) +
     ggplot2::geom_hline(ggplot2::aes(yintercept = 0), in_panel(2, data.frame(zero = 0)), colour = "grey40") +
-    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$stage, group = interaction(.data$stage, .data$part)),
+    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$stage,
+                                      group = interaction(.data$stage, .data$part)),
                          in_panel(1, table), alpha = 0.18) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$observed, group = .data$part), in_panel(1, measured), colour = "grey15", linewidth = 1.5) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$stage, group = interaction(.data$stage, .data$part)),
+    ggplot2::geom_line(ggplot2::aes(y = .data$observed, group = .data$part), in_panel(1, measured), colour = "grey15",
+                       linewidth = 1.5) +
+    ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$stage,
+                                    group = interaction(.data$stage, .data$part)),
                        in_panel(1, table), linewidth = 0.7) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$residual, colour = .data$stage, group = interaction(.data$stage, .data$part)),
+    ggplot2::geom_line(ggplot2::aes(y = .data$residual, colour = .data$stage,
+                                    group = interaction(.data$stage, .data$part)),
                        in_panel(2, table), linewidth = 0.7) +
     ggplot2::facet_grid(panel ~ use, scales = "free", space = "free_x", switch = "y",
                         labeller = ggplot2::labeller(panel = wrap_turned(2))) +
     stage_scales() +
-    figure_titles(fit_title(upgrade), "Above, black: measured; coloured: simulated, with the band that should hold 95 % of the measurements. Below: error = measured - simulated.",
+    figure_titles(fit_title(upgrade),
+                  "Above, black: measured; coloured: simulated, with the band that should hold 95 % of the measurements. Below: error = measured - simulated.",
                   x = time_label(table$time)) +
     time_axis(table$time) + figure_theme() + ggplot2::theme(panel.spacing.x = ggplot2::unit(30, "pt"))
   with_height(figure, 6.4)
@@ -49,7 +56,8 @@ gain_title <- function(upgrade) {
 
 gain_table <- function(upgrade) {
   unit <- pretty_unit(upgrade$measurements$unit)
-  panels <- c(rmse = axis_label("typical error, RMSE", unit), crps = axis_label("error of the prediction with its band, CRPS", unit),
+  panels <- c(rmse = axis_label("typical error, RMSE", unit),
+              crps = axis_label("error of the prediction with its band, CRPS", unit),
               coverage95 = "measurements inside the 95 % band [%]")
   table <- stage_table(upgrade_stages(upgrade), function(s) {
     rows <- expand.grid(score = names(panels), use = names(use_names), stringsAsFactors = FALSE)
@@ -71,7 +79,8 @@ figure_gain <- function(upgrade) {
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$use, .data$value, fill = .data$stage)) +
     ggplot2::geom_col(position = dodge, width = 0.74) +
     ggplot2::geom_text(ggplot2::aes(label = .data$label, vjust = ifelse(.data$score == "coverage95", 3, -0.35),
-                                    colour = ifelse(.data$score == "coverage95" & .data$stage != "before", "white", "black")), position = dodge, size = 4.3) +
+                                    colour = ifelse(.data$score == "coverage95" & .data$stage != "before", "white",
+                                                    "black")), position = dodge, size = 4.3) +
     ggplot2::scale_colour_identity() +
     ggplot2::geom_hline(ggplot2::aes(yintercept = .data$value), target, linetype = "dashed", colour = "grey20") +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 3, labeller = wrap_strips(3)) +
@@ -88,7 +97,8 @@ mean_day_title <- function(binned, unit, noise) {
   worst <- stages[[1]][which.max(abs(stages[[1]]$residual)), ]
   if (abs(worst$residual) < noise) return("No time of day stands out from the noise")
   told <- function(r) paste(short(abs(r)), pretty_unit(unit), if (r > 0) "too low" else "too high")
-  title <- sprintf("In calibration, around %02d:30, the simulation is on average %s", floor(worst$hour), told(worst$residual))
+  title <- sprintf("In calibration, around %02d:30, the simulation is on average %s", floor(worst$hour),
+                   told(worst$residual))
   if (length(stages) < 2) return(title)
   after <- stages[[2]]$residual[stages[[2]]$hour == worst$hour]
   paste0(title, " before, ", told(after), " after")
@@ -101,14 +111,16 @@ figure_mean_day <- function(upgrade) {
   binned <- stats::aggregate(residual ~ hour + use + stage, table, mean)
   spread <- stats::aggregate(residual ~ hour + use + stage, table, stats::quantile, probs = c(0.1, 0.9))
   binned[c("low", "high")] <- spread$residual
-  figure <- ggplot2::ggplot(binned, ggplot2::aes(.data$hour, .data$residual, colour = .data$stage, fill = .data$stage)) +
+  figure <- ggplot2::ggplot(binned,
+                            ggplot2::aes(.data$hour, .data$residual, colour = .data$stage, fill = .data$stage)) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
     ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$low, ymax = .data$high), alpha = 0.18, colour = NA) +
     ggplot2::geom_line(linewidth = 1.2) +
     ggplot2::scale_x_continuous(breaks = seq(0, 24, 6), guide = apart, limits = c(0, 24)) +
     ggplot2::facet_wrap(ggplot2::vars(.data$use)) +
     stage_scales() +
-    figure_titles(mean_day_title(binned, m$unit, m$noise_sd), "Lines: mean of all days. Bands: eight days of ten.", x = "hour of day",
+    figure_titles(mean_day_title(binned, m$unit, m$noise_sd), "Lines: mean of all days. Bands: eight days of ten.",
+                  x = "hour of day",
                   y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 4.6)
@@ -120,11 +132,14 @@ figure_measurements <- function(measurements) {
   panels <- c(axis_label(m$target, level_unit(m$unit, m$y)), m$conditions)
   uses <- c(warmup = "warm-up", use_names, none = "not used")
   table <- data.frame(time = rep(m$time, length(panels)), value = unlist(series),
-                      use = factor(uses[rep(m$use, length(panels))], uses), panel = factor(rep(panels, each = length(m$y)), panels),
+                      use = factor(uses[rep(m$use, length(panels))], uses),
+                      panel = factor(rep(panels, each = length(m$y)), panels),
                       part = rep(paste(m$segment, cumsum(c(TRUE, m$use[-1] != m$use[-length(m$use)]))), length(panels)))
   count <- function(use) sum(m$use == use & !is.na(m$y))
-  title <- sprintf("%s: %d steps of %s h to calibrate, %d held out", m$name, count("calibrate"), format(m$step_h), count("validate"))
-  figure <- ggplot2::ggplot(table[!is.na(table$value), ], ggplot2::aes(.data$time, .data$value, colour = .data$use, group = .data$part)) +
+  title <- sprintf("%s: %d steps of %s h to calibrate, %d held out", m$name, count("calibrate"), format(m$step_h),
+                   count("validate"))
+  figure <- ggplot2::ggplot(table[!is.na(table$value), ],
+                            ggplot2::aes(.data$time, .data$value, colour = .data$use, group = .data$part)) +
     ggplot2::geom_line(linewidth = 0.6) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y", labeller = wrap_strips()) +
     ggplot2::scale_colour_manual(values = stats::setNames(c("#999999", "#0072B2", "#009E73", "#CCCCCC"), uses)) +

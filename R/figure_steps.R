@@ -23,7 +23,8 @@ figure_steps <- function(upgrade) {
   best <- which.max(drop)
   title <- if (drop[best] <= 0) "No step lowers the error"
            else sprintf("%s brings most: the typical error (%s) %s",
-                        sub("^\\+ ", "", as.character(shown$step[best + 1])), use[length(use)], change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
+                        sub("^\\+ ", "", as.character(shown$step[best + 1])), use[length(use)],
+                        change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$rmse, .data$step, colour = .data$use, shape = .data$use)) +
     ggplot2::geom_vline(xintercept = m$noise_sd, linetype = "dashed", colour = "grey20") +
     ggplot2::geom_path(ggplot2::aes(group = .data$use), linewidth = 0.8) +

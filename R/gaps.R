@@ -3,14 +3,15 @@
 stray_limit <- 0.25   # of a step: a reading is at the nearest step if it strays by no more
 stray_share <- 0.1    # of the rows that may be off all steps and are left out
 
-# The rows of the record: list(row, hours, segment, step), `row` the row of the data, NA where it was lost. A segment goes on
-# over lost rows that together last no longer than `bridge` hours, over one in any case, unless the steps are others after
-# them: shifted by more than stamps stray elsewhere.
+# The rows of the record: list(row, hours, segment, step), `row` the row of the data, NA where it was lost. A segment
+# goes on over lost rows that together last no longer than `bridge` hours, over one in any case, unless the steps are
+# others after them: shifted by more than stamps stray elsewhere.
 regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
   step <- stats::median(diff(hours))
   steps <- diff(hours) / step
   apart <- abs(steps - round(steps))
-  ends <- (round(steps) - 1.1) * step > max(step, bridge) | steps > 1.5 & apart > max(0.02, 2 * stats::quantile(apart, 0.9))
+  ends <- (round(steps) - 1.1) * step > max(step, bridge) | steps > 1.5 &
+    apart > max(0.02, 2 * stats::quantile(apart, 0.9))
   segment <- cumsum(c(1L, ends))
   row <- seq_along(hours)
   if (any(!ends & (apart > 0.01 * steps | steps < 0.5))) {
@@ -28,11 +29,12 @@ regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
 refuse_unequal <- function(steps, step, ends, name, call) {
   off <- which(!ends & abs(steps - 1) > 0.01)[1]
   abort_input(c("Time column {.val {name}} has unequal steps: {signif(steps[off] * step, 4)} h after row {off}, while the usual step is {signif(step, 4)} h; more than {100 * stray_share} % of the rows are at no step.",
-                i = "Interpolate or average the record to equal steps; gaps and stamps that stray a little may stay."), call = call)
+                i = "Interpolate or average the record to equal steps; gaps and stamps that stray a little may stay."),
+                call = call)
 }
 
-# Every stamp at the nearest of equal steps: list(hours, step, keep). The median of stamps that stray is not exactly their
-# step; whole minutes and the slope over the longest segment are tried beside it.
+# Every stamp at the nearest of equal steps: list(hours, step, keep). The median of stamps that stray is not exactly
+# their step; whole minutes and the slope over the longest segment are tried beside it.
 snap <- function(hours, segment, step) {
   longest <- hours[segment == which.max(tabulate(segment))]
   count <- cumsum(c(0, round(diff(longest) / step)))
@@ -82,7 +84,8 @@ tell_stray <- function(hours, snapped, name) {
                   class = "amiss_message_gap")
 }
 
-# Time at the hours of the grid, rounded to milliseconds, as hours are not whole: a second before 00:10:00 is in another minute.
+# Time at the hours of the grid, rounded to milliseconds, as hours are not whole: a second before 00:10:00 is in another
+# minute.
 grid_time <- function(time, grid) {
   if (is.numeric(time)) return(grid$hours)
   at <- utc(round(3600 * grid$hours, 3))
@@ -90,8 +93,8 @@ grid_time <- function(time, grid) {
   at
 }
 
-# Gaps of the drivers that last at most `longest` hours, by straight lines; directions (degrees) by way of sine and cosine.
-# Lost rows are filled in any case.
+# Gaps of the drivers that last at most `longest` hours, by straight lines; directions (degrees) by way of sine and
+# cosine. Lost rows are filled in any case.
 fill_drivers <- function(drivers, grid, longest, turning) {
   for (name in colnames(drivers)) {
     v <- drivers[, name]

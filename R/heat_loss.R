@@ -22,12 +22,14 @@ heat_loss_coefficient <- function(simulator, values, drivers = numeric(), outsid
   check_input(checkmate::check_matrix(values, "numeric", any.missing = FALSE, min.rows = 1), "values")
   check_all_finite(values, "values")
   check_values(colnames(values), names(zone_parameters(simulator)), rlang::current_env())
-  check_input(checkmate::check_numeric(drivers, finite = TRUE, any.missing = FALSE, names = if (length(drivers)) "unique"), "drivers")
+  check_input(checkmate::check_numeric(drivers, finite = TRUE, any.missing = FALSE,
+                                       names = if (length(drivers)) "unique"), "drivers")
   check_input(checkmate::check_number(outside, finite = TRUE), "outside")
   check_input(checkmate::check_number(inside, lower = outside + 0.1, finite = TRUE), "inside",
               "It must be warmer than {.arg outside}.")
   row <- t(steady_drivers(simulator, drivers, outside))
-  vapply(seq_len(nrow(values)), function(i) steady_loss(zone_resolve(simulator, values[i, ]), row, inside) / (inside - outside), 0)
+  vapply(seq_len(nrow(values)),
+         function(i) steady_loss(zone_resolve(simulator, values[i, ]), row, inside) / (inside - outside), 0)
 }
 
 # One interval of a day, its driver repeated long enough for the walls to be in balance with a held air.

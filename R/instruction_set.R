@@ -1,5 +1,5 @@
-# The compiled code comes twice on x86-64 (src/Makevars). Where the processor has AVX2 and FMA, and the environment variable
-# AMISS_SIMD is not "baseline", the routines of the second library take the place of the first one's.
+# The compiled code comes twice on x86-64 (src/Makevars). Where the processor has AVX2 and FMA, and the environment
+# variable AMISS_SIMD is not "baseline", the routines of the second library take the place of the first one's.
 
 avx2_library <- "amiss_avx2"
 
@@ -15,7 +15,8 @@ avx2_library <- "amiss_avx2"
   library.dynam.unload("amiss", libpath)
 }
 
-# "AVX2" or "baseline": which library's routines are called. A library compiled for one processor alone is "baseline" too.
+# "AVX2" or "baseline": which library's routines are called. A library compiled for one processor alone is "baseline"
+# too.
 instruction_set <- function() {
   if (`_amiss_cpu_has_avx2_`$dll[["name"]] == avx2_library) "AVX2" else "baseline"
 }

@@ -32,18 +32,21 @@ least_squares <- function(fit, threads = 1L) {
   }
   start <- start_of_search(fit, lower, upper)
   # Where the simulator fails beside a point there are no slopes: the search ends at its start, not converged.
-  found <- tryCatch(stats::nlminb(start, objective, gradient = function(u) as.numeric(crossprod(slopes(u), at(u)$error)) / scale,
+  found <- tryCatch(stats::nlminb(start, objective,
+                                  gradient = function(u) as.numeric(crossprod(slopes(u), at(u)$error)) / scale,
                                   hessian = function(u) crossprod(slopes(u)) / scale, lower = lower, upper = upper),
                     error = function(e) list(par = start, convergence = 1L))
   error <- at(found$par)$error
   values <- unit_to_values(t(found$par), parameters)[1, ]
   list(values = values, unit = stats::setNames(found$par, names(parameters)), error = error, rss = sum(error^2),
-       at_edge = names(parameters)[found$par < 0.005 | found$par > 0.995], converged = found$convergence == 0, runs = runs)
+       at_edge = names(parameters)[found$par < 0.005 | found$par > 0.995], converged = found$convergence == 0,
+       runs = runs)
 }
 
 # The ends of the unit cube, but for priors without limits, whose values there are infinite.
 finite_end <- function(parameters, end) {
-  vapply(parameters, function(p) if (is.finite(prior_quantile(p$prior, end))) end else abs(end - 1e-4), 0, USE.NAMES = FALSE)
+  vapply(parameters, function(p) if (is.finite(prior_quantile(p$prior, end))) end else abs(end - 1e-4), 0,
+         USE.NAMES = FALSE)
 }
 
 # Central differences; one-sided where a step would leave the cube.
@@ -98,7 +101,8 @@ likelihood_ratio <- function(models, criteria, i) {
   j <- nested_in(models, i)
   if (is.null(j)) {
     note <- if (i == 1) "the first model" else "no earlier model is nested in it"
-    return(data.frame(nested = NA_character_, lr = NA_real_, lr_df = NA_integer_, lr_p_value = NA_real_, lr_note = note))
+    return(data.frame(nested = NA_character_, lr = NA_real_, lr_df = NA_integer_, lr_p_value = NA_real_,
+                      lr_note = note))
   }
   statistic <- 2 * (criteria$log_likelihood[i] - criteria$log_likelihood[j])
   df <- criteria$k[i] - criteria$k[j]
@@ -108,5 +112,6 @@ likelihood_ratio <- function(models, criteria, i) {
   else if (length(edge)) paste("invalid:", listed(edge), "at the edge of the range")
   else ""
   data.frame(nested = models[[j]]$name, lr = statistic, lr_df = df,
-             lr_p_value = if (statistic < 0) NA_real_ else stats::pchisq(statistic, df, lower.tail = FALSE), lr_note = note)
+             lr_p_value = if (statistic < 0) NA_real_ else stats::pchisq(statistic, df, lower.tail = FALSE),
+             lr_note = note)
 }

@@ -37,7 +37,8 @@ check_settings_size <- function(control, condition_columns, what, call = rlang::
 
 # Annealing visits at least ten temperatures; a likelihood takes at least 20 microseconds.
 check_sampler_size <- function(ais, what, call = rlang::caller_env()) {
-  counts <- c(pilot_chains = ais$pilot_chains, groups = ais$groups * if (ais$chains > 0) ais$chains else 32, importance_draws = ais$importance_draws)
+  counts <- c(pilot_chains = ais$pilot_chains, groups = ais$groups * if (ais$chains > 0) ais$chains else 32,
+              importance_draws = ais$importance_draws)
   counts[1:2] <- 10 * counts[1:2] * max(ais$sweeps, 1)
   largest <- names(which.max(counts))
   check_size(paste0(what, "$", largest), ais[[largest]], hours = 2e-5 * sum(counts) / 3600, call = call)
@@ -47,11 +48,14 @@ check_sampler_size <- function(ais, what, call = rlang::caller_env()) {
 check_zone_size <- function(zone, runs, rows, step_s, control, call = rlang::caller_env()) {
   steps <- step_s / control$max_substep_s
   if (steps > 1e8) {
-    abort_input("{.arg step_s} = {step_s} has more than 1e8 steps of {.arg control$max_substep_s} = {control$max_substep_s} s.", call = call)
+    abort_input(
+      "{.arg step_s} = {step_s} has more than 1e8 steps of {.arg control$max_substep_s} = {control$max_substep_s} s.",
+                call = call)
   }
   components <- max(1, length(zone$components))
   hours <- 2e-7 * runs * rows * ceiling(steps) * components * (1 + control$cells / 3) / 3600
   largest <- which.max(c(steps, control$cells, runs))
   check_size(c("control$max_substep_s", "control$cells", "values (rows)")[largest],
-             c(control$max_substep_s, control$cells, runs)[largest], matrix_gb(40 * control$cells, components), hours, call)
+             c(control$max_substep_s, control$cells, runs)[largest], matrix_gb(40 * control$cells, components), hours,
+             call)
 }

@@ -1,8 +1,8 @@
 #' Measurements: the target, the boundary conditions and what each row is for
 #'
-#' Checks a table of measurements and prepares it for all later stages: the record is cut into segments wherever
-#' time is broken, averaged to a coarser step if asked (blocks follow the UTC clock), and each row is given its use: calibration, validation or
-#' warm-up. Time stamps mark the end of each interval.
+#' Checks a table of measurements and prepares it for all later stages: the record is cut into segments wherever time is
+#' broken, averaged to a coarser step if asked (blocks follow the UTC clock), and each row is given its use:
+#' calibration, validation or warm-up. Time stamps mark the end of each interval.
 #'
 #' # Time
 #'
@@ -12,9 +12,9 @@
 #' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. Numbers of 1e8 and more
 #' are Unix time in seconds or milliseconds, which is told. What stays open is an error, and `time_format` settles it.
 #'
-#' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when daylight saving ends, the
-#' column's order tells the first from the second; a time that its beginning leaves out is an error. Text that steps as
-#' the clocks of a common zone do on such a day is not read as UTC unless `time_zone = "UTC"` says so.
+#' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when daylight saving ends,
+#' the column's order tells the first from the second; a time that its beginning leaves out is an error. Text that steps
+#' as the clocks of a common zone do on such a day is not read as UTC unless `time_zone = "UTC"` says so.
 #'
 #' The record keeps time as `POSIXct`, with the clock of `time_zone`, or as hours where no date is known; simulators and
 #' figures are given that.
@@ -75,7 +75,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   check_record(data, time, target, terms, name, unit)
   require_columns(data, c(time, target, terms$name))
   if (any(terms$name %in% c(time, target))) {
-    abort_input(c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
+    abort_input(
+      c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
                   i = "Leave it out of {.arg boundary}."))
   }
   stamps <- read_time(data[[time]], time, table$format, time_zone)
@@ -127,7 +128,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   noise <- noise_level(noise_sd, coarse, raw$y)
   check_target_values(y, target, calibrate)
   structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise$sd,
-                 noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
+                 noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time,
+                 hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
                  time_format = table$format, time_zone = time_zone),
@@ -162,7 +164,8 @@ require_numeric <- function(data, columns, call = rlang::caller_env()) {
     if (is.numeric(data[[column]]) && is.null(dim(data[[column]]))) next
     values <- as.character(data[[column]])
     bad <- which(is.na(suppressWarnings(as.numeric(values))) & !is.na(values))
-    where <- if (length(bad)) "row {bad[1]} holds {.val {values[bad[1]]}}" else "it is of class {.cls {class(data[[column]])}}"
+    where <- if (
+      length(bad)) "row {bad[1]} holds {.val {values[bad[1]]}}" else "it is of class {.cls {class(data[[column]])}}"
     abort_input(c(paste0("Column {.val {column}} is not numeric: ", where, "."),
                   i = "Read it as numbers, or mark missing values as NA."), call = call)
   }
@@ -180,7 +183,8 @@ tell_gaps <- function(hours, segment, used_for, row) {
   where <- "within the rows of one use"
   tell(inside, function(text) warn_input(text, .envir = parent.frame()))
   where <- "between calibration and validation"
-  tell(setdiff(gaps, inside), function(text) cli::cli_inform(text, class = "amiss_message_gap", .envir = parent.frame()))
+  tell(setdiff(gaps, inside),
+       function(text) cli::cli_inform(text, class = "amiss_message_gap", .envir = parent.frame()))
 }
 
 # `row` of the data, NA for one that was lost.
@@ -189,22 +193,27 @@ require_complete <- function(drivers, analysed, time, row = seq_along(time), cal
     bad <- which(!is.finite(drivers[, column]) & !is.na(row))
     if (length(bad)) {
       abort_input(c("Boundary condition {.val {column}} has {length(bad)} missing or infinite value{?s}; the first is in row {row[bad[1]]} ({format(time[bad[1]])}).",
-                    i = "A simulator needs every value of what drives it: fill short gaps by {.arg fill_gaps} of {.fun measurements}, or remove these rows as a whole."), call = call)
+                    i = "A simulator needs every value of what drives it: fill short gaps by {.arg fill_gaps} of {.fun measurements}, or remove these rows as a whole."),
+                    call = call)
     }
   }
 }
 
 eval_rows <- function(text, data, what, call = rlang::caller_env()) {
-  check_input(checkmate::check_string(text, min.chars = 1), what, "One expression in the columns of the data.", call = call)
+  check_input(checkmate::check_string(text, min.chars = 1), what, "One expression in the columns of the data.",
+              call = call)
   rows <- tryCatch(eval(str2lang(text), data, baseenv()),
-                   error = function(e) abort_input(c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
-                                                     i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."), call = call))
+                   error = function(e) abort_input(
+                     c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
+                                                     i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."),
+                                                     call = call))
   rows
 }
 
 rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {
   if (is.null(rows)) return(if (isTRUE(default)) rep(TRUE, n) else if (what == "calibrate") NULL else rep(FALSE, n))
-  check_input(checkmate::check_logical(rows, len = n, any.missing = FALSE), what, "One TRUE or FALSE for every row of the data.", call = call)
+  check_input(checkmate::check_logical(rows, len = n, any.missing = FALSE), what,
+              "One TRUE or FALSE for every row of the data.", call = call)
   if (!any(rows)) abort_input("{.arg {what}} picks no row.", call = call)
   rows
 }
@@ -216,7 +225,9 @@ average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
     check_input(checkmate::check_number(average, lower = 1e-6, upper = 1e6), "average", call = call)
     per_step <- as.integer(round(average / raw$step_h))
     if (per_step < 1 || abs(per_step * raw$step_h - average) > 1e-6 * average) {
-      abort_input("{.arg average} = {average} h is not a whole multiple of the data's step of {signif(raw$step_h, 4)} h.", call = call)
+      abort_input(
+        "{.arg average} = {average} h is not a whole multiple of the data's step of {signif(raw$step_h, 4)} h.",
+                  call = call)
     }
   }
   width <- per_step * raw$step_h
@@ -224,13 +235,15 @@ average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
   key <- interaction(raw$segment, clock, drop = TRUE, lex.order = TRUE)
   block <- as.integer(factor(key, levels = unique(key)))
   size <- tabulate(block)
-  uses <- tapply(raw$use, block, function(u) if (length(unique(u)) == 1) u[1] else if ("warmup" %in% u) "warmup" else "none")
+  uses <- tapply(raw$use, block,
+                 function(u) if (length(unique(u)) == 1) u[1] else if ("warmup" %in% u) "warmup" else "none")
   whole <- which(size == per_step)
   index <- match(block, whole)
   keep <- !is.na(index)
   mean_of <- function(v) as.numeric(rowsum(v[keep], index[keep], reorder = TRUE)) / per_step
   y <- mean_of(raw$y)
-  spread <- if (per_step > 1) sqrt(pmax(0, as.numeric(rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) / (per_step - 1)) / per_step) else rep(NA_real_, length(whole))
+  spread <- if (per_step > 1) sqrt(pmax(0, as.numeric(rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) / (
+    per_step - 1)) / per_step) else rep(NA_real_, length(whole))
   boundary <- rowsum(boundary[keep, , drop = FALSE], index[keep], reorder = TRUE) / per_step
   last <- which(keep)[!duplicated(index[keep], fromLast = TRUE)]
   dimnames(boundary) <- NULL
@@ -255,9 +268,11 @@ constant_conditions <- function(x, rows) {
 }
 
 x_keep <- function(x, names, call = rlang::caller_env()) {
-  if (!length(names)) abort_input("No boundary condition varies; there is nothing to attribute a discrepancy to.", call = call)
+  if (!length(names))
+    abort_input("No boundary condition varies; there is nothing to attribute a discrepancy to.", call = call)
   columns <- x$names[x$condition] %in% names
-  list(values = x$values[, columns, drop = FALSE], names = names, condition = match(x$names[x$condition][columns], names))
+  list(values = x$values[, columns, drop = FALSE], names = names,
+       condition = match(x$names[x$condition][columns], names))
 }
 
 # The noise of the averages and how it came about: given, standard error or bootstrap; RMS over the calibration steps.
@@ -275,9 +290,11 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
   needed <- if (is.null(noise_sd) || noise_sd$detrend) 3 else 2
   if (coarse$per_step < needed) {
     abort_input(c("{.arg noise_sd} is needed as a number: {if (coarse$per_step == 1) 'the data are not averaged' else paste('an average is of', coarse$per_step, 'readings only')}, so that their scatter within a step is unknown.",
-                  i = "Give the standard deviation of the measurement error in the target's unit, or an {.arg average} over at least {needed} readings."), call = call)
+                  i = "Give the standard deviation of the measurement error in the target's unit, or an {.arg average} over at least {needed} readings."),
+                  call = call)
   }
-  noise <- if (is.null(noise_sd)) list(method = "standard error", per_step = coarse$standard_error) else bootstrap_averages(y, coarse, noise_sd)
+  noise <- if (is.null(noise_sd)) list(method = "standard error",
+                                       per_step = coarse$standard_error) else bootstrap_averages(y, coarse, noise_sd)
   sd <- sqrt(mean(noise$per_step[coarse$use == "calibrate"]^2, na.rm = TRUE))
   if (!is.finite(sd) || sd <= 0) {
     abort_input(c("The readings do not scatter within the averages ({noise$method}: {signif(sd, 3)}), so that {.arg noise_sd} cannot be estimated from them.",
@@ -293,11 +310,11 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 #' RMS over the calibration steps is the noise of the record. As the number of replicates grows, the plain bootstrap
 #' tends to `sqrt((n - 1) / n) * s / sqrt(n)` for n readings of standard deviation `s`.
 #'
-#' What changes inside a window counts as noise: a trend of `d` per reading adds `d^2 (n^2 - 1) / 12` to `s^2 (n - 1) / n`.
-#' `detrend` takes a straight line off each window first and bootstraps the residuals, raised by `sqrt(n / (n - 2))` for the
-#' two degrees of freedom that the line uses, so that neither a trend nor the line biases the variance. Either way the
-#' readings' errors are taken as independent: what they have in common over a window, such as an offset of the sensor,
-#' is not seen, and the noise is then larger than the estimate.
+#' What changes inside a window counts as noise: a trend of `d` per reading adds `d^2 (n^2 - 1) / 12` to `s^2 (n - 1) /
+#' n`. `detrend` takes a straight line off each window first and bootstraps the residuals, raised by `sqrt(n / (n - 2))`
+#' for the two degrees of freedom that the line uses, so that neither a trend nor the line biases the variance. Either
+#' way the readings' errors are taken as independent: what they have in common over a window, such as an offset of the
+#' sensor, is not seen, and the noise is then larger than the estimate.
 #'
 #' @param replicates Number of bootstrap draws of each window.
 #' @param detrend Take a straight line off each window first; the paper does not.
@@ -306,14 +323,17 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 #' @examples
 #' table <- data.frame(hour = seq(0.1, 24, 0.1), Te = 5 + sin(1:240 / 20), Ti = 20 + sin(1:240 / 20) + 0.1 * sin(61 * (1:240)^2))
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, average = 1, noise_sd = bootstrap_noise(detrend = TRUE))
-#' @source Efron (1979), Bootstrap methods: another look at the jackknife, Annals of Statistics 7, 1-26; for averages of raw
-#'   data in this method: Monari (2022). Residuals: Davison and Hinkley (1997), Bootstrap methods and their application.
+#' @source Efron (1979), Bootstrap methods: another look at the jackknife, Annals of Statistics 7, 1-26; for averages of
+#'   raw data in this method: Monari (2022). Residuals: Davison and Hinkley (1997), Bootstrap methods and their
+#'   application.
 #' @export
 bootstrap_noise <- function(replicates = 1000, detrend = FALSE, seed = 1) {
   check_input(checkmate::check_int(replicates, lower = 0, upper = 1e6), "replicates")
-  if (replicates < 50) abort_input("{.arg replicates} = {replicates} is too few for a standard deviation; give at least 50.")
+  if (replicates < 50)
+    abort_input("{.arg replicates} = {replicates} is too few for a standard deviation; give at least 50.")
   check_input(checkmate::check_flag(detrend), "detrend")
-  structure(list(replicates = as.integer(replicates), detrend = detrend, seed = pick_seed(seed)), class = "amiss_bootstrap_noise")
+  structure(list(replicates = as.integer(replicates), detrend = detrend, seed = pick_seed(seed)),
+            class = "amiss_bootstrap_noise")
 }
 
 # Standard deviation of the bootstrapped mean of each window; NA where a reading is missing.
@@ -329,7 +349,8 @@ bootstrap_averages <- function(y, coarse, options) {
     drawn <- sample.int(n, n * options$replicates, replace = TRUE)
     if (anyNA(readings)) NA else stats::sd(colMeans(matrix(readings[drawn], n)))
   }))
-  c(list(method = if (options$detrend) "bootstrap of detrended readings" else "bootstrap of readings", per_step = per_step, readings = n), unclass(options))
+  c(list(method = if (options$detrend) "bootstrap of detrended readings" else "bootstrap of readings",
+         per_step = per_step, readings = n), unclass(options))
 }
 
 # Rows of a use that have a measured value.
@@ -345,9 +366,11 @@ segment_starts <- function(measurements, rows) {
 print.amiss_measurements <- function(x, ...) on_stdout(x, {
   n <- table(factor(x$use, c("calibrate", "validate", "warmup")))
   cli::cli_text("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in {length(unique(x$segment))} segment{?s}")
-  origin <- switch(x$noise$method, given = "", `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
+  origin <- switch(x$noise$method, given = "",
+                   `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
                    sprintf(" (%s, %d an average, %d times)", x$noise$method, x$noise$readings, x$noise$replicates))
-  cli::cli_bullets(c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}{origin}",
+  cli::cli_bullets(
+    c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}{origin}",
                      "*" = "{n[['calibrate']]} calibrate, {n[['validate']]} validate, {n[['warmup']]} warm up",
                      "*" = "boundary conditions {.field {x$conditions}}",
                      ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))

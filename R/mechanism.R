@@ -4,8 +4,8 @@
 #' and one sentence for a person. A catalogue holds the mechanisms that make sense for a model.
 #'
 #' @param name Short name.
-#' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared
-#'   by [free()]: an edit of a [zone()], or [with_parameters()]. Of a model that is an [ensemble()] of given runs, another
+#' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared by
+#'   [free()]: an edit of a [zone()], or [with_parameters()]. Of a model that is an [ensemble()] of given runs, another
 #'   ensemble, of runs with the mechanism, or a function of the present ensemble that returns one. An ensemble is tried
 #'   while it has the parameters of all that was adopted before it.
 #' @param boundary Names of the boundary conditions that drive the mechanism.
@@ -36,10 +36,12 @@ catalogue <- function(...) {
   mechanisms <- list(...)
   if (!all(vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))) {
     other <- which(!vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))[1]
-    abort_input(c("Every entry of a catalogue must be a mechanism; number {other} is {seen(mechanisms[[other]])}.", i = "Make each with {.fun mechanism}."))
+    abort_input(c("Every entry of a catalogue must be a mechanism; number {other} is {seen(mechanisms[[other]])}.",
+                  i = "Make each with {.fun mechanism}."))
   }
   names(mechanisms) <- vapply(mechanisms, `[[`, "", "name")
-  if (anyDuplicated(names(mechanisms))) abort_input("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}} stands twice in the catalogue.")
+  if (anyDuplicated(names(mechanisms)))
+    abort_input("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}} stands twice in the catalogue.")
   structure(mechanisms, class = "amiss_catalogue")
 }
 
@@ -54,7 +56,8 @@ print.amiss_catalogue <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Catalogue} of {length(x)} mechanism{?s}")
   shown <- utils::head(x, 10)
   for (entry in shown) cli::cli_bullets(c("*" = "{.strong {entry$name}} ({entry$boundary}): {entry$sentence}"))
-  if (length(x) > length(shown)) cli::cli_bullets(c("*" = "{length(x) - length(shown)} more: {names(x)[-seq_along(shown)]}"))
+  if (length(x) > length(shown))
+    cli::cli_bullets(c("*" = "{length(x) - length(shown)} more: {names(x)[-seq_along(shown)]}"))
   cli::cli_bullets(c(">" = "next: {.fun upgrade_model}"))
 })
 
@@ -62,7 +65,8 @@ print.amiss_catalogue <- function(x, ...) on_stdout(x, {
 extend <- function(simulator, mechanism, adopted = character(), call = rlang::caller_env()) {
   edit <- mechanism$edit
   extended <- tryCatch(if (is.function(edit)) edit(simulator) else edit, error = function(e) {
-    abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"), call = call)
+    abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"),
+                call = call)
   })
   if (!inherits(extended, class(simulator)[1])) {
     abort_input(c(paste("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not",
@@ -77,7 +81,8 @@ extend <- function(simulator, mechanism, adopted = character(), call = rlang::ca
   lost <- setdiff(adopted, names(free_parameters(extended)))
   if (length(lost)) {
     abort_input(c("Mechanism {.val {mechanism$name}} drops {cli::qty(lost)}the parameter{?s} {.val {lost}} of a mechanism that was adopted before.",
-                  i = "Let its {.code edit} extend the model that it is given, instead of making it anew."), call = call)
+                  i = "Let its {.code edit} extend the model that it is given, instead of making it anew."),
+                  call = call)
   }
   extended
 }

@@ -1,16 +1,17 @@
-# Where the parameters lie, by the simulator itself: a Gauss-Newton search whose every step is the posterior under the line that
-# touches the simulator there (tangent_posterior_), error and discrepancy as uncertain as the record leaves them. It needs no
-# emulator, and a few runs for each parameter and step.
+# Where the parameters lie, by the simulator itself: a Gauss-Newton search whose every step is the posterior under the
+# line that touches the simulator there (tangent_posterior_), error and discrepancy as uncertain as the record leaves
+# them. It needs no emulator, and a few runs for each parameter and step.
 
 search_steps <- 20         # at most
 search_gain <- 0.1         # nats, below which a step is the last
 search_draws <- 8          # of error and discrepancy, by which a step is judged
 search_difference <- 0.02  # of slopes, in standard deviations of the prior
 search_damping <- c(0, 1, 10, 100, 1000, 1e4)
-search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1, importance_draws = 300, ess_drop = 0.3)
+search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1, importance_draws = 300,
+                   ess_drop = 0.3)
 
-# The posterior's centre and covariance as the search from `start` sees them, in normal coordinates: list(centre, covariance,
-# value, runs). `set`: calibration_setting(), or a calibration.
+# The posterior's centre and covariance as the search from `start` sees them, in normal coordinates: list(centre,
+# covariance, value, runs). `set`: calibration_setting(), or a calibration.
 search_mode <- function(set, start, threads) {
   m <- set$measurements
   data <- history_data(set$emulator, m, set$rows, set$control)
@@ -31,8 +32,10 @@ search_mode <- function(set, start, threads) {
     values <- rep(-Inf, ncol(outputs))
     if (!length(fine)) return(values)
     each <- rep(seq_len(draws), length(fine))
-    points <- list(setting = tangent$setting[each], variance = tangent$variance[each], t = tangent$t[each, , drop = FALSE])
-    log_l <- call_engine(run_likelihood_(data, priors, points, outputs[, rep(fine, each = draws), drop = FALSE], context))
+    points <- list(setting = tangent$setting[each], variance = tangent$variance[each],
+                   t = tangent$t[each, , drop = FALSE])
+    log_l <- call_engine(run_likelihood_(data, priors, points, outputs[, rep(fine, each = draws), drop = FALSE],
+                                         context))
     log_l <- matrix(log_l, draws)
     top <- apply(log_l, 2, max)
     values[fine] <- top + log(colMeans(exp(sweep(log_l, 2, top)))) - 0.5 * rowSums(x[fine, , drop = FALSE]^2)

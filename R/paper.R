@@ -22,23 +22,24 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' The prior of the discrepancy's variance, `(1 - t2) / t2` with `t2` uniform, has its median at 1 in the target's unit
 #' squared: unlike [calibrate()]'s, the evidence depends on that unit beyond the change of density.
 #'
-#' *Cost.* The kernel of (6) is smooth in the values of the conditions and so of low rank. Beyond 120 steps its posterior is
-#' annealed by way of every 4th, 16th, ... step of the record, with values that are approximate to `tolerance` nats; at 32 of
-#' the final draws they are compared with certified ones, and the evidence is corrected. `tolerance = 0` computes every
-#' value densely, at a cost that grows with N^3, and anneals from the prior.
+#' *Cost.* The kernel of (6) is smooth in the values of the conditions and so of low rank. Beyond 120 steps its
+#' posterior is annealed by way of every 4th, 16th, ... step of the record, with values that are approximate to
+#' `tolerance` nats; at 32 of the final draws they are compared with certified ones, and the evidence is corrected.
+#' `tolerance = 0` computes every value densely, at a cost that grows with N^3, and anneals from the prior.
 #'
 #' @inheritParams calibrate
 #' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
 #'   `shared_lambda` (one noise precision for all basis vectors; `FALSE`), `alpha` and `t2` (the two shapes of their
-#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `fictitious_seed` (of the white noise, which is
-#'   part of the data; 1), `probability` of
-#'   the highest-density intervals (0.95), `tolerance` (0.01, in nats; 0 for dense values), and `ais`, a list for the sampler as in [calibrate()].
+#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `fictitious_seed` (of the white noise, which is part of the data; 1),
+#'   `probability` of the highest-density intervals (0.95), `tolerance` (0.01, in nats; 0 for dense values), and `ais`,
+#'   a list for the sampler as in [calibrate()].
 #' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of the parameters),
 #'   `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of equations 5 and 6 and the total),
 #'   `hyperparameters` (draws of `alpha`, the fictitious condition last, `t2`, `lambda` and their weights), `lambda`
 #'   (draws of the precisions of equation 5), `index` (ranked table), `share` (draws of `R2`), `trust`, and `inside` and
 #'   `outside`, all that the sampler said of (5) and (6); `outside$approximation` tells the largest error among the
-#'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the last, and in the last by skeletons and directly. [tidy()][posterior] gives the table of the parameters.
+#'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the
+#'   last, and in the last by skeletons and directly. [tidy()][posterior] gives the table of the parameters.
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)
@@ -57,7 +58,8 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
   threads <- check_threads(threads)
   control <- fill_paper_control(control, length(rows))
   data <- paper_data(emulator, measurements, rows, control)
-  priors <- list(alpha = control$alpha, t2 = control$t2, noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence)
+  priors <- list(alpha = control$alpha, t2 = control$t2, noise_sd = measurements$noise_sd,
+                 noise_shape = length(rows) * control$confidence)
   result <- call_engine(calibrate_paper_(data, priors, emulator$processes, control, engine_context(seed, threads)))
   inside <- result$inside
   outside <- result$outside
@@ -69,7 +71,8 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
   structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
                  seed = seed, rows = rows, priors = priors, values = unit_to_values(inside$unit, emulator$parameters),
                  weights = inside$weights, lambda = inside$lambda, hyperparameters = hyperparameters,
-                 evidence = evidence, log_evidence = evidence$log_evidence[3], standard_error = evidence$standard_error[3],
+                 evidence = evidence, log_evidence = evidence$log_evidence[3],
+                 standard_error = evidence$standard_error[3],
                  interval = c(evidence$lower95[3], evidence$upper95[3]), log_jacobian = result$log_jacobian,
                  trust = paper_trust(outside, inside), index = index_table(result$index, conditions),
                  share = result$index$share,
@@ -92,17 +95,21 @@ fill_paper_control <- function(control, n, what = "control", call = rlang::calle
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
   check_input(checkmate::check_flag(control$shared_lambda), named("shared_lambda"), call = call)
   for (prior in c("alpha", "t2")) {
-    check_input(checkmate::check_numeric(control[[prior]], lower = 1e-6, finite = TRUE, len = 2, any.missing = FALSE), named(prior),
+    check_input(checkmate::check_numeric(control[[prior]], lower = 1e-6, finite = TRUE, len = 2, any.missing = FALSE),
+                named(prior),
                 "Give the two shapes of a beta distribution.", call = call)
   }
   check_seed(control$fictitious_seed, named("fictitious_seed"), call)
-  check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999), named("probability"), call = call)
-  check_input(checkmate::check_number(control$tolerance, lower = 0, upper = 1), named("tolerance"), "In nats; 0 for dense values.", call = call)
+  check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999), named("probability"),
+              call = call)
+  check_input(checkmate::check_number(control$tolerance, lower = 0, upper = 1), named("tolerance"),
+              "In nats; 0 for dense values.", call = call)
   control
 }
 
 paper_data <- function(emulator, measurements, rows, control) {
-  list(y = measurements$y[rows], basis = emulator$basis$vectors, conditions = measurements$boundary[rows, , drop = FALSE],
+  list(y = measurements$y[rows], basis = emulator$basis$vectors,
+       conditions = measurements$boundary[rows, , drop = FALSE],
        condition = measurements$condition - 1L, fictitious_seed = control$fictitious_seed)
 }
 
@@ -134,5 +141,6 @@ print.amiss_paper_calibration <- function(x, ...) on_stdout(x, {
   say_parameters(x, 3)
   cli::cli_text("variance index of the boundary conditions over that of white noise")
   say_table(utils::head(x$index, 4))
-  cli::cli_bullets(c(">" = "next: {.fun calibrate} and {.fun attribute_discrepancy}, which know the history of the conditions"))
+  cli::cli_bullets(
+    c(">" = "next: {.fun calibrate} and {.fun attribute_discrepancy}, which know the history of the conditions"))
 })

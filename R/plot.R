@@ -1,4 +1,5 @@
-figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day", "priors",
+figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day",
+                  "priors",
                   "moved", "steps", "missing", "emulator", "sampler")
 
 # Okabe and Ito's colours: told apart by colour-blind readers and, one light and one dark, in grey.
@@ -14,8 +15,8 @@ stage_colours <- c("before" = "#E69F00", "after" = "#0072B2", "the model" = "#00
 #'   the leading boundary condition), `"gain"` (scores before and after), `"mean_day"`, `"priors"` (against posteriors),
 #'   `"moved"` (parameters that moved between the models, and what they trade off with), `"steps"` (what each mechanism
 #'   brought), `"missing"` (the response that the first model lacks, by boundary condition), `"emulator"` (its errors on
-#'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`,
-#'   `"criteria"` (ranks by each), `"attribution"`, `"fit"` (measured and simulated), `"discrepancy"` (over time), `"parameters"`,
+#'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`, `"criteria"` (ranks by
+#'   each), `"attribution"`, `"fit"` (measured and simulated), `"discrepancy"` (over time), `"parameters"`,
 #'   `"heat_loss"` (of zones) or `"held_out"` (where rows validate).
 #' @param ... Not used.
 #' @return A ggplot.
@@ -115,5 +116,6 @@ save_figures <- function(x, folder, width = canvas_width, dpi = 120) {
 
 # `ragg` finds fonts in the same way on every machine, and letters that a font lacks in another.
 save_figure <- function(figure, path, width = canvas_width, dpi = 120) {
-  ggplot2::ggsave(path, figure, ragg::agg_png, width = width, height = figure_height(figure, width), dpi = dpi, bg = "white")
+  ggplot2::ggsave(path, figure, ragg::agg_png, width = width, height = figure_height(figure, width), dpi = dpi,
+                  bg = "white")
 }

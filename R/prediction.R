@@ -1,8 +1,8 @@
 #' Predict with a calibrated simulator
 #'
-#' The simulator itself is run at draws of the posterior (no emulator error); errors as large
-#' as those that calibration left widen the band. Of an [ensemble()] made elsewhere, the emulator of its runs at the rows
-#' asked for predicts, and its own uncertainty widens the band too.
+#' The simulator itself is run at draws of the posterior (no emulator error); errors as large as those that calibration
+#' left widen the band. Of an [ensemble()] made elsewhere, the emulator of its runs at the rows asked for predicts, and
+#' its own uncertainty widens the band too.
 #'
 #' @param object A calibration ([calibrate()], [calibrate_paper()]), or an upgrade ([upgrade_model()]), of
 #'   which it is the last model.
@@ -92,7 +92,8 @@ prediction_record <- function(m, newdata, call = rlang::caller_env()) {
   if (is.null(newdata)) return(m)
   if (is.data.frame(newdata)) return(new_record(m, newdata, call))
   check_input(checkmate::check_class(newdata, "amiss_measurements"), "newdata",
-              "Give a data frame or {.fun measurements}; rows of the record itself are chosen by {.arg use}.", call = call)
+              "Give a data frame or {.fun measurements}; rows of the record itself are chosen by {.arg use}.",
+              call = call)
   if (!isTRUE(all.equal(newdata$step_h, m$step_h)) || !identical(newdata$conditions, m$conditions)) {
     abort_input(c("{.arg newdata} must have the record's time step and boundary conditions.",
                   i = "The record has steps of {signif(m$step_h, 3)} h and {.val {m$conditions}}.",

@@ -19,7 +19,8 @@ NULL
 new_prior <- function(family, parameters, lower, upper, call) {
   if (!is.finite(lower) && family %in% c("uniform", "triangular", "beta") ||
       !is.finite(upper) && family %in% c("uniform", "triangular", "beta")) {
-    abort_input("A {family} prior needs finite limits; got lower = {.val {lower}}, upper = {.val {upper}}.", call = call)
+    abort_input("A {family} prior needs finite limits; got lower = {.val {lower}}, upper = {.val {upper}}.",
+                call = call)
   }
   if (is.na(lower) || is.na(upper) || lower >= upper) {
     abort_input(c("A {family} prior needs lower < upper; got lower = {.val {lower}}, upper = {.val {upper}}.",
@@ -28,7 +29,8 @@ new_prior <- function(family, parameters, lower, upper, call) {
   if (family %in% c("uniform", "triangular", "beta") && !is.finite(upper - lower)) {
     abort_input("A {family} prior from {.val {lower}} to {.val {upper}} is wider than numbers go.", call = call)
   }
-  prior <- structure(list(family = family, parameters = parameters, lower = lower, upper = upper), class = "amiss_prior")
+  prior <- structure(list(family = family, parameters = parameters, lower = lower, upper = upper),
+                     class = "amiss_prior")
   mass <- diff(untruncated_cdf(prior, c(lower, upper)))
   if (!is.finite(mass) || mass < 1e-8) {
     abort_input(c("A {family} prior has no mass between its limits {.val {lower}} and {.val {upper}}.",
@@ -63,14 +65,16 @@ normal <- function(mean, sd, lower = -Inf, upper = Inf) {
 #' @rdname prior
 #' @export
 lognormal <- function(meanlog, sdlog, lower = 0, upper = Inf) {
-  new_prior("lognormal", list(meanlog = number(meanlog, "meanlog"), sdlog = number(sdlog, "sdlog", .Machine$double.xmin)),
+  new_prior("lognormal",
+            list(meanlog = number(meanlog, "meanlog"), sdlog = number(sdlog, "sdlog", .Machine$double.xmin)),
             limit(lower, "lower"), limit(upper, "upper"), rlang::current_env())
 }
 
 #' @rdname prior
 #' @export
 beta_prior <- function(shape1, shape2, lower = 0, upper = 1) {
-  new_prior("beta", list(shape1 = number(shape1, "shape1", .Machine$double.xmin), shape2 = number(shape2, "shape2", .Machine$double.xmin)),
+  new_prior("beta", list(shape1 = number(shape1, "shape1", .Machine$double.xmin),
+                         shape2 = number(shape2, "shape2", .Machine$double.xmin)),
             limit(lower, "lower"), limit(upper, "upper"), rlang::current_env())
 }
 
@@ -78,7 +82,8 @@ beta_prior <- function(shape1, shape2, lower = 0, upper = 1) {
 #' @export
 triangular <- function(lower, mode, upper) {
   mode <- number(mode, "mode")
-  prior <- new_prior("triangular", list(mode = mode), limit(lower, "lower"), limit(upper, "upper"), rlang::current_env())
+  prior <- new_prior("triangular", list(mode = mode), limit(lower, "lower"), limit(upper, "upper"),
+                     rlang::current_env())
   if (mode < lower || mode > upper) {
     abort_input("A triangular prior needs lower <= mode <= upper; got {.val {c(lower, mode, upper)}}.")
   }
@@ -111,12 +116,14 @@ untruncated_density <- function(prior, x) {
     uniform = stats::dunif(x, prior$lower, prior$upper),
     normal = stats::dnorm(x, p$mean, p$sd),
     lognormal = stats::dlnorm(x, p$meanlog, p$sdlog),
-    beta = stats::dbeta((x - prior$lower) / (prior$upper - prior$lower), p$shape1, p$shape2) / (prior$upper - prior$lower),
+    beta = stats::dbeta((x - prior$lower) / (prior$upper - prior$lower), p$shape1,
+                        p$shape2) / (prior$upper - prior$lower),
     triangular = triangular_density(x, prior$lower, p$mode, prior$upper))
 }
 
 triangular_density <- function(x, a, m, b) {
-  ifelse(x < m, 2 * (x - a) / ((b - a) * max(m - a, .Machine$double.xmin)), 2 * (b - x) / ((b - a) * max(b - m, .Machine$double.xmin)))
+  ifelse(x < m, 2 * (x - a) / ((b - a) * max(m - a, .Machine$double.xmin)),
+         2 * (b - x) / ((b - a) * max(b - m, .Machine$double.xmin)))
 }
 
 triangular_cdf <- function(x, a, m, b) {
@@ -180,7 +187,8 @@ free <- function(name, prior, unit = "", label = name) {
 }
 
 #' @export
-format.amiss_free <- function(x, ...) paste0("free(", x$name, ": ", format(x$prior), if (nzchar(x$unit)) paste0(" ", x$unit), ")")
+format.amiss_free <- function(x, ...) paste0("free(", x$name, ": ", format(x$prior),
+                                             if (nzchar(x$unit)) paste0(" ", x$unit), ")")
 
 #' @export
 print.amiss_free <- function(x, ...) {

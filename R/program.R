@@ -1,23 +1,24 @@
 #' A simulator that is an external program
 #'
-#' Any program that reads text files and writes numbers can be calibrated: ESP-r, EnergyPlus, a Modelica model, a script.
-#' Each run gets a fresh directory with the rendered `templates` and the drivers as CSV; the program is started there,
-#' without a shell, and its output is read. In templates and in the arguments of the command, `{{name}}` stands for the
-#' value of the parameter `name`.
+#' Any program that reads text files and writes numbers can be calibrated: ESP-r, EnergyPlus, a Modelica model, a
+#' script. Each run gets a fresh directory with the rendered `templates` and the drivers as CSV; the program is started
+#' there, without a shell, and its output is read. In templates and in the arguments of the command, `{{name}}` stands
+#' for the value of the parameter `name`.
 #'
-#' The drivers' file has the columns `time` (the record's: ISO 8601 in UTC, or its hours), `hours` since the start of the
-#' segment, both at the end of each interval, and the columns named in `boundary`.
+#' The drivers' file has the columns `time` (the record's: ISO 8601 in UTC, or its hours), `hours` since the start of
+#' the segment, both at the end of each interval, and the columns named in `boundary`.
 #'
-#' A run that succeeds is kept in `cache` at once and never made twice: its key is what it reads (templates, command, drivers,
-#' contents of the files that the command names, `version`) and how its output is read. What else the program reads,
-#' such as a library of its own, does not count: give another `version` when it changes. A run that fails (exit status, time limit, unreadable output, too few rows, values that are
-#' not finite) is `NaN`, told in a warning with its directory, which is kept, and the last lines of its stderr; it is tried
-#' again at the next call. Runs are made in parallel as [future::plan()] says.
+#' A run that succeeds is kept in `cache` at once and never made twice: its key is what it reads (templates, command,
+#' drivers, contents of the files that the command names, `version`) and how its output is read. What else the program
+#' reads, such as a library of its own, does not count: give another `version` when it changes. A run that fails (exit
+#' status, time limit, unreadable output, too few rows, values that are not finite) is `NaN`, told in a warning with its
+#' directory, which is kept, and the last lines of its stderr; it is tried again at the next call. Runs are made in
+#' parallel as [future::plan()] says.
 #'
 #' @param command The program and its arguments, as a character vector. Words that name a file become absolute paths.
 #' @param ... The parameters, each made by [free()].
-#' @param output Where the output is: `c(file = "out.csv", column = "Ti")` of a CSV in the run's directory (`stdout.txt` for
-#'   what the program prints), or a function of that directory that returns one number per row of the drivers.
+#' @param output Where the output is: `c(file = "out.csv", column = "Ti")` of a CSV in the run's directory (`stdout.txt`
+#'   for what the program prints), or a function of that directory that returns one number per row of the drivers.
 #' @param templates Named list: file in the run's directory = path of its template, or its text in [I()].
 #' @param boundary Names of the driver columns that the program needs.
 #' @param drivers Name of the drivers' file.
@@ -57,7 +58,8 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
   simulator <- structure(list(
     format_version = format_version, name = name, command = command, output = output, templates = templates,
     parameters = named_parameters(list(...)), boundary = unique(boundary), drivers = drivers, time_limit = time_limit,
-    retries = retries, cache = normalizePath(cache, mustWork = FALSE), version = version), class = "amiss_program_simulator")
+    retries = retries, cache = normalizePath(cache, mustWork = FALSE), version = version),
+    class = "amiss_program_simulator")
   check_placeholders(simulator)
 }
 
@@ -81,7 +83,8 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
 #' })
 #' @export
 with_template <- function(simulator, templates, ..., boundary = character()) {
-  check_input(checkmate::check_class(simulator, "amiss_program_simulator"), "simulator", "Make one with {.fun program_simulator}.")
+  check_input(checkmate::check_class(simulator, "amiss_program_simulator"), "simulator",
+              "Make one with {.fun program_simulator}.")
   check_columns_named(boundary)
   added <- read_templates(templates, simulator$templates)
   simulator$templates[names(added)] <- added
@@ -120,13 +123,15 @@ check_placeholders <- function(simulator, call = rlang::caller_env()) {
     unknown <- setdiff(placeholders(places[[place]]), known)
     if (length(unknown)) {
       abort_input(c("Template {.val {place}} holds the placeholder {.val {unknown[1]}}, which is no parameter.",
-                    i = "Parameters: {.val {known}}; declare it with {.fun free} or correct the template."), call = call)
+                    i = "Parameters: {.val {known}}; declare it with {.fun free} or correct the template."),
+                    call = call)
     }
   }
   idle <- setdiff(known, unlist(lapply(places, placeholders)))
   if (length(idle)) {
     abort_input(c("Parameter {.val {idle[1]}} stands in no template and in no argument of the command.",
-                  i = "Write {.code {paste0('{{', idle[1], '}}')}} where its value belongs. Templates: {.val {names(simulator$templates)}}."), call = call)
+                  i = "Write {.code {paste0('{{', idle[1], '}}')}} where its value belongs. Templates: {.val {names(simulator$templates)}}."),
+                  call = call)
   }
   simulator
 }
@@ -166,8 +171,10 @@ simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, st
   }
   table <- drivers_table(drivers, step_h, time)
   files <- c(program, simulator$command[file.exists(simulator$command)])
-  shared <- rlang::hash(list(table, unname(tools::md5sum(files)), simulator$version, plain(simulator$output), simulator$drivers))
-  made <- future.apply::future_lapply(seq_len(nrow(values)), function(m) program_run(simulator, values[m, ], table, shared),
+  shared <- rlang::hash(list(table, unname(tools::md5sum(files)), simulator$version, plain(simulator$output),
+                             simulator$drivers))
+  made <- future.apply::future_lapply(seq_len(nrow(values)),
+                                      function(m) program_run(simulator, values[m, ], table, shared),
                                       future.packages = "amiss", future.seed = NULL)
   failed <- which(!vapply(made, is.numeric, NA))
   tell_failed(simulator, made, failed)
@@ -230,8 +237,10 @@ write_inputs <- function(directory, templates, drivers, table) {
 
 # The output of one run of the program; an error says why there is none.
 run_program <- function(simulator, command, directory, rows) {
-  done <- processx::run(command[1], command[-1], wd = directory, timeout = simulator$time_limit, error_on_status = FALSE,
-                        stdout = file.path(directory, "stdout.txt"), stderr = file.path(directory, "stderr.txt"), cleanup_tree = TRUE)
+  done <- processx::run(command[1], command[-1], wd = directory, timeout = simulator$time_limit,
+                        error_on_status = FALSE,
+                        stdout = file.path(directory, "stdout.txt"), stderr = file.path(directory, "stderr.txt"),
+                        cleanup_tree = TRUE)
   if (done$timeout) stop("it did not end within ", simulator$time_limit, " s")
   if (done$status != 0) stop("it ended with exit status ", done$status)
   out <- if (is.function(simulator$output)) simulator$output(directory) else read_output(simulator$output, directory)
@@ -246,7 +255,8 @@ read_output <- function(output, directory) {
   if (!file.exists(path) || file.size(path) == 0) stop("it wrote nothing into ", output[["file"]])
   table <- utils::read.csv(path, check.names = FALSE)
   if (!output[["column"]] %in% names(table)) {
-    stop("there is no column ", output[["column"]], " in ", output[["file"]], "; there: ", paste(names(table), collapse = ", "))
+    stop("there is no column ", output[["column"]], " in ", output[["file"]], "; there: ",
+         paste(names(table), collapse = ", "))
   }
   table[[output[["column"]]]]
 }

@@ -14,7 +14,8 @@ check_record <- function(data, time, target, terms, name, unit, call = rlang::ca
   if (time == target) abort_input("{.arg target} and {.arg time} are both the column {.val {time}}.", call = call)
   again <- terms$name[duplicated(terms$name)]
   if (length(again)) {
-    abort_input(c("{.val {again[1]}} stands twice in {.arg boundary}.", i = "It is either circular or not."), call = call)
+    abort_input(c("{.val {again[1]}} stands twice in {.arg boundary}.", i = "It is either circular or not."),
+                call = call)
   }
 }
 
@@ -26,6 +27,8 @@ check_target_values <- function(y, target, used, call = rlang::caller_env()) {
   }
   values <- y[used & !is.na(y)]
   if (length(values) > 1 && all(values == values[1])) {
-    abort_input("Target {.val {target}} is {values[1]} in all {length(values)} rows that calibrate: there is nothing to explain.", call = call)
+    abort_input(
+      "Target {.val {target}} is {values[1]} in all {length(values)} rows that calibrate: there is nothing to explain.",
+                call = call)
   }
 }

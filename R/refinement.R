@@ -1,19 +1,21 @@
 #' Calibrate, check by runs and refine
 #'
-#' Trains the emulator, calibrates, and lets the simulator check the emulator where the posterior lies. Where the check fails,
-#' fewer than a third of its runs are effective, or more than a hundredth of the posterior lies in the outer tenth of the emulator's region,
-#' runs are made in the region of that posterior ([refine_ensemble()]; those of the check join them), an emulator is
-#' trained for this region, and all is done again, up to a number of rounds. Where the emulator was surer than it was right, the error that
-#' the check saw is added to the noise before the region is drawn, so that the region is as wide as the emulator deserves.
+#' Trains the emulator, calibrates, and lets the simulator check the emulator where the posterior lies. Where the check
+#' fails, fewer than a third of its runs are effective, or more than a hundredth of the posterior lies in the outer
+#' tenth of the emulator's region, runs are made in the region of that posterior ([refine_ensemble()]; those of the
+#' check join them), an emulator is trained for this region, and all is done again, up to a number of rounds. Where the
+#' emulator was surer than it was right, the error that the check saw is added to the noise before the region is drawn,
+#' so that the region is as wide as the emulator deserves.
 #'
-#' @param ensemble An ensemble: [simulate_design()], [refine_ensemble()], [ensemble()] (which can be checked, but not refined).
+#' @param ensemble An ensemble: [simulate_design()], [refine_ensemble()], [ensemble()] (which can be checked, but not
+#'   refined).
 #' @param rounds Greatest number of refinements; 0 for the check alone.
-#' @param runs Runs made in the first round, beside those of searches and checks, by default 40 or, if more, ten for each parameter;
-#'   each further round makes 1.3 times as many.
+#' @param runs Runs made in the first round, beside those of searches and checks, by default 40 or, if more, ten for
+#'   each parameter; each further round makes 1.3 times as many.
 #' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and [calibrate()] take them.
 #' @inheritParams calibrate
-#' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how many
-#'   runs of the simulator were made here, those of the checks included.
+#' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how
+#'   many runs of the simulator were made here, those of the checks included.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -26,7 +28,8 @@
 #' fit <- calibrate_refined(runs, room, control = quick, seed = 1)
 #' c(fit$rounds, fit$runs_made)
 #' @export
-calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL, threads = 1) {
+calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL,
+                              threads = 1) {
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_count(rounds), "rounds")
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
@@ -37,15 +40,18 @@ calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, c
   fill_emulator_control(control$emulator, "control$emulator")
   n <- length(used_rows(measurements, "calibrate"))
   fill_calibration_control(control$calibration, measurements, n, "control$calibration")
-  refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), check_threads(threads), runs = runs)$fit
+  refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), check_threads(threads),
+                       runs = runs)$fit
 }
 
 good_effective <- 1 / 3  # effective share of the runs at posterior draws from which no more is refined
-good_border <- 0.01      # share of the posterior in the outer tenth of the region; a normal one has a tenth of that there
+good_border <-
+  0.01      # share of the posterior in the outer tenth of the region; a normal one has a tenth of that there
 lost <- 3                # error over noise from which an emulator does not even tell where the posterior lies
 
-# list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`: such a
-# list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more is wanted of it.
+# list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`:
+# such a list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more
+# is wanted of it.
 refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
                                  hopeless = function(fit) FALSE) {
   runs <- runs %||% regional_runs(ensemble$parameters)
@@ -58,7 +64,8 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   }
   trained <- function(ensemble) train_emulator(ensemble, measurements, control$emulator, threads = threads)
   calibrated <- function(ensemble, calibration, emulator = trained(ensemble)) {
-    own <- tryCatch(calibrate_with_runs(emulator, measurements, calibration, seed, threads), amiss_error_numerical = function(e) {
+    own <- tryCatch(calibrate_with_runs(emulator, measurements, calibration, seed, threads),
+                    amiss_error_numerical = function(e) {
       if (is.null(ensemble$region) || round >= rounds) rlang::cnd_signal(e)
     })
     if (is.null(own)) {  # the posterior lies at the very end of the region
@@ -89,7 +96,8 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   }
   repeat {
     check <- result$fit$check
-    settled <- is.null(result$made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= good_border)
+    settled <- is.null(result$made) ||
+      (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= good_border)
     if (!settled && round < rounds) {
       if (hopeless(result$fit)) break
       # A coarse sampler is enough to see where the posterior lies, until the check passes.
@@ -110,14 +118,16 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   result
 }
 
-# By the runs left out, an emulator over the priors is too coarse to sample from: the search on the simulator is cheaper.
+# By the runs left out, an emulator over the priors is too coarse to sample from: the search on the simulator is
+# cheaper.
 too_coarse <- function(emulator, measurements) {
   is.null(emulator$processes$region) && isTRUE(emulator$diagnostics$series_rmse > measurements$noise_sd)
 }
 
 regional_runs <- function(parameters, least = 0) max(least, 40, 10 * length(parameters))
 
-refining_ais <- list(pilot_chains = 128, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, gradient = FALSE, importance_draws = 0)
+refining_ais <- list(pilot_chains = 128, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, gradient = FALSE,
+                     importance_draws = 0)
 
 coarsely <- function(calibration) {
   calibration <- utils::modifyList(as.list(calibration), list(exact = 0))
@@ -125,9 +135,10 @@ coarsely <- function(calibration) {
   calibration
 }
 
-# list(ensemble, runs): the ensemble of the region to which searches on the simulator lead, and the runs that they and it took. They
-# start from `centre`, if there is one, and over the priors also from their middle and from the run nearest to the record. Where
-# none gets anywhere, as error and discrepancy could not be sampled so far from the record, the ensemble as it was.
+# list(ensemble, runs): the ensemble of the region to which searches on the simulator lead, and the runs that they and
+# it took. They start from `centre`, if there is one, and over the priors also from their middle and from the run
+# nearest to the record. Where none gets anywhere, as error and discrepancy could not be sampled so far from the record,
+# the ensemble as it was.
 searched_ensemble <- function(ensemble, set, centre, runs, threads) {
   starts <- list(centre)
   if (is.null(ensemble$region)) {
@@ -151,5 +162,6 @@ with_checked_runs <- function(result) {
   n <- ncol(made$runs)
   kept <- unique(round(seq(1, n, length.out = min(n, max(1, fit$control$check)))))
   draws <- made$draws[kept]
-  join_runs(result$ensemble, posterior_unit(fit)[draws, , drop = FALSE], fit$values[draws, , drop = FALSE], made$runs[, kept, drop = FALSE])
+  join_runs(result$ensemble, posterior_unit(fit)[draws, , drop = FALSE], fit$values[draws, , drop = FALSE],
+            made$runs[, kept, drop = FALSE])
 }

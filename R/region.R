@@ -1,5 +1,5 @@
-# Regions of the parameters' space: where the posterior lies, in the coordinates in which the priors are N(0, I). An emulator
-# of runs in such a region, along its axes, needs few of them; NULL stands for everywhere.
+# Regions of the parameters' space: where the posterior lies, in the coordinates in which the priors are N(0, I). An
+# emulator of runs in such a region, along its axes, needs few of them; NULL stands for everywhere.
 
 to_normal <- function(unit) stats::qnorm(pmin(pmax(unit, 1e-15), 1 - 1e-15))
 
@@ -16,7 +16,8 @@ posterior_region <- function(fit, growth = 1) {
   covariance <- (1 - shrinkage) * covariance + shrinkage * diag(diag(covariance), ncol(z)) + diag(1e-10, ncol(z))
   root <- growth * t(chol(covariance))
   distance <- sqrt(colSums(forwardsolve(root, t(apart))^2))
-  list(centre = centre, root = root, radius = 1.1 * max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999)))
+  list(centre = centre, root = root,
+       radius = 1.1 * max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999)))
 }
 
 wider_region <- function(region) {
@@ -24,13 +25,15 @@ wider_region <- function(region) {
   region
 }
 
-# The ellipsoid that holds what search_mode() found from several starts: modes as good as the best, or places along a ridge.
+# The ellipsoid that holds what search_mode() found from several starts: modes as good as the best, or places along a
+# ridge.
 region_of_modes <- function(modes) {
   value <- vapply(modes, `[[`, 0, "value")
   modes <- modes[value > max(value) - 10]
   centres <- do.call(rbind, lapply(modes, `[[`, "centre"))
   centre <- colMeans(centres)
-  covariance <- Reduce(`+`, lapply(modes, `[[`, "covariance")) / length(modes) + crossprod(sweep(centres, 2, centre)) / length(modes)
+  covariance <- Reduce(`+`, lapply(modes, `[[`, "covariance")) / length(modes) +
+    crossprod(sweep(centres, 2, centre)) / length(modes)
   list(centre = centre, root = t(chol(covariance)), radius = 1.1 * sqrt(stats::qchisq(0.999, length(centre))))
 }
 

@@ -1,5 +1,5 @@
-# What a model leaves of the calibration record, beside the stated noise, and whether the calendar shows in it: a pattern
-# that no boundary condition carries is of the clock (something at fixed hours) or of time itself (a drift).
+# What a model leaves of the calibration record, beside the stated noise, and whether the calendar shows in it: a
+# pattern that no boundary condition carries is of the clock (something at fixed hours) or of time itself (a drift).
 
 large_remainder <- 1.5  # times the stated noise: autocorrelated noise of the stated size stays below it
 
@@ -23,14 +23,17 @@ remainder_pattern <- function(r, rows, measurements) {
   if (!shares[best] > 0.5) return(NULL)
   if (names(shares)[best] == "drift") {
     ends <- stats::fitted(stats::lm(r ~ stats::poly(hours, 2)))[c(1, length(r))]
-    return(list(what = sprintf("it drifts, by %s %s from the beginning to the end of the calibration", signed(unname(diff(ends))), unit),
+    return(list(what = sprintf("it drifts, by %s %s from the beginning to the end of the calibration",
+                               signed(unname(diff(ends))), unit),
                 where = "Suspect a drifting sensor, or something slow that the inputs do not hold."))
   }
   profile <- tapply(r, clock, mean)
   peak <- which.max(abs(profile - mean(r)))
   hour <- as.numeric(names(profile)[peak])
-  list(what = sprintf("every day around %02d:%02d the measured %s is on average %s %s %s than simulated", floor(hour), round(60 * (hour %% 1)),
-                      measurements$target, short(abs(profile[[peak]])), unit, if (profile[[peak]] > 0) "higher" else "lower"),
+  list(what = sprintf("every day around %02d:%02d the measured %s is on average %s %s %s than simulated", floor(hour),
+                      round(60 * (hour %% 1)),
+                      measurements$target, short(abs(profile[[peak]])), unit,
+                      if (profile[[peak]] > 0) "higher" else "lower"),
        where = "Look for something that follows the clock and is not among the inputs: a heat gain, a schedule, a door.")
 }
 
@@ -54,14 +57,16 @@ daily_share <- function(r, hours, clock) {
   summary(stats::lm(r ~ bin))$adj.r.squared
 }
 
-# TRUE where a drift (a parabola in time) on top of the base model, its parameters adapted to first order, fits the calibration
-# record about as well as the extended model: no decisive difference of likelihoods (white error, a BIC's price for the drift).
+# TRUE where a drift (a parabola in time) on top of the base model, its parameters adapted to first order, fits the
+# calibration record about as well as the extended model: no decisive difference of likelihoods (white error, a BIC's
+# price for the drift).
 drift_rivals <- function(models, measurements, control) {
   base <- models[[1]]
   hours <- measurements$hours[base$fit$rows]
   if (length(hours) < 10) return(FALSE)
   n <- length(hours)
-  drifted <- stats::lm.fit(cbind(1, output_slopes(base$fit), stats::poly(hours, 2)), calibration_residual(base))$residuals
+  drifted <- stats::lm.fit(cbind(1, output_slopes(base$fit), stats::poly(hours, 2)),
+                           calibration_residual(base))$residuals
   extended <- calibration_residual(models[[length(models)]])
   if (!sum(extended^2) > 0) return(FALSE)
   0.5 * n * log(sum(drifted^2) / sum(extended^2)) + log(n) < control$decisive * log(10)

@@ -25,20 +25,26 @@
 #' summary(comparison)
 #' @export
 summary.amiss_comparison <- function(object, ...) {
-  no_doubt <- "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range."
-  structure(list(title = object$title %||% object$study %||% object$measurements$name, headline = comparison_headline(object),
-                 evidence = c(evidence_sentences(object), probability_sentences(object)), remains = remains_sentences(object),
+  no_doubt <-
+    "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range."
+  structure(list(title = object$title %||% object$study %||% object$measurements$name,
+                 headline = comparison_headline(object),
+                 evidence = c(evidence_sentences(object), probability_sentences(object)),
+                 remains = remains_sentences(object),
                  practice = practice_sentences(object), doubts = doubt_sentences(object) %||% no_doubt,
                  inspect = comparison_inspections(object), models = models_words(object),
-                 attribution = attribution_table_words(object), parameters = compared_parameters_words(object), criteria = criteria_words(object),
-                 errors = errors_words(object), heat_loss = heat_loss_words(object), method = comparison_method_table(object), seed = object$seed), class = "summary.amiss_comparison")
+                 attribution = attribution_table_words(object), parameters = compared_parameters_words(object),
+                 criteria = criteria_words(object),
+                 errors = errors_words(object), heat_loss = heat_loss_words(object),
+                 method = comparison_method_table(object), seed = object$seed), class = "summary.amiss_comparison")
 }
 
 #' @rdname summary.amiss_comparison
 #' @export
 print.summary.amiss_comparison <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$headline}")
-  parts <- list("Evidence" = x$evidence, "What remains" = x$remains, "What practice would do" = x$practice, "Doubts" = x$doubts,
+  parts <- list("Evidence" = x$evidence, "What remains" = x$remains, "What practice would do" = x$practice,
+                "Doubts" = x$doubts,
                 "What to inspect next" = x$inspect)
   for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
   cli::cli_bullets(c(">" = "next: {.fun report}"))
@@ -49,9 +55,11 @@ comparison_headline <- function(comparison) {
   best <- table[which.min(table$rank), ]
   if (nrow(table) < 2) return(sprintf("One model, %s, and nothing to compare it with.", best$model))
   rough <- if (!all(table$trusted[table$rank <= 2])) ", though the numbers are rough" else ""
-  if (best$log10_bf >= 2 && best$bf_lower95 > 0) return(sprintf("The record is decisively for %s among %d models%s.", best$model, nrow(table), rough))
+  if (best$log10_bf >= 2 && best$bf_lower95 > 0)
+    return(sprintf("The record is decisively for %s among %d models%s.", best$model, nrow(table), rough))
   sprintf("%s leads among %d models, but not decisively: %s is %s.", best$model, nrow(table), best$against,
-          if (best$bf_lower95 <= 0) "not to be told from it" else paste("only", power_of_ten(best$log10_bf), "times less probable"))
+          if (best$bf_lower95 <= 0) "not to be told from it" else paste("only", power_of_ten(best$log10_bf),
+                                                                        "times less probable"))
 }
 
 probability_sentences <- function(comparison) {
@@ -59,7 +67,8 @@ probability_sentences <- function(comparison) {
   if (nrow(table) < 2) return(NULL)
   table <- table[order(table$rank), ]
   near <- table[-1, ][table$probability[-1] >= 0.01, ]
-  if (nrow(near)) sprintf("All models were equally likely beforehand; after it also %s.", listed(paste0(near$model, " (", percent(near$probability), ")")))
+  if (nrow(near)) sprintf("All models were equally likely beforehand; after it also %s.",
+                          listed(paste0(near$model, " (", percent(near$probability), ")")))
   else "All models were equally likely beforehand; no other keeps one per cent of the probability."
 }
 
@@ -90,21 +99,28 @@ interval_words <- function(lower, upper, digits = 3) paste0("[", short(lower, di
 # Table 3a of the paper, in two: evidence, and attribution with a column for each condition.
 models_words <- function(comparison) {
   evidence <- comparison$tables$evidence
-  factor <- sprintf("%s [%s, %s] against %s", signed(evidence$log10_bf), signed(evidence$bf_lower95), signed(evidence$bf_upper95), evidence$against)
-  data.frame(model = evidence$model, "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence, evidence$lower95, evidence$upper95),
-             estimate = ifelse(evidence$trusted, "sound", "rough"), "log10 Bayes factor" = ifelse(is.na(evidence$log10_bf), "", factor), evidence = ifelse(is.na(evidence$word), "", evidence$word),
-             "log10 B against the first" = signed(evidence$log10_bf_first), probability = percent(evidence$probability), check.names = FALSE)
+  factor <- sprintf("%s [%s, %s] against %s", signed(evidence$log10_bf), signed(evidence$bf_lower95),
+                    signed(evidence$bf_upper95), evidence$against)
+  data.frame(model = evidence$model, "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence,
+                                                                evidence$lower95, evidence$upper95),
+             estimate = ifelse(evidence$trusted, "sound", "rough"), "log10 Bayes factor" = ifelse(
+               is.na(evidence$log10_bf), "", factor), evidence = ifelse(is.na(evidence$word), "", evidence$word),
+             "log10 B against the first" = signed(evidence$log10_bf_first), probability = percent(evidence$probability),
+             check.names = FALSE)
 }
 
 attribution_table_words <- function(comparison) {
   table <- comparison$tables$attribution
   cell <- if (comparison$method == "paper") {
-    sprintf("%.3f [%.3f, %.3f]%s, rank %d", table$difference, table$lower95, table$upper95, ifelse(table$significant, " *", ""), table$rank)
+    sprintf("%.3f [%.3f, %.3f]%s, rank %d", table$difference, table$lower95, table$upper95,
+            ifelse(table$significant, " *", ""), table$rank)
   } else {
-    sprintf("%s, p = %s%s", signed(table$log10_bf_dropped), format(round(table$p_value, 3)), ifelse(table$significant, " *", ""))
+    sprintf("%s, p = %s%s", signed(table$log10_bf_dropped), format(round(table$p_value, 3)),
+            ifelse(table$significant, " *", ""))
   }
   models <- names(comparison$models)
-  columns <- sapply(comparison$measurements$conditions, function(condition) cell[match(paste(models, condition), paste(table$model, table$boundary))], simplify = FALSE)
+  columns <- sapply(comparison$measurements$conditions, function(
+    condition) cell[match(paste(models, condition), paste(table$model, table$boundary))], simplify = FALSE)
   data.frame(model = models, columns, check.names = FALSE)
 }
 
@@ -112,11 +128,15 @@ attribution_table_words <- function(comparison) {
 compared_parameters_words <- function(comparison) {
   rows <- comparison$tables$parameters
   true <- true_values(comparison, rows$name)
-  mean <- mapply(function(model, name) with(comparison$models[[model]]$fit, sum(weights * values[, name]) / sum(weights)), rows$model, rows$name)
+  mean <- mapply(function(model, name) with(comparison$models[[model]]$fit,
+                                            sum(weights * values[, name]) / sum(weights)), rows$model, rows$name)
   holds <- ifelse(rows$lower95 <= true & true <= rows$upper95, "holds the truth", "misses the truth")
-  table <- data.frame(model = rows$model, parameter = rows$label, unit = pretty_unit(rows$unit), prior = interval_words(rows$prior_lower, rows$prior_upper),
-                      true = short(true, 3), mean = short(mean, 3), median = short(rows$median, 3), "95 % interval" = interval_words(rows$lower95, rows$upper95),
-                      note = paste0(ifelse(is.na(true), "", holds), ifelse(rows$at_edge, ", at the edge", "")), check.names = FALSE, row.names = NULL)
+  table <- data.frame(model = rows$model, parameter = rows$label, unit = pretty_unit(rows$unit),
+                      prior = interval_words(rows$prior_lower, rows$prior_upper),
+                      true = short(true, 3), mean = short(mean, 3), median = short(rows$median, 3),
+                      "95 % interval" = interval_words(rows$lower95, rows$upper95),
+                      note = paste0(ifelse(is.na(true), "", holds), ifelse(rows$at_edge, ", at the edge", "")),
+                      check.names = FALSE, row.names = NULL)
   table$note <- sub("^, ", "", table$note)
   if (all(is.na(true))) table[names(table) != "true"] else table
 }
@@ -125,8 +145,10 @@ criteria_words <- function(comparison) {
   table <- comparison$tables$criteria
   p_value <- ifelse(is.na(table$lr_p_value), "not defined", format.pval(table$lr_p_value, 2, eps = 1e-4))
   note <- ifelse(nzchar(table$lr_note), paste0(" (", table$lr_note, ")"), "")
-  ratio <- ifelse(is.na(table$lr), table$lr_note, paste0(sprintf("%.1f against %s, p ", table$lr, table$nested), p_value, note))
-  data.frame(model = table$model, k = table$k, "RMSE of the best fit" = short(table$rmse_best, 3), "log likelihood" = sprintf("%.1f", table$log_likelihood),
+  ratio <- ifelse(is.na(table$lr), table$lr_note,
+                  paste0(sprintf("%.1f against %s, p ", table$lr, table$nested), p_value, note))
+  data.frame(model = table$model, k = table$k, "RMSE of the best fit" = short(table$rmse_best, 3),
+             "log likelihood" = sprintf("%.1f", table$log_likelihood),
              AIC = sprintf("%.1f", table$aic), BIC = sprintf("%.1f", table$bic), "likelihood ratio" = ratio,
              "correlation of errors at one step" = sprintf("%.2f", table$autocorrelation), check.names = FALSE)
 }
@@ -136,7 +158,8 @@ errors_words <- function(comparison) {
   unit <- pretty_unit(comparison$measurements$unit)
   score <- function(use, which) vapply(comparison$models, function(m) m$scores[[use]][[which]], 0)
   inside <- function(use) ifelse(is.na(score(use, "coverage95")), "", paste(round(100 * score(use, "coverage95")), "%"))
-  table <- data.frame(model = names(comparison$models), calibration = short(score("calibrate", "rmse"), 3), inside = inside("calibrate"), row.names = NULL)
+  table <- data.frame(model = names(comparison$models), calibration = short(score("calibrate", "rmse"), 3),
+                      inside = inside("calibrate"), row.names = NULL)
   names(table)[2:3] <- c(paste0("RMSE, calibration [", unit, "]"), "in its 95 % band")
   if (validates(comparison)) {
     table[[paste0("RMSE, held out [", unit, "]")]] <- short(score("validate", "rmse"), 3)
@@ -159,11 +182,15 @@ comparison_method_table <- function(comparison) {
   unit <- pretty_unit(comparison$measurements$unit)
   value <- function(model) {
     fit <- model$fit
-    c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs), paste(short(fit$measurements$noise_sd), unit),
-      paste(short(fit$emulator$basis$discarded_rms), unit), paste(short(fit$emulator$diagnostics$series_rmse), unit), fit$trust$verdict)
+    c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
+      paste(short(fit$measurements$noise_sd), unit),
+      paste(short(fit$emulator$basis$discarded_rms), unit), paste(short(fit$emulator$diagnostics$series_rmse), unit),
+      fit$trust$verdict)
   }
-  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M", "stated measurement noise",
-                     "part of the runs that the Q vectors leave out (RMS)", "error of the emulator (leave-one-out RMS)", "sampler"),
+  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M",
+                     "stated measurement noise",
+                     "part of the runs that the Q vectors leave out (RMS)", "error of the emulator (leave-one-out RMS)",
+                     "sampler"),
         as.data.frame(lapply(comparison$models, value), optional = TRUE))
 }
 
@@ -176,19 +203,28 @@ result_list.amiss_comparison <- function(x) {
     row <- evidence[i, ]
     own <- function(table) table_rows(table[table$model == model$name, setdiff(names(table), "model")])
     loss <- model$heat_loss
-    list(name = model$name, Q = ncol(fit$emulator$basis$vectors), N = length(fit$rows), M = nrow(fit$emulator$processes$inputs),
-         noise_sd = fit$measurements$noise_sd, discarded_rms = fit$emulator$basis$discarded_rms, log10_evidence = row$log10_evidence,
-         log10_evidence_interval = c(row$lower95, row$upper95), trusted = row$trusted, verdict = fit$trust$verdict, rank = row$rank,
-         probability = row$probability, log10_bf = row$log10_bf, log10_bf_interval = c(row$bf_lower95, row$bf_upper95), against = row$against,
-         word = row$word, log10_bf_first = row$log10_bf_first, criteria = own(x$tables$criteria)[[1]], coverage95_validation = model$scores$validate[["coverage95"]],
+    list(name = model$name, Q = ncol(fit$emulator$basis$vectors), N = length(fit$rows),
+         M = nrow(fit$emulator$processes$inputs),
+         noise_sd = fit$measurements$noise_sd, discarded_rms = fit$emulator$basis$discarded_rms,
+         log10_evidence = row$log10_evidence,
+         log10_evidence_interval = c(row$lower95, row$upper95), trusted = row$trusted, verdict = fit$trust$verdict,
+         rank = row$rank,
+         probability = row$probability, log10_bf = row$log10_bf, log10_bf_interval = c(row$bf_lower95, row$bf_upper95),
+         against = row$against,
+         word = row$word, log10_bf_first = row$log10_bf_first, criteria = own(x$tables$criteria)[[1]],
+         coverage95_validation = model$scores$validate[["coverage95"]],
          parameters = own(x$tables$parameters), attribution = own(x$tables$attribution),
-         heat_loss = if (length(loss)) list(mean = mean(loss), interval = unname(stats::quantile(loss, c(0.025, 0.975)))))
+         heat_loss = if (length(loss)) list(mean = mean(loss),
+                                            interval = unname(stats::quantile(loss, c(0.025, 0.975)))))
   }
   true_loss <- true_heat_loss(x)
-  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s, method = x$method, best = best_model(x),
-       headline = comparison_headline(x), models = lapply(seq_along(x$models), model_list), disagreements = as.list(disagreements(x)),
+  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s, method = x$method,
+       best = best_model(x),
+       headline = comparison_headline(x), models = lapply(seq_along(x$models), model_list),
+       disagreements = as.list(disagreements(x)),
        doubts = as.list(doubt_sentences(x)),
-       truth = if (!is.null(x$truth)) list(values = as.list(x$truth$values), heat_loss = if (!is.na(true_loss)) true_loss))
+       truth = if (!is.null(x$truth)) list(values = as.list(x$truth$values),
+                                           heat_loss = if (!is.na(true_loss)) true_loss))
 }
 
 #' @export

@@ -8,8 +8,9 @@
 #' @param ... Not used.
 #' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`), `tag`, `headline`; the
 #'   sentences `note`, `sure`, `change`, `gain`, `remains` and `inspect` (what to inspect next, to settle what is open);
-#'   `mechanisms`, for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits `also`
-#'   and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`, `attribution` and `method`.
+#'   `mechanisms`, for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits
+#'   `also` and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`, `attribution` and
+#'   `method`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -30,10 +31,12 @@ summary.amiss_upgrade <- function(object, ...) {
   last <- object$models[[length(object$models)]]
   structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
               list(note = size_note(object), sure = sure_sentences(object), change = change_sentences(object),
-                   gain = gain_sentences(object), remains = remaining_sentences(object), inspect = upgrade_inspections(object),
+                   gain = gain_sentences(object), remains = remaining_sentences(object),
+                   inspect = upgrade_inspections(object),
                    mechanisms = lapply(adopted_models(object), mechanism_words, object), scores = scores_table(object),
                    changes = changes_table(object), candidates = candidates_words(object),
-                   parameters = parameters_words(last$fit), attribution = last$attribution$table, method = method_table(object),
+                   parameters = parameters_words(last$fit), attribution = last$attribution$table,
+                   method = method_table(object),
                    stopped_because = object$stopped_because, seed = object$seed)), class = "summary.amiss_upgrade")
 }
 
@@ -42,7 +45,8 @@ summary.amiss_upgrade <- function(object, ...) {
 print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$tag}")
   cli::cli_text("{x$headline}")
-  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain, "What remains" = x$remains,
+  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain,
+                "What remains" = x$remains,
                 "What to inspect next" = x$inspect)
   for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
   cli::cli_bullets(c(">" = "next: {.fun report}"))
@@ -63,11 +67,13 @@ diagnosis_verdict <- function(upgrade) {
   of <- function(verdict) Filter(function(m) m$verdict == verdict, adopted)
   headline <- cause_headline(upgrade)
   if (length(of("named"))) {
-    return(list(verdict = "named", tag = if (length(of("named")) > 1) "Causes named" else "Cause named", headline = headline))
+    return(list(verdict = "named", tag = if (length(of("named")) > 1) "Causes named" else "Cause named",
+                headline = headline))
   }
   likely <- of("likely")
   if (length(likely)) {
-    return(list(verdict = "likely", tag = paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; ")), headline = headline))
+    return(list(verdict = "likely", tag = paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; ")),
+                headline = headline))
   }
   list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
 }
@@ -77,16 +83,20 @@ open_verdict <- function(upgrade) {
   base <- upgrade$models[[1]]
   answers <- significant_conditions(base$attribution$table)
   if (length(answers)) {
-    return(unexplained(sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.", listed(answers))))
+    return(unexplained(
+      sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.",
+                               listed(answers))))
   }
   remainder <- remaining_error(base, upgrade$measurements)
   if (remainder$large) {
     return(unexplained(sprintf("Something is missing from the model that no mechanism of the catalogue explains: its error is %s times the stated noise; %s.",
-                               short(remainder$ratio), remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
+                               short(remainder$ratio),
+                               remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
   }
   if (!base$fit$trust$trusted) {
     return(list(verdict = "nothing", tag = "Nothing decisive, but the numbers are not trusted",
-                headline = paste0("No mechanism is called for, but the numbers behind this are not to be trusted: ", base$fit$trust$verdict, ".")))
+                headline = paste0("No mechanism is called for, but the numbers behind this are not to be trusted: ",
+                                  base$fit$trust$verdict, ".")))
   }
   list(verdict = "nothing", tag = "Nothing decisive",
        headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition.")
@@ -101,7 +111,8 @@ cause_headline <- function(upgrade) {
     m <- adopted[[k]]
     switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
            likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
-           paste0("\"", m$mechanism, "\" fits too, but data held out do not gain by it: take it as a stand-in for something else."))
+           paste0("\"", m$mechanism,
+                  "\" fits too, but data held out do not gain by it: take it as a stand-in for something else."))
   }, "")
   paste(told, collapse = " ")
 }
@@ -124,7 +135,8 @@ odds <- function(x) {
 }
 
 evidence_sentence <- function(row) {
-  sprintf("The evidence for %s is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf), odds_interval(c(row$lower95, row$upper95)))
+  sprintf("The evidence for %s is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf),
+          odds_interval(c(row$lower95, row$upper95)))
 }
 
 # Left out where both ends read the same.
@@ -141,12 +153,16 @@ sure_sentences <- function(upgrade) {
   if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
   trials <- first_trials(upgrade)
   best <- trials[1, ]
-  needed <- sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no doubt who gains.", sub(" in favour", "", odds(upgrade$control$decisive)))
+  needed <-
+    sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no doubt who gains.",
+            sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted_models(upgrade))) {
-    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed, trust_sentence(upgrade, best)))
+    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
+             trust_sentence(upgrade, best)))
   }
   later <- vapply(adopted_models(upgrade)[-1], function(m) {
-    evidence_sentence(upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ])
+    evidence_sentence(upgrade$candidates[upgrade$candidates$from == m$parent &
+                                         upgrade$candidates$mechanism == m$mechanism, ])
   }, "")
   c(evidence_sentence(best), later, probability_sentence(trials), trust_sentence(upgrade, best))
 }
@@ -154,7 +170,9 @@ sure_sentences <- function(upgrade) {
 # Only where the size of the error itself says that something is missing.
 missing_sentence <- function(upgrade) {
   left <- remaining_error(upgrade$models[[1]], upgrade$measurements)
-  if (left$large) sprintf("That something is missing is plain: the error is %s times the stated noise. What it is stays open.", short(left$ratio))
+  if (left$large)
+    sprintf("That something is missing is plain: the error is %s times the stated noise. What it is stays open.",
+            short(left$ratio))
 }
 
 probability_sentence <- function(trials) {
@@ -162,7 +180,8 @@ probability_sentence <- function(trials) {
   all <- sort(all, decreasing = TRUE)
   near <- all[-1][all[-1] >= 0.01]
   told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
-  paste0("Of ", nrow(trials), if (nrow(trials) == 1) " mechanism" else " mechanisms", " tried and \"no change\", all equally likely beforehand, ",
+  paste0("Of ", nrow(trials), if (nrow(trials) == 1) " mechanism" else " mechanisms",
+         " tried and \"no change\", all equally likely beforehand, ",
          names(all)[1], " holds ", percent(unname(all[1])), " of the probability",
          if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
 }
@@ -189,10 +208,13 @@ size_note <- function(upgrade) {
   change <- if (length(upgrade$models) > 2) "changes" else "change"
   if (!improves_held_out(upgrade)) {
     return(sprintf("The %s not improve predictions of data the model has not seen (typical error %s %s before, %s after; %s). Take it as a hint, not as a repair.",
-                   if (length(upgrade$models) > 2) "changes do" else "change does", short(held[1]), unit, short(held[2]), noise))
+                   if (length(upgrade$models) > 2) "changes do" else "change does", short(held[1]), unit,
+                   short(held[2]), noise))
   }
-  if (anyNA(held)) sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit), noise)
-  else sprintf("With the %s the typical error on data the model has not seen %s; %s.", change, change_words(held[1], held[2], m$unit), noise)
+  if (anyNA(held))
+    sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit), noise)
+  else sprintf("With the %s the typical error on data the model has not seen %s; %s.", change,
+               change_words(held[1], held[2], m$unit), noise)
 }
 
 adopted_models <- function(upgrade) upgrade$models[-1]
@@ -204,7 +226,8 @@ change_sentences <- function(upgrade) {
   unlist(lapply(adopted, function(model) {
     row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
     entry <- upgrade$catalogue[[model$mechanism]]
-    c(sprintf("%s (%s), driven by %s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf)),
+    c(sprintf("%s (%s), driven by %s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict,
+              listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf)),
       step_sentence(upgrade, model), doubt_sentence(model), confounded_sentence(model))
   }))
 }
@@ -227,7 +250,8 @@ rival_sentence <- function(upgrade, model) {
   others <- trials[trials$mechanism != model$mechanism, ]
   kept <- stats::setNames(c(others$probability, max(0, 1 - sum(trials$probability))), c(others$mechanism, "no change"))
   kept <- sort(kept[kept >= 0.01], decreasing = TRUE)
-  if (!length(kept)) return("Neither another mechanism tried at this step nor \"no change\" keeps one per cent of the probability.")
+  if (!length(kept))
+    return("Neither another mechanism tried at this step nor \"no change\" keeps one per cent of the probability.")
   sprintf("At this step %s too: %s.", if (length(kept) > 1) "others are possible" else "another is possible",
           listed(paste0(names(kept), " (", percent(unname(kept)), ")")))
 }
@@ -239,7 +263,8 @@ step_sentence <- function(upgrade, model) {
   told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
   gain <- model$held_out_gain
   sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
-          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s the uncertainty of that change", told("validate"),
+          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s the uncertainty of that change",
+                                                    told("validate"),
                                                     if (gain$improves) "more than" else "not more than"))
 }
 
@@ -249,7 +274,8 @@ doubt_sentence <- function(model) {
 
 confounded_sentence <- function(model) {
   if (length(model$confounded_with)) {
-    sprintf("What %s does, %s could do in part as well (correlated beyond 0.4).", model$mechanism, listed(parameter_labels(model$fit, model$confounded_with)))
+    sprintf("What %s does, %s could do in part as well (correlated beyond 0.4).", model$mechanism,
+            listed(parameter_labels(model$fit, model$confounded_with)))
   }
 }
 
@@ -277,10 +303,13 @@ gain_sentences <- function(upgrade) {
   inside <- score_of(upgrade, if (anyNA(held)) "calibrate" else "validate", "coverage95")
   inside <- round(100 * inside[length(inside)])
   told <- function(v) if (length(v) < 2) paste("is", short(v), pretty_unit(unit)) else change_words(v[1], v[2], unit)
-  c(paste0("The typical error (RMSE) ", told(seen), " in calibration", if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
+  c(paste0("The typical error (RMSE) ", told(seen), " in calibration",
+           if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
     if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
-    sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside, if (anyNA(held)) "calibration" else "held-out",
-            if (inside < 88) paste0(": ", narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
+    sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside,
+            if (anyNA(held)) "calibration" else "held-out",
+            if (inside < 88) paste0(": ",
+                                    narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
 }
 
 # Too few measurements in the band: because the simulation lies to one side of them, or all round.
@@ -289,7 +318,8 @@ narrow_words <- function(upgrade) {
   p <- p[p$use == if (has_validation(upgrade)) "validate" else "calibrate", ]
   bias <- mean(p$observed - p$mean)
   if (abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
-  sprintf("the simulation is on average %s %s too %s there", short(abs(bias)), pretty_unit(upgrade$measurements$unit), if (bias > 0) "low" else "high")
+  sprintf("the simulation is on average %s %s too %s there", short(abs(bias)), pretty_unit(upgrade$measurements$unit),
+          if (bias > 0) "low" else "high")
 }
 
 remaining_sentences <- function(upgrade) {
@@ -297,22 +327,28 @@ remaining_sentences <- function(upgrade) {
   rows <- parameter_rows(upgrade$models[[length(upgrade$models)]]$fit)
   edge <- rows$label[rows$at_edge]
   last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
-  c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers)) else "The remaining error answers to no boundary condition.",
+  c(if (length(answers)) sprintf("The remaining error answers to %s.",
+                                 listed(answers)) else "The remaining error answers to no boundary condition.",
     if (last$large) sprintf("In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
-                            if (is.null(last$pattern)) ": either the stated noise is too small, or something else is missing."
+                            if (is.null(last$pattern))
+                              ": either the stated noise is too small, or something else is missing."
                             else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
     reach_sentence(upgrade$models[[length(upgrade$models)]]$fit),
     vapply(group_words(upgrade$models[[length(upgrade$models)]]$attribution), paste0, "", "."),
-    if (length(edge)) sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these parameters make up for something else.", listed(edge))
+    if (length(edge))
+      sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these parameters make up for something else.",
+              listed(edge))
     else "No parameter is at the edge of its range.",
-    sprintf("The search stopped because %s%s.", sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
+    sprintf("The search stopped because %s%s.",
+            sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
             if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))
 }
 
 # What the reach of the discrepancy says of the last model.
 reach_sentence <- function(fit) {
   free <- sum(fit$reach[is.infinite(fit$control$reach)])
-  if (length(fit$reach) > 1 && free > 0.9) "What remains reaches into what the parameters can do: they may hide a part of it, so do not read their values as physical."
+  if (length(fit$reach) > 1 && free > 0.9)
+    "What remains reaches into what the parameters can do: they may hide a part of it, so do not read their values as physical."
 }
 
 scores_table <- function(upgrade) {
@@ -328,7 +364,8 @@ candidates_words <- function(upgrade) {
   table <- candidate_table(upgrade)
   table <- table[order(table$step, -table$log10_bf), ]
   drives <- vapply(table$mechanism, function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
-  data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives, "log10 Bayes factor" = signed(table$log10_bf),
+  data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
+             "log10 Bayes factor" = signed(table$log10_bf),
              "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)), evidence = table$word,
              probability = percent(table$probability), estimate = ifelse(table$trusted, "sound", "rough"),
              decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
@@ -349,13 +386,16 @@ method_table <- function(upgrade) {
     unit <- pretty_unit(fit$measurements$unit)
     c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
       paste(short(fit$measurements$noise_sd), unit), paste(short(fit$emulator$basis$discarded_rms), unit),
-      paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ", signed(fit$interval[2] / log(10)), ")"),
+      paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ",
+             signed(fit$interval[2] / log(10)), ")"),
       fit$check$verdict %||% "not checked", fit$trust$verdict)
   }
   columns <- lapply(upgrade$models, value)
   names(columns) <- vapply(upgrade$models, `[[`, "", "name")
-  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M", "stated measurement noise",
-                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)", "emulator", "trust"),
+  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M",
+                     "stated measurement noise",
+                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)",
+                     "emulator", "trust"),
         as.data.frame(columns, optional = TRUE))
 }
 
@@ -378,7 +418,9 @@ score_tiles <- function(upgrade) {
 }
 
 conditions_words <- function(table) {
-  data.frame("boundary condition" = table$boundary, "log10 Bayes factor lost without it" = sprintf("%+.1f", table$log10_bf_dropped),
+  data.frame("boundary condition" = table$boundary,
+             "log10 Bayes factor lost without it" = sprintf("%+.1f", table$log10_bf_dropped),
              "share of the error" = sprintf("%.0f %%", 100 * table$share), "p-value" = format(round(table$p_value, 3)),
-             significant = ifelse(table$significant, "yes", "no"), estimate = ifelse(table$trusted, "sound", "rough"), check.names = FALSE)
+             significant = ifelse(table$significant, "yes", "no"), estimate = ifelse(table$trusted, "sound", "rough"),
+             check.names = FALSE)
 }

@@ -1,21 +1,24 @@
-# What a mechanism could explain, before it has an emulator: a few runs of it at the posterior of the present model, its own
-# parameters over their priors, show the responses that it adds. If the present model is taken as the line that touches it there,
-# and the responses come in amounts that are free, the evidence is a matter of milliseconds (response_evidence_()).
+# What a mechanism could explain, before it has an emulator: a few runs of it at the posterior of the present model, its
+# own parameters over their priors, show the responses that it adds. If the present model is taken as the line that
+# touches it there, and the responses come in amounts that are free, the evidence is a matter of milliseconds
+# (response_evidence_()).
 
-response_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1, importance_draws = 300,
+response_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1,
+                     importance_draws = 300,
                      ess_drop = 0.3, gradient = FALSE)
 
 response_scales <- c(1, 0.25, 0.0625)
 
-# One row for each trial: log10 Bayes factor of its responses against none, 95 % interval, word, and the runs made. NA where its
-# runs failed.
+# One row for each trial: log10 Bayes factor of its responses against none, 95 % interval, word, and the runs made. NA
+# where its runs failed.
 response_factors <- function(fit, trials, settings) {
   emulator <- fit$emulator
   m <- fit$measurements
   data <- history_data(emulator, m, fit$rows, fit$control)
   ais <- fill_ais_control(utils::modifyList(fit$control$ais, response_ais))
   evidence <- function(responses) {
-    call_engine(response_evidence_(data, fit$priors, fit$tangent, responses, ais, engine_context(settings$seed, settings$threads)))
+    call_engine(response_evidence_(data, fit$priors, fit$tangent, responses, ais,
+                                   engine_context(settings$seed, settings$threads)))
   }
   # Of the amounts that suit the record best: a mechanism whose prior is wide may be needed in a small part of it alone.
   best <- function(responses) {
@@ -32,14 +35,15 @@ response_factors <- function(fit, trials, settings) {
     values <- response_design(trial, centre)
     responses <- simulated(trial, values) - present
     responses <- responses[, colSums(!is.finite(responses)) == 0, drop = FALSE]
-    if (!ncol(responses)) return(data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_, word = NA_character_, runs = nrow(values)))
+    if (!ncol(responses)) return(data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_,
+                                            word = NA_character_, runs = nrow(values)))
     cbind(factor_of(best(responses), nothing), runs = nrow(values))
   })
   do.call(rbind, rows)
 }
 
-# Values of the parameters for the runs that show a mechanism's responses: those of the model at `centre`, those that the mechanism
-# brings spread over their priors.
+# Values of the parameters for the runs that show a mechanism's responses: those of the model at `centre`, those that
+# the mechanism brings spread over their priors.
 response_design <- function(trial, centre) {
   parameters <- free_parameters(trial)
   new <- setdiff(names(parameters), colnames(centre))

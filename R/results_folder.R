@@ -6,16 +6,19 @@ hold_folder <- function(out, call = rlang::caller_env()) {
   check_input(checkmate::check_string(out, min.chars = 1), "out", call = call)
   made <- !dir.exists(out) && suppressWarnings(dir.create(out, recursive = TRUE))
   held <- list(out = out, made = made, holder = file.path(out, ".amiss-holder"))
-  lock <- tryCatch(suppressWarnings(list(filelock::lock(file.path(out, ".amiss-lock"), timeout = 0))), error = function(e) NULL)
+  lock <- tryCatch(suppressWarnings(list(filelock::lock(file.path(out, ".amiss-lock"), timeout = 0))),
+                   error = function(e) NULL)
   if (is.null(lock)) {
     abort_input(c("{.arg out} = {.file {out}} is not a folder that can be written.",
                   i = "Name another folder; it is made if it does not exist."), call = call)
   }
   if (is.null(lock[[1]])) {
     holder <- tryCatch(suppressWarnings(readLines(held$holder)), error = function(e) "another process")
-    abort_input(c("The folder {.file {out}} is in use by {holder}.", i = "Wait until it has ended, or name another folder."), call = call)
+    abort_input(c("The folder {.file {out}} is in use by {holder}.",
+                  i = "Wait until it has ended, or name another folder."), call = call)
   }
-  writeLines(sprintf("process %d on %s since %s", Sys.getpid(), Sys.info()[["nodename"]], format(Sys.time(), "%Y-%m-%d %H:%M:%S %Z")), held$holder)
+  writeLines(sprintf("process %d on %s since %s", Sys.getpid(), Sys.info()[["nodename"]],
+                     format(Sys.time(), "%Y-%m-%d %H:%M:%S %Z")), held$holder)
   c(held, lock = lock)
 }
 
@@ -27,8 +30,8 @@ release_folder <- function(held) {
   if (held$made) remove_empty(held$out)
 }
 
-# Everything is made elsewhere and copied beside its place; then what has these names is moved aside as a whole and the new
-# moved in. Results of two runs never stand side by side.
+# Everything is made elsewhere and copied beside its place; then what has these names is moved aside as a whole and the
+# new moved in. Results of two runs never stand side by side.
 write_study <- function(result, out, quiet = FALSE) {
   work <- tempfile("amiss-new-")
   on.exit(unlink(work, recursive = TRUE))
@@ -57,7 +60,8 @@ copy_whole <- function(work, out, copy = file.copy, call = rlang::caller_env()) 
   copied <- suppressWarnings(copy(work, out, recursive = TRUE))
   if (!copied || !identical(sizes(staging), sizes(work))) {
     unlink(staging, recursive = TRUE)
-    abort_input(c("The results could not be copied into {.file {out}}.", i = "Is the disk full? What was computed is kept: the same call goes on from it."),
+    abort_input(c("The results could not be copied into {.file {out}}.",
+                  i = "Is the disk full? What was computed is kept: the same call goes on from it."),
                 call = call)
   }
   staging

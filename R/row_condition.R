@@ -1,5 +1,5 @@
-# Conditions of a study file, such as `phase == "rolbs" & hour <= 180`: a small language over the columns of the data. R's
-# parser reads it; what is not in this table is refused, and nothing is ever evaluated as R code.
+# Conditions of a study file, such as `phase == "rolbs" & hour <= 180`: a small language over the columns of the data.
+# R's parser reads it; what is not in this table is refused, and nothing is ever evaluated as R code.
 
 row_operators <- list(
   "==" = 2, "!=" = 2, "<" = 2, "<=" = 2, ">" = 2, ">=" = 2, "&" = 2, "|" = 2, "!" = 1, "(" = 1,
@@ -26,7 +26,8 @@ row_condition <- function(text, data, what, call = rlang::caller_env()) {
     if (inherits(e, "amiss_error")) stop(e)
     abort_input(c("{.arg {what}} = {.val {text}} has no value: {conditionMessage(e)}.", i = hint), call = call)
   })
-  check_input(checkmate::check_logical(rows, len = nrow(data)), what, "One TRUE or FALSE for every row of the data.", call = call)
+  check_input(checkmate::check_logical(rows, len = nrow(data)), what, "One TRUE or FALSE for every row of the data.",
+              call = call)
   rows
 }
 

@@ -7,12 +7,12 @@
 #' edit as `base`, so that edits stack in any order. Make every [mechanism()] of a function in this way: an edit that
 #' writes the model anew would lose what was adopted before it.
 #'
-#' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with named columns, one row
-#'   per interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is given a
-#'   list of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment` (its number) and
-#'   `hold` (the target as measured in the rows that warm up, `NA` in the others).
-#'   `with_parameters()`: if it has an argument `base`, it is given the simulator before the edit, as a function of
-#'   `values` and, if they are to differ, `drivers` and `info`; `NULL` leaves the function as it is.
+#' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with named columns, one row per
+#'   interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is given a list
+#'   of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment` (its number) and
+#'   `hold` (the target as measured in the rows that warm up, `NA` in the others). `with_parameters()`: if it has an
+#'   argument `base`, it is given the simulator before the edit, as a function of `values` and, if they are to differ,
+#'   `drivers` and `info`; `NULL` leaves the function as it is.
 #' @param ... The parameters, each made by [free()]. Those of `model` stay.
 #' @param boundary Names of the driver columns that the function needs; `with_parameters()`: beside those of `model`.
 #' @param name A name for people.
@@ -45,7 +45,8 @@ function_simulator <- function(f, ..., boundary = character(), name = "simulator
   parameters <- named_parameters(list(...))
   check_columns_named(boundary)
   check_input(checkmate::check_string(name), "name")
-  structure(list(format_version = format_version, name = name, f = f, parameters = parameters, boundary = unique(boundary)),
+  structure(list(format_version = format_version, name = name, f = f, parameters = parameters,
+                 boundary = unique(boundary)),
             class = "amiss_function_simulator")
 }
 
@@ -130,7 +131,8 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
 #' @export
 print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Simulator} {.val {x$name}} (an R function) with {length(x$parameters)} free parameter{?s}")
-  cli::cli_bullets(stats::setNames(vapply(utils::head(x$parameters, 10), format, ""), rep("*", min(10, length(x$parameters)))))
+  cli::cli_bullets(stats::setNames(vapply(utils::head(x$parameters, 10), format, ""),
+                                   rep("*", min(10, length(x$parameters)))))
   cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
 
@@ -145,8 +147,8 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @param hold Values at which the target is held during warm-up, `NA` where it is free; a simulator that cannot be
 #'   held ignores it.
 #' @param threads Number of threads.
-#' @param ... What a method may use or ignore: `time` of each row (`POSIXct`, or hours) and the number of the `segment`. Every method must have
-#'   it.
+#' @param ... What a method may use or ignore: `time` of each row (`POSIXct`, or hours) and the number of the `segment`.
+#'   Every method must have it.
 #' @return `free_parameters()`: named list of [free()]; `driver_names()`: names of the columns that it needs;
 #'   `simulate_runs()`: matrix with one row per interval and one column per run, `NaN` columns where a run failed.
 #' @examples
@@ -181,7 +183,9 @@ check_run_request <- function(simulator, values, drivers, step_h, hold, threads,
   check_input(checkmate::check_number(step_h, lower = 1e-9, finite = TRUE), "step_h", call = call)
   check_input(checkmate::check_numeric(hold, null.ok = TRUE), "hold", call = call)
   if (!length(hold) %in% c(0, nrow(drivers))) {
-    abort_input("{.arg hold} has {length(hold)} value{?s}; one for each of the {nrow(drivers)} row{?s} of the drivers is needed.", call = call)
+    abort_input(
+      "{.arg hold} has {length(hold)} value{?s}; one for each of the {nrow(drivers)} row{?s} of the drivers is needed.",
+                call = call)
   }
   check_threads(threads, call)
 }
@@ -191,7 +195,8 @@ check_named_columns <- function(x, name, needed, call = rlang::caller_env()) {
   check_input(checkmate::check_matrix(x, if (NCOL(x) > 0) "numeric", min.rows = 1), name, call = call)
   absent <- setdiff(needed, colnames(x))
   if (length(absent)) {
-    abort_input(c("{.arg {name}} has no column {.val {absent}}.", i = "Columns there: {.val {colnames(x)}}."), call = call)
+    abort_input(c("{.arg {name}} has no column {.val {absent}}.", i = "Columns there: {.val {colnames(x)}}."),
+                call = call)
   }
   twice <- colnames(x)[duplicated(colnames(x))]
   if (length(twice)) abort_input("{.arg {name}} has the column {.val {twice[1]}} twice.", call = call)
@@ -206,7 +211,9 @@ check_run_dots <- function(..., call = rlang::caller_env()) {
 # One time for each row.
 check_row_times <- function(time, rows, call = rlang::caller_env()) {
   if (length(time) != rows) {
-    abort_input("{.arg time} has {length(time)} value{?s}; one for each of the {rows} row{?s} of the drivers is needed.", call = call)
+    abort_input(
+      "{.arg time} has {length(time)} value{?s}; one for each of the {rows} row{?s} of the drivers is needed.",
+                call = call)
   }
 }
 
@@ -279,7 +286,8 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
   known <- any(paste0("simulate_runs.", class(simulator)) %in% utils::methods("simulate_runs"))
   if (!known) {
     abort_input(c("{.arg simulator} is of class {.cls {class(simulator)}}, which is no simulator.",
-                  i = "Make one with {.fun zone} or {.fun function_simulator}, or give runs with {.fun ensemble}."), call = call)
+                  i = "Make one with {.fun zone} or {.fun function_simulator}, or give runs with {.fun ensemble}."),
+                  call = call)
   }
 }
 
@@ -297,7 +305,8 @@ simulate_measured <- function(simulator, values, measurements, uses, threads, ca
   needed <- driver_names(simulator)
   absent <- setdiff(needed, colnames(raw$drivers))
   if (length(absent)) {
-    abort_input(c("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the measurements do not have.",
+    abort_input(
+      c("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the measurements do not have.",
                   i = "Columns there: {.val {colnames(raw$drivers)}}."), call = call)
   }
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
@@ -311,7 +320,8 @@ simulate_measured <- function(simulator, values, measurements, uses, threads, ca
       bad <- own[!is.finite(raw$drivers[own, column])]
       if (length(bad)) {
         abort_input(c("Driver {.val {column}} has {length(bad)} missing value{?s}; the first is in row {bad[1]} ({format(raw$time[bad[1]])}).",
-                      i = "A simulator needs every value of what drives it: fill the gap, or remove these rows as a whole."), call = call)
+                      i = "A simulator needs every value of what drives it: fill the gap, or remove these rows as a whole."),
+                      call = call)
       }
     }
     hold <- ifelse(raw$use[own] == "warmup", raw$y[own], NA_real_)

@@ -2,7 +2,8 @@ study_fields <- list(
   needed = c("study", "data", "time", "target", "boundary"),
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
-  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h", "runs", "seed", "control", "title"))
+  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
+               "fill_gaps_h", "runs", "seed", "control", "title"))
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
@@ -18,25 +19,29 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' and, where the record is synthetic, `truth` (an R file whose value is a list of a `simulator` and its `values`).
 #'
 #' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
-#' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`, `average_h`,
-#' `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]), `calibrate`, `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in
-#' [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
+#' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`,
+#' `average_h`, `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]), `calibrate`,
+#' `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in [upgrade_model()] or
+#' [compare_models()]). R files are evaluated in their own folder.
 #'
-#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical. Conditions are
-#' no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, `+ - * /` and `%in% c(...)`.
+#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical.
+#' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, `+ -
+#' * /` and `%in% c(...)`.
 #'
 #' @param path The YAML file.
-#' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It is
-#'   filled only when all is computed; until then its folder `stages` holds the finished models, and the same call goes on
-#'   from there if it was interrupted, as long as the code of the study's R files is the same. What has these names before,
-#'   such as earlier results, is moved into a folder `earlier-` with the time. One run at a time can use the folder.
+#' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It
+#'   is filled only when all is computed; until then its folder `stages` holds the finished models, and the same call
+#'   goes on from there if it was interrupted, as long as the code of the study's R files is the same. What has these
+#'   names before, such as earlier results, is moved into a folder `earlier-` with the time. One run at a time can use
+#'   the folder.
 #' @param seed Overrides the seed of the file.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
-#' @param trust Whether the R files that the study names may run, and files outside its folder be read: both can do whatever
-#'   you can. If not, such a study is refused, or you are asked at a terminal. Studies that ship with the package need no trust.
-#' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], invisibly; `read_study()`: a list of the
-#'   study's pieces.
+#' @param trust Whether the R files that the study names may run, and files outside its folder be read: both can do
+#'   whatever you can. If not, such a study is refused, or you are asked at a terminal. Studies that ship with the
+#'   package need no trust.
+#' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], invisibly; `read_study()`: a list of
+#'   the study's pieces.
 #' @examples
 #' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
 #' @export
@@ -87,12 +92,14 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
   rows <- function(field) row_condition(study[[field]], data, field)
   measure <- function() {
     measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
-                 noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"), validate = rows("validate"),
+                 noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
+                 validate = rows("validate"),
                  warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
                  time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0)
   }
   pieces <- if (is.null(study$models)) upgrade_pieces(files) else comparison_pieces(files, study$method)
-  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150, control = study$control),
+  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150,
+         control = study$control),
     pieces, list(measurements = if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure(),
                  code = content_hash(lapply(files[is_code(files)], study_code))))
 }
@@ -104,7 +111,8 @@ check_study_control <- function(study, call = rlang::caller_env()) {
 }
 
 check_study_fields <- function(study, path, call = rlang::caller_env()) {
-  if (!is.list(study) || is.null(names(study))) abort_input("The study file {.file {path}} holds no fields.", call = call)
+  if (!is.list(study) || is.null(names(study)))
+    abort_input("The study file {.file {path}} holds no fields.", call = call)
   unknown <- setdiff(names(study), unlist(study_fields))
   if (length(unknown)) {
     abort_input(c("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",
@@ -120,7 +128,8 @@ check_study_fields <- function(study, path, call = rlang::caller_env()) {
   absent <- setdiff(c(study_fields$needed, if (!compares) study_fields$upgrade), names(study))
   if (length(absent)) {
     abort_input(c("The study file {.file {path}} lacks {cli::qty(absent)}field{?s} {.field {absent}}.",
-                  i = if (any(absent %in% study_fields$upgrade)) "Or name {.field models}, to compare several."), call = call)
+                  i = if (any(absent %in% study_fields$upgrade)) "Or name {.field models}, to compare several."),
+                  call = call)
   }
   for (field in c("study", "title", "unit", "time", "target")) {
     check_input(checkmate::check_string(study[[field]], null.ok = field %in% c("title", "unit")), field,
@@ -145,7 +154,8 @@ require_trust <- function(files, folder, trust, call = rlang::caller_env()) {
   code <- files[is_code(files)]
   other <- files[outside & !is_code(files)]
   if (rlang::is_interactive()) {
-    question <- paste0("The study asks to use these files, which can do whatever you can:\n", paste(c(code, other), collapse = "\n"), "\nTrust it?")
+    question <- paste0("The study asks to use these files, which can do whatever you can:\n",
+                       paste(c(code, other), collapse = "\n"), "\nTrust it?")
     if (isTRUE(utils::askYesNo(question, default = FALSE))) return(invisible())
   }
   cli::cli_abort(c("The study asks for trust that was not given.",
@@ -200,7 +210,8 @@ study_path <- function(path, folder, field, call = rlang::caller_env()) {
 source_value <- function(path, field, call = rlang::caller_env()) {
   tryCatch(sys.source_value(path), error = function(e) {
     if (inherits(e, "amiss_error")) stop(e)
-    abort_input(c("The {.field {field}} file {.file {path}} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
+    abort_input(c("The {.field {field}} file {.file {path}} stopped with an error.", x = "{conditionMessage(e)}"),
+                call = call)
   })
 }
 
@@ -231,21 +242,27 @@ result_list.amiss_upgrade <- function(x) {
          discarded_rms = fit$emulator$basis$discarded_rms, log10_evidence = fit$log_evidence / log(10),
          log10_evidence_interval = fit$interval / log(10), trusted = fit$trust$trusted, trust = fit$trust$verdict,
          verdict = model$verdict, doubts = as.list(model$doubts), confounded_with = as.list(model$confounded_with),
-         held_out_gain = model$held_out_gain[c("mean", "standard_error")], emulator_error = fit$check$error, emulator_ratio = fit$check$ratio,
+         held_out_gain = model$held_out_gain[c("mean", "standard_error")], emulator_error = fit$check$error,
+         emulator_ratio = fit$check$ratio,
          emulator_checked = fit$check$passed, refinements = fit$rounds, reach = as.list(fit$reach),
          rmse_calibration = model$scores$calibrate[["rmse"]], rmse_validation = model$scores$validate[["rmse"]],
-         coverage95_validation = model$scores$validate[["coverage95"]], crps_calibration = model$scores$calibrate[["crps"]],
+         coverage95_validation = model$scores$validate[["coverage95"]],
+         crps_calibration = model$scores$calibrate[["crps"]],
          crps_validation = model$scores$validate[["crps"]], parameters = table_rows(parameter_table(fit)),
-         attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group")]))
+         attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value",
+                                                            "significant", "group")]))
   }
   candidate_list <- function(i) {
     row <- x$candidates[i, ]
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
-         probability = row$probability, trusted = row$trusted, screened = row$screened, judged_by = row$judged_by, parameters = table_rows(row$parameters[[1]]))
+         probability = row$probability, trusted = row$trusted, screened = row$screened, judged_by = row$judged_by,
+         parameters = table_rows(row$parameters[[1]]))
   }
   cause <- x$named_cause
   if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
-  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s, runs_total = x$runs_total,
-       diagnosis = diagnosis_verdict(x), models = lapply(x$models, model_list), candidates = lapply(seq_len(NROW(x$candidates)), candidate_list),
+  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s,
+       runs_total = x$runs_total,
+       diagnosis = diagnosis_verdict(x), models = lapply(x$models, model_list),
+       candidates = lapply(seq_len(NROW(x$candidates)), candidate_list),
        named_cause = cause, gain = x$gain, stopped_because = x$stopped_because)
 }

@@ -14,7 +14,8 @@ read_study_file <- function(path, call = rlang::caller_env()) {
   if (any(startsWith(lines, "%TAG"))) refuse("Tags cannot be declared in a study.")
   written <- grep("^(%|\\s*(#|$))", lines, value = TRUE, invert = TRUE)
   marks <- grep("^(---|\\.\\.\\.)(\\s|$)", written)
-  if (any(marks > 1 & !(marks == length(written) & startsWith(written[marks], "...")))) refuse("It holds several documents; give each its own file.")
+  if (any(marks > 1 & !(marks == length(written) & startsWith(written[marks], "..."))))
+    refuse("It holds several documents; give each its own file.")
   tags <- new.env()
   study <- tryCatch(yaml::yaml.load(text, eval.expr = FALSE, handlers = c(plain_words, noted_tags(text, tags))),
                     error = function(e) refuse(conditionMessage(e)), warning = function(w) refuse(conditionMessage(w)))
@@ -67,7 +68,8 @@ check_study_size <- function(study, refuse) {
 # The text of a regular file, marked as UTF-8, without a byte-order mark.
 read_utf8 <- function(path, field, call = rlang::caller_env()) {
   if (!fs::is_file(path, follow = TRUE)) {
-    abort_input(c("The {.field {field}} file {.file {path}} is not a regular file.", i = "Name a file that can be read from its start to its end."),
+    abort_input(c("The {.field {field}} file {.file {path}} is not a regular file.",
+                  i = "Name a file that can be read from its start to its end."),
                 call = call)
   }
   bytes <- tryCatch(suppressWarnings(readBin(path, "raw", file.size(path))), error = function(e) {
@@ -77,7 +79,8 @@ read_utf8 <- function(path, field, call = rlang::caller_env()) {
   if (identical(utils::head(bytes, 3), mark)) bytes <- bytes[-(1:3)]
   line_of <- function(byte) 1 + sum(bytes[seq_len(byte)] == as.raw(10))
   invalid <- function(line) {
-    abort_input(c("The {.field {field}} file {.file {path}} is not UTF-8 text: line {line}.", i = "Save it with the encoding UTF-8."), call = call)
+    abort_input(c("The {.field {field}} file {.file {path}} is not UTF-8 text: line {line}.",
+                  i = "Save it with the encoding UTF-8."), call = call)
   }
   if (any(bytes == as.raw(0))) invalid(line_of(which(bytes == as.raw(0))[1]))
   text <- rawToChar(bytes)

@@ -19,12 +19,14 @@ check_time_options <- function(format, zone, call) {
   known <- c(day_orders, names(time_units), "unix")
   if (!is.null(format) && !format %in% known && !is_pattern(format)) {
     abort_input(c("{.arg time_format} = {.val {format}} is not known.",
-                  i = "Give one of {.val {known}}, or a format of {.fun strptime} such as {.val %d.%m.%Y %H:%M}."), call = call)
+                  i = "Give one of {.val {known}}, or a format of {.fun strptime} such as {.val %d.%m.%Y %H:%M}."),
+                  call = call)
   }
   check_input(checkmate::check_string(zone, null.ok = TRUE), "time_zone", call = call)
   if (!is.null(zone) && !zone %in% OlsonNames()) {
     abort_input(c("{.arg time_zone} = {.val {zone}} is not known.",
-                  i = "Give {.val UTC} or a name such as {.val Europe/Berlin} ({.fun OlsonNames} lists them); for one hour ahead of UTC all year {.val Etc/GMT-1}, with that sign."), call = call)
+                  i = "Give {.val UTC} or a name such as {.val Europe/Berlin} ({.fun OlsonNames} lists them); for one hour ahead of UTC all year {.val Etc/GMT-1}, with that sign."),
+                  call = call)
   }
 }
 
@@ -55,7 +57,8 @@ on_clock <- function(time, zone) {
 # Numbers that are too large for hours (1e8 hours are 11 000 years) count the seconds or milliseconds of Unix.
 parse_numbers <- function(numbers, name, format, zone, call) {
   if (!is.null(format) && !format %in% c(names(time_units), "unix")) {
-    abort_input(c("Time column {.val {name}} holds numbers, which {.arg time_format} = {.val {format}} does not go with.",
+    abort_input(
+      c("Time column {.val {name}} holds numbers, which {.arg time_format} = {.val {format}} does not go with.",
                   i = "For numbers it is one of {.val {c(names(time_units), 'unix')}}, or a format of {.fun strptime} such as {.val %Y%m%d%H}."),
                 call = call)
   }
@@ -72,7 +75,8 @@ number_format <- function(numbers, name, zone, call) {
                   i = "Say by {.arg time_format} what they are, for example {.val %Y%m%d%H%M}."), call = call)
   }
   shown <- format(on_clock(unix_time(first), zone %||% "UTC"), "%Y-%m-%d %H:%M:%S %Z")
-  cli::cli_inform(c("Time column {.val {name}} is read as Unix time, from {shown}: its numbers are too large for hours.",
+  cli::cli_inform(
+    c("Time column {.val {name}} is read as Unix time, from {shown}: its numbers are too large for hours.",
                     i = "{.code time_format = \"unix\"} settles it; digits of a date need a format such as {.val %Y%m%d%H}."),
                   class = "amiss_message_time")
   "unix"
@@ -117,7 +121,8 @@ stamps_time <- function(text, name, format, zone, call) {
   require_read(is.na(parts[, 1]), text, name, call)
   clock <- parts[, ncol(parts) - 4:0, drop = FALSE]
   seconds <- clock_seconds(clock)
-  date <- switch(names(date_forms)[k], ymd = parts[, 1:3, drop = FALSE], no_year = cbind(NA, parts[, 1:2, drop = FALSE]),
+  date <- switch(names(date_forms)[k], ymd = parts[, 1:3, drop = FALSE],
+                 no_year = cbind(NA, parts[, 1:2, drop = FALSE]),
                  ordered_date(parts[, 1:4, drop = FALSE], name, format, call))
   if (names(date_forms)[k] == "no_year") {
     hours <- hours_of_year(date, seconds)
@@ -147,7 +152,8 @@ captures <- function(pattern, text) {
 
 # Seconds since midnight; 24:00:00 ends the day.
 clock_seconds <- function(clock) {
-  number <- function(k) as.numeric(sub(",", ".", ifelse(is.na(clock[, k]) | nzchar(clock[, k]), clock[, k], "0"), fixed = TRUE))
+  number <- function(k) as.numeric(sub(",", ".", ifelse(is.na(clock[, k]) | nzchar(clock[, k]), clock[, k], "0"),
+                                       fixed = TRUE))
   half <- tolower(clock[, 4])
   twelve <- half %in% c("am", "pm")
   hour <- number(1)
@@ -205,7 +211,8 @@ local_time <- function(local, text, name, zone, call) {
     hours <- both$offset[absent[1]] / 3600
     winter <- if (hours == round(hours)) sprintf("Etc/GMT%+d", -as.integer(hours)) else "UTC"
     abort_input(c("Time column {.val {name}}: row {absent[1]} holds {.val {text[absent[1]]}}, which the clocks of {.val {zone}} leave out when daylight saving begins.",
-                  i = "If the record's clock was not changed, give the zone that it stayed in, such as {.code time_zone = \"{winter}\"}."), call = call)
+                  i = "If the record's clock was not changed, give the zone that it stayed in, such as {.code time_zone = \"{winter}\"}."),
+                  call = call)
   }
   on_clock(utc(repeated_hours(local, both, text, name, zone, call)), zone)
 }
@@ -221,8 +228,9 @@ zone_readings <- function(local, zone) {
   list(first = reading(before), second = reading(offset_at(local + 86400)), offset = before)
 }
 
-# What the clock shows twice when daylight saving ends: up to where the column goes back it is the first time, from there
-# the second. Where it does not go back, that which follows the row before or leads to the row after without a gap.
+# What the clock shows twice when daylight saving ends: up to where the column goes back it is the first time, from
+# there the second. Where it does not go back, that which follows the row before or leads to the row after without a
+# gap.
 repeated_hours <- function(local, both, text, name, zone, call) {
   seconds <- ifelse(is.na(both$first), both$second, both$first)
   rows <- which(both$first != both$second)
@@ -269,7 +277,8 @@ require_even_clock <- function(local, text, name, call) {
 
 check_time <- function(time, values, name, call) {
   hours <- time_hours(time)
-  if (any(is.infinite(hours))) abort_input("Time column {.val {name}} has an infinite value in row {which(is.infinite(hours))[1]}.", call = call)
+  if (any(is.infinite(hours)))
+    abort_input("Time column {.val {name}} has an infinite value in row {which(is.infinite(hours))[1]}.", call = call)
   if (anyNA(hours)) {
     abort_input(c("Time column {.val {name}} has {sum(is.na(hours))} missing value{?s}; the first is in row {which(is.na(hours))[1]}.",
                   i = "Every row needs its time; delete rows without one."), call = call)

@@ -1,5 +1,5 @@
-# Time series objects (zoo, xts, ts, tsibble) as the data frames that measurements() reads: list(data, time, format), the
-# time in the column `time`.
+# Time series objects (zoo, xts, ts, tsibble) as the data frames that measurements() reads: list(data, time, format),
+# the time in the column `time`.
 
 time_table <- function(data, time, format, call = rlang::caller_env()) {
   if (stats::is.ts(data)) return(with_index(data, stats::time(data), time, format %||% ts_unit(data, call), call))
@@ -19,7 +19,8 @@ with_index <- function(values, index, time, format, call) {
   time <- time %||% "time"
   check_input(checkmate::check_string(time), "time", call = call)
   columns <- colnames(values)
-  if (is.null(columns)) abort_input(c("{.arg data} is a series whose columns have no names.", i = "Name them by {.fun colnames}."), call = call)
+  if (is.null(columns)) abort_input(c("{.arg data} is a series whose columns have no names.",
+                                      i = "Name them by {.fun colnames}."), call = call)
   if (time %in% columns) {
     abort_input(c("{.arg time} = {.val {time}} names a column of the series, whose own index is its time.",
                   i = "Leave {.arg time} out, or give another name for the index."), call = call)

@@ -1,5 +1,7 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine = 1 / 3, rounds = 8, emulator = list(), calibration = list(), attribution = list(), margin = 1.5,
-                        screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12, precision = 0.5, gradient = FALSE, importance_draws = 0))
+upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine = 1 / 3, rounds = 8, emulator = list(),
+                        calibration = list(), attribution = list(), margin = 1.5,
+                        screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12,
+                                         precision = 0.5, gradient = FALSE, importance_draws = 0))
 
 #' The loop: show, name the cause, extend, measure
 #'
@@ -7,42 +9,46 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
 #' and the loop begins again with the extended model. Held-out rows only measure; they decide nothing.
 #'
-#' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present model
-#' lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for these responses, in
-#' amounts that are free, tells which mechanisms promise what adoption asks for: their full Bayes factor is taken to be at most
-#' twice as large (in decades), and the margin. Those are calibrated, the best first; the others only if one of those could be
-#' adopted, as it must be compared with every rival. `candidates$judged_by` is `"response"` for those that were not.
+#' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
+#' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
+#' these responses, in amounts that are free, tells which mechanisms promise what adoption asks for: their full Bayes
+#' factor is taken to be at most twice as large (in decades), and the margin. Those are calibrated, the best first; the
+#' others only if one of those could be adopted, as it must be compared with every rival. `candidates$judged_by` is
+#' `"response"` for those that were not.
 #'
-#' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the parameters,
-#' two thirds of all, and compared with the present model calibrated in the same way; then in full, with the other runs made
-#' where the coarse posterior lies ([refine_ensemble()]) and the emulator checked by runs of the simulator and refined
-#' ([calibrate_refined()]), those that could come within `margin` of the best, if any could come
-#' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and, if `screening` asks
-#' for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their coarse Bayes factor;
-#' `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those calibrated in full.
+#' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the
+#' parameters, two thirds of all, and compared with the present model calibrated in the same way; then in full, with the
+#' other runs made where the coarse posterior lies ([refine_ensemble()]) and the emulator checked by runs of the
+#' simulator and refined ([calibrate_refined()]), those that could come within `margin` of the best, if any could come
+#' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and, if
+#' `screening` asks for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their
+#' coarse Bayes factor; `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those calibrated in
+#' full.
 #'
 #' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
-#' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out, and
-#' held-out rows are predicted by emulators of the runs given there.
+#' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,
+#' and held-out rows are predicted by emulators of the runs given there.
 #'
 #' @param simulator The base model: a simulator, or an [ensemble()] of given runs.
 #' @param measurements The [measurements()].
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
-#' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies; 1/3, 0 for
-#'   none), `rounds` (of refinement where the check by runs asks for it; 8), `decisive` (log10 Bayes factor that a mechanism must earn, with
-#'   its interval above zero; 2), `runs_total` (budget: once so many runs of the simulator have been made, no further mechanism is
-#'   calibrated than those begun; `NULL`: none), lists `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the
-#'   first calibration of a mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
+#' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies;
+#'   1/3, 0 for none), `rounds` (of refinement where the check by runs asks for it; 8), `decisive` (log10 Bayes factor
+#'   that a mechanism must earn, with its interval above zero; 2), `runs_total` (budget: once so many runs of the
+#'   simulator have been made, no further mechanism is calibrated than those begun; `NULL`: none), lists `emulator`,
+#'   `calibration` and `attribution` for the stages, `screening` (sampler of the first calibration of a mechanism, as
+#'   `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
 #' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
 #' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried, the
-#'   named cause, the gain, why the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism has a `verdict` of its own: `"named"`; `"likely"`,
-#'   where something of its `doubts` speaks against it; or `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its
-#'   standard error): then it takes the place of something else. `confounded_with` names parameters that are correlated beyond
-#'   0.4 with those that it brought: other parts of the model that could do the same.
+#'   named cause, the gain, why the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model
+#'   that adopted a mechanism has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks
+#'   against it; or `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then
+#'   it takes the place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those
+#'   that it brought: other parts of the model that could do the same.
 #' @examples
 #' \donttest{
 #' table <- data.frame(hour = 1:120, Te = 5 + 3 * sin(1:120 / 4), Gv = pmax(0, 100 * cos(1:120 / 3.8)))
@@ -69,7 +75,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'               quiet = TRUE)
 #' }
 #' @export
-upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1, quiet = FALSE,
+upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1,
+                          quiet = FALSE,
                           checkpoint = NULL) {
   given <- inherits(simulator, "amiss_ensemble")
   if (!given) check_simulator(simulator)
@@ -82,7 +89,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   say <- progress(quiet)
-  settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed, threads = threads)
+  settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed,
+                   threads = threads)
   before <- runs_so_far()
   settings$spent <- function() !is.null(control$runs_total) && runs_so_far() - before >= control$runs_total
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
@@ -129,7 +137,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   say("Stopped: {stopped}")
   models <- judge_models(models, candidates, catalogue, measurements, control)
   structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
-                 named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models), stopped_because = stopped,
+                 named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models),
+                 stopped_because = stopped,
                  runs_total = runs_so_far() - before,
                  measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
 }
@@ -140,7 +149,8 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive", call = call)
   check_input(checkmate::check_number(control$refine, lower = 0, upper = 0.8), "control$refine", call = call)
   check_input(checkmate::check_count(control$rounds), "control$rounds", call = call)
-  check_input(checkmate::check_count(control$runs_total, positive = TRUE, null.ok = TRUE), "control$runs_total", call = call)
+  check_input(checkmate::check_count(control$runs_total, positive = TRUE, null.ok = TRUE), "control$runs_total",
+              call = call)
   check_input(checkmate::check_number(control$margin, lower = 0, finite = TRUE), "control$margin", call = call)
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening", call)
   check_stage_controls(control, measurements, call = call)
@@ -153,7 +163,8 @@ check_stage_controls <- function(control, measurements, method = "history", call
   n <- length(used_rows(measurements, "calibrate"))
   if (method == "paper") return(fill_paper_control(control$calibration, n, "control$calibration", call))
   calibration <- fill_calibration_control(control$calibration, measurements, n, "control$calibration", call)
-  fill_attribution_control(control$attribution, calibration$ais, length(measurements$conditions), "control$attribution", call)
+  fill_attribution_control(control$attribution, calibration$ais, length(measurements$conditions), "control$attribution",
+                           call)
 }
 
 # Runs at the rows of the measurements, and an emulator of them; each round of refinement makes 1.3 times as many.
@@ -192,12 +203,15 @@ fit_runs <- function(ensemble, settings, calibration = settings$control$calibrat
 # draws tell how far its evidence is off, correct it, and join them where it is too far.
 screen_model <- function(simulator, name, settings, hopeless = function(fit) FALSE) {
   calibration <- as.list(settings$control$calibration)
-  calibration$ais <- utils::modifyList(as.list(calibration$ais), as.list(settings$control$screening %||% upgrade_control$screening))
-  if (is.null(calibration$check) || calibration$check > screening_runs) calibration$check <- calibration$exact <- screening_runs
+  calibration$ais <- utils::modifyList(as.list(calibration$ais),
+                                       as.list(settings$control$screening %||% upgrade_control$screening))
+  if (is.null(calibration$check) || calibration$check > screening_runs)
+    calibration$check <- calibration$exact <- screening_runs
   settings$keep(list("coarse", name, plain(simulator)), {
     ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
     control <- list(emulator = settings$control$emulator, calibration = calibration)
-    refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
+    refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
+                         settings$threads,
                          runs = regional_runs(ensemble$parameters, refined_runs(settings)), hopeless = hopeless)
   })
 }
@@ -206,7 +220,8 @@ screening_runs <- 20
 
 refined_runs <- function(settings) round((settings$control$refine %||% upgrade_control$refine) * settings$runs)
 
-# The full calibration, with the remaining runs made where the coarse posterior lies. It keeps the coarse one's evidence.
+# The full calibration, with the remaining runs made where the coarse posterior lies. It keeps the coarse one's
+# evidence.
 fit_fully <- function(simulator, name, settings, first = NULL) {
   more <- refined_runs(settings)
   if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
@@ -216,10 +231,12 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
       fit_runs(first$ensemble, settings)
     } else if (isFALSE(first$fit$check$passed)) {
       control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
-      refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed, settings$threads,
+      refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
+                           settings$threads,
                            runs = regional_runs(first$ensemble$parameters, more), first = first)$fit
     } else {
-      fit_runs(if (more > 0) refine_ensemble(with_checked_runs(first), first$fit, more, threads = settings$threads) else first$ensemble, settings)
+      fit_runs(if (more > 0) refine_ensemble(with_checked_runs(first), first$fit, more,
+                                             threads = settings$threads) else first$ensemble, settings)
     }
     fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     fit
@@ -228,11 +245,14 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
 
 progress <- function(quiet, call = rlang::caller_env()) {
   check_input(checkmate::check_flag(quiet), "quiet", call = call)
-  if (quiet) function(...) invisible() else function(text, .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
+  if (quiet) function(...) invisible() else function(text,
+                                                     .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
 }
 
-measured_model <- function(fit, name, parent, mechanism, settings) settings$keep(list("measured", name, plain(model_of(fit))), {
-  attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)
+measured_model <- function(fit, name, parent, mechanism,
+                           settings) settings$keep(list("measured", name, plain(model_of(fit))), {
+  attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
+                                       threads = settings$threads)
   prediction <- stats::predict(fit, use = predictable(fit), seed = settings$seed, threads = settings$threads)
   list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
        prediction = prediction, scores = prediction_scores(prediction))
@@ -268,8 +288,8 @@ try_mechanisms <- function(current, catalogue, settings, say) {
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
 
-# Coarse calibrations (screen_model()): of the mechanisms whose responses promise enough, the best first; if one of them could be
-# adopted, of all others too, since what is adopted must have been compared with every rival.
+# Coarse calibrations (screen_model()): of the mechanisms whose responses promise enough, the best first; if one of them
+# could be adopted, of all others too, since what is adopted must have been compared with every rival.
 screened_mechanisms <- function(current, trials, responses, settings, say) {
   coarse <- as_coarse(current$fit)
   screens <- list()
@@ -293,7 +313,8 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
 tried_in_full <- function(current, trials, screens, full, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
   for (name in full) {
-    fits[[name]] <- naming_mechanism(name, fit_fully(trials[[name]], trial_name(current, name), settings, first = screens[[name]]))
+    fits[[name]] <- naming_mechanism(name, fit_fully(trials[[name]], trial_name(current, name), settings,
+                                                     first = screens[[name]]))
     report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
   }
   list(fits = fits, table = trial_table(fits, current, full, responses))
@@ -306,22 +327,23 @@ naming_mechanism <- function(name, code) {
   })
 }
 
-# What the mechanisms could explain (response_factors()), a row for each; NULL where runs are given and none can be made.
+# What the mechanisms could explain (response_factors()), a row for each; NULL where runs are given and none can be
+# made.
 seen_responses <- function(current, trials, settings) {
   if (inherits(trials[[1]], "amiss_ensemble")) return(NULL)
   settings$keep(list("responses", current$name, lapply(trials, plain)), response_factors(current$fit, trials, settings))
 }
 
-# Whether the full evidence of a mechanism, of which its response is a part, is unlikely to come to what adoption asks for. A
-# response at one place of the parameters' space shows a good half of what the mechanism earns with the parameters free to follow:
-# it may be twice as large, and more by the margin.
+# Whether the full evidence of a mechanism, of which its response is a part, is unlikely to come to what adoption asks
+# for. A response at one place of the parameters' space shows a good half of what the mechanism earns with the
+# parameters free to follow: it may be twice as large, and more by the margin.
 out_of_reach <- function(response, control) {
   if (is.null(response) || is.na(response$log10_bf)) return(FALSE)
   2 * max(0, response$log10_bf) + 3 * (response$upper95 - response$log10_bf) / 1.96 + control$margin < control$decisive
 }
 
-# Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by more than
-# `far` decades, and three standard errors, behind the best before it or behind what adoption asks for.
+# Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by
+# more than `far` decades, and three standard errors, behind the best before it or behind what adoption asks for.
 hopeless <- function(fits, reference, control, far = 3) {
   needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
   function(fit) fit$check$ratio <= 1 && fit$log_evidence + 3 * fit$standard_error + far * log(10) < needed
@@ -335,11 +357,13 @@ as_coarse <- function(fit) {
 
 report_candidate <- function(what, fit, reference, say) {
   bf <- bayes_factor(fit, reference)
-  say("  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
+  say(
+    "  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
 }
 
-# Candidates whose coarse evidence could come near the best, if any could come near adoption. It is taken as uncertain by three
-# standard errors and by the nats that annealing lies behind the second estimator: where chains lag, a mode may be missed.
+# Candidates whose coarse evidence could come near the best, if any could come near adoption. It is taken as uncertain
+# by three standard errors and by the nats that annealing lies behind the second estimator: where chains lag, a mode may
+# be missed.
 contenders <- function(fits, reference, control) {
   if (!length(fits)) return(character())
   bf <- do.call(rbind, lapply(fits, bayes_factor, reference))
@@ -348,18 +372,21 @@ contenders <- function(fits, reference, control) {
   names(fits)[reach >= max(bf$log10_bf, control$decisive)]
 }
 
-# Bayes factors of all mechanisms against the current model: in full, by the coarse calibration, or by the responses alone.
+# Bayes factors of all mechanisms against the current model: in full, by the coarse calibration, or by the responses
+# alone.
 trial_table <- function(fits, current, full, responses = NULL) {
   rows <- lapply(names(fits), function(name) {
     reference <- if (name %in% full) current$fit else as_coarse(current$fit)
-    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], reference), trusted = fits[[name]]$trust$trusted,
+    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], reference),
+                      trusted = fits[[name]]$trust$trusted,
                       judged_by = if (name %in% full) "calibration" else "screening")
     row$parameters <- list(added_parameters(fits[[name]], current$fit))
     row
   })
   by_response <- responses[!rownames(responses) %in% names(fits), ]
   if (NROW(by_response)) {
-    seen <- data.frame(from = current$name, mechanism = rownames(by_response), by_response[names(by_response) != "runs"], trusted = FALSE,
+    seen <- data.frame(from = current$name, mechanism = rownames(by_response),
+                       by_response[names(by_response) != "runs"], trusted = FALSE,
                        judged_by = "response", row.names = NULL)
     seen$parameters <- rep(list(added_parameters(current$fit, current$fit)), nrow(seen))
     rows <- c(rows, list(seen))
@@ -382,8 +409,10 @@ added_parameters <- function(fit, parent) {
 stop_reason <- function(table, attribution, decisive) {
   significant <- significant_conditions(attribution$table)
   best <- which.max(table$log10_bf)
-  tail <- sprintf("no mechanism is decisive (best: %s, log10 Bayes factor %.1f, %.0f needed)", table$mechanism[best], table$log10_bf[best], decisive)
-  if (length(significant)) paste0(tail, "; what answers to ", paste(significant, collapse = ", "), " remains unexplained") else paste0(tail, " and no boundary condition is significant")
+  tail <- sprintf("no mechanism is decisive (best: %s, log10 Bayes factor %.1f, %.0f needed)", table$mechanism[best],
+                  table$log10_bf[best], decisive)
+  if (length(significant)) paste0(tail, "; what answers to ", paste(significant, collapse = ", "),
+                                  " remains unexplained") else paste0(tail, " and no boundary condition is significant")
 }
 
 # The first mechanism that is named or, if none is, likely; a stand-in is no cause.
@@ -422,5 +451,6 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   if (length(others)) cli::cli_bullets(c("*" = "{others}"))
   g <- x$gain
   cli::cli_bullets(c("*" = "RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)} held out",
-                     "*" = "stopped because {x$stopped_because}", ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
+                     "*" = "stopped because {x$stopped_because}",
+                     ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
 })

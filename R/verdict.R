@@ -1,7 +1,8 @@
 # Each adopted mechanism judged by itself: named, likely, or a stand-in for something that the catalogue does not hold.
 
-# Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism is a
-# stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely otherwise.
+# Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
+# is a stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely
+# otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control) {
   remains <- much_remains(models, measurements)
   for (k in seq_along(models)[-1]) {
@@ -16,7 +17,8 @@ judge_models <- function(models, candidates, catalogue, measurements, control) {
       if (row$probability < 0.95) "other causes are possible",
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (no_gain) "data held out do not gain by it",
-      if (model$scores$calibrate[["rmse"]] > 1.02 * parent$scores$calibrate[["rmse"]]) "the error in calibration rose with it",
+      if (model$scores$calibrate[["rmse"]] > 1.02 * parent$scores$calibrate[["rmse"]])
+        "the error in calibration rose with it",
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary)) "what drives it is still answered to",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
       if (remains) "a good part of the error remains",
@@ -57,8 +59,8 @@ still_answers <- function(parent, model, boundary) {
   before > 0 && strength(model) > 0.5 * before
 }
 
-# Parameters of the model that are correlated beyond 0.4 with those that the mechanism brought: another part of the model
-# that could do the same.
+# Parameters of the model that are correlated beyond 0.4 with those that the mechanism brought: another part of the
+# model that could do the same.
 confounded_parameters <- function(fit, new) {
   others <- setdiff(colnames(fit$values), new)
   if (!length(new) || !length(others)) return(character())
@@ -67,8 +69,8 @@ confounded_parameters <- function(fit, new) {
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > 0.4]
 }
 
-# TRUE for each parameter whose 95 % interval touches an end of its prior (in probability, within 1 %), where the prior ends
-# abruptly.
+# TRUE for each parameter whose 95 % interval touches an end of its prior (in probability, within 1 %), where the prior
+# ends abruptly.
 edge_of_prior <- function(fit) {
   unit <- posterior_unit(fit)
   stats::setNames(vapply(seq_len(ncol(unit)), function(p) {
@@ -77,8 +79,8 @@ edge_of_prior <- function(fit) {
   }, NA), colnames(fit$values))
 }
 
-# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The mechanism
-# that made the error leaves nothing; one that imitates it does.
+# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The
+# mechanism that made the error leaves nothing; one that imitates it does.
 much_remains <- function(models, measurements) {
   ends <- lapply(models[c(1, length(models))], remaining_error, measurements)
   excess <- vapply(ends, function(e) e$ratio^2 - 1, 0)

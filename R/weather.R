@@ -22,13 +22,15 @@
 #' weather <- synthetic_weather(4, seed = 1)
 #' weather$RHP <- rolbs(nrow(weather), step_h = 0.25, power = 100, seed = 1)
 #' @export
-synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude = 36.8, temperature = 17, daily_range = 9,
+synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude = 36.8, temperature = 17,
+                              daily_range = 9,
                               cloudiness = 0.3, wind = 3.5, wind_direction = 240, azimuth = 180, seed = NULL) {
   check_input(checkmate::check_number(days, lower = 1, finite = TRUE), "days")
   check_input(checkmate::check_number(step_h, lower = 1 / 60, upper = 6), "step_h")
   check_size("days", days, matrix_gb(24 * days / step_h, 30))
   check_input(checkmate::check_number(day_of_year, lower = 0, upper = 366), "day_of_year")
-  check_input(checkmate::check_number(latitude, lower = -90, upper = 90), "latitude", "It is in degrees, north of the equator.")
+  check_input(checkmate::check_number(latitude, lower = -90, upper = 90), "latitude",
+              "It is in degrees, north of the equator.")
   check_input(checkmate::check_number(temperature, lower = -90, upper = 60), "temperature", "It is in degrees Celsius.")
   check_input(checkmate::check_number(daily_range, lower = 0, upper = 60), "daily_range")
   check_input(checkmate::check_number(wind_direction, lower = -360, upper = 360), "wind_direction", "It is in degrees.")
@@ -40,7 +42,8 @@ synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude =
     hour <- seq_len(n) * step_h
     middle <- hour - step_h / 2
     sun <- sun_position(day_of_year + middle / 24, latitude)
-    cover <- stats::pnorm(stats::qnorm(min(max(cloudiness, 0.02), 0.98)) * sqrt(1.5) + red_noise(n, 6, step_h) + 0.7 * red_noise(n, 0.5, step_h))
+    cover <- stats::pnorm(stats::qnorm(min(max(cloudiness, 0.02), 0.98)) * sqrt(1.5) + red_noise(n, 6, step_h) +
+                          0.7 * red_noise(n, 0.5, step_h))
     # Clear sky: beam by air mass (Meinel), a diffuse part that clouds enlarge; the ground reflects a fifth.
     air_mass <- 1 / pmax(sin(sun$elevation), 0.05)
     beam <- ifelse(sun$elevation > 0, 1353 * 0.7^(air_mass^0.678), 0) * (1 - cover)^1.2
@@ -49,13 +52,15 @@ synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude =
     horizontal <- beam * up + diffuse
     facing <- pmax(cos(sun$elevation) * cos(sun$azimuth - azimuth * pi / 180), 0)
     vertical <- beam * facing + 0.5 * diffuse + 0.1 * horizontal
-    clear <- 1 - stats::filter(c(rep(cover[1], round(24 / step_h)), cover), rep(step_h / 24, round(24 / step_h)), sides = 1)
+    clear <- 1 -
+      stats::filter(c(rep(cover[1], round(24 / step_h)), cover), rep(step_h / 24, round(24 / step_h)), sides = 1)
     clear <- as.numeric(utils::tail(clear, n))
     outdoor <- temperature + daily_range / 2 * (0.4 + 0.8 * clear) * cos(2 * pi * (middle - 15) / 24) +
       2 * red_noise(n, 48, step_h) + 0.35 * red_noise(n, 1.5, step_h)
     breeze <- 1 + 0.35 * cos(2 * pi * (middle - 16) / 24)
     speed <- wind * breeze * exp(0.45 * red_noise(n, 8, step_h) + 0.25 * red_noise(n, 0.5, step_h) - 0.13)
-    direction <- (wind_direction + 35 * sin(2 * pi * (middle - 10) / 24) + 45 * red_noise(n, 10, step_h) + 15 * red_noise(n, 0.5, step_h)) %% 360
+    direction <- (wind_direction + 35 * sin(2 * pi * (middle - 10) / 24) + 45 * red_noise(n, 10, step_h) +
+                  15 * red_noise(n, 0.5, step_h)) %% 360
     emissivity <- 0.78 * (1 - cover) + 0.96 * cover
     data.frame(hour = hour, Te = outdoor, Gh = horizontal, Gv = vertical, Ws = speed, Wd = direction,
                Lw = emissivity * 5.670374e-8 * (273.15 + outdoor)^4)
@@ -88,7 +93,8 @@ rolbs <- function(n, step_h = 0.25, power = 100, lengths = c(1, 2, 4, 8, 16), se
   check_size("n", n, matrix_gb(n, 4))
   check_input(checkmate::check_number(step_h, lower = 1e-6, finite = TRUE), "step_h")
   check_input(checkmate::check_number(power, finite = TRUE), "power")
-  check_input(checkmate::check_numeric(lengths, lower = step_h, upper = 1e6 * step_h, min.len = 1, any.missing = FALSE), "lengths",
+  check_input(checkmate::check_numeric(lengths, lower = step_h, upper = 1e6 * step_h, min.len = 1, any.missing = FALSE),
+              "lengths",
               "They are hours, at least one step and at most a million.")
   with_seed(pick_seed(seed), {
     on <- logical(0)

@@ -200,7 +200,8 @@ zone_crack <- function(name, width, length, outside, height = 0, azimuth = 0, wi
 
 #' @rdname zone_components
 #' @export
-zone_infiltration <- function(name, ach, outside) new_component("infiltration", name, list(ach = ach, outside = outside))
+zone_infiltration <- function(name, ach, outside) new_component("infiltration", name,
+                                                                list(ach = ach, outside = outside))
 
 #' @rdname zone_components
 #' @export
@@ -285,7 +286,8 @@ component <- function(zone, name) {
 find_component <- function(zone, name, call) {
   known <- names(zone$components)
   if (!checkmate::test_choice(name, known)) {
-    abort_input(c("The zone has no component {.arg name} = {seen(name)}.", i = "Known components: {.val {known}}."), call = call)
+    abort_input(c("The zone has no component {.arg name} = {seen(name)}.", i = "Known components: {.val {known}}."),
+                call = call)
   }
   zone$components[[name]]
 }
@@ -501,12 +503,14 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
   }
   control <- check_zone_control(control, call)
   check_zone_size(zone, nrow(values), nrow(drivers), step_s, control, call)
-  # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between them.
+  # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between
+  # them.
   fields <- free_fields(unclass(zone))
   extremes <- vapply(parameters, function(p) range(values[, p]), numeric(2))
   for (i in seq_len(if (nrow(values) > 1) 2 else 1)) resolve_zone(zone, fields, extremes[i, ], call)
   storage.mode(drivers) <- "double"
-  call_engine(zone_simulate_(index_zone(unclass(zone), colnames(drivers)), lapply(fields, `[[`, "path"), field_values(fields, values),
+  call_engine(zone_simulate_(index_zone(unclass(zone), colnames(drivers)), lapply(fields, `[[`, "path"),
+                             field_values(fields, values),
                              drivers, step_s, as.numeric(hold), control, engine_context(0, threads)), call)
 }
 
@@ -529,7 +533,8 @@ check_drivers <- function(zone, drivers, call) {
 check_zone_control <- function(control, call) {
   control <- merge_control(zone_control, control, call = call)
   for (option in c("max_substep_s", "cells", "initial_hours")) {
-    check_input(checkmate::check_number(control[[option]], lower = 1e-3, upper = 1e9), paste0("control$", option), call = call)
+    check_input(checkmate::check_number(control[[option]], lower = 1e-3, upper = 1e9), paste0("control$", option),
+                call = call)
   }
   check_input(checkmate::check_count(control$spinup), "control$spinup", call = call)
   control

@@ -1,7 +1,7 @@
 #!/usr/bin/env Rscript
-# Does the evidence hang on the basis or on the design? Rscript bench/basis.R --out FILE [--threads N]
-# log10 evidence of five models of the Twin Houses with 8, 10, 12 and 16 basis vectors, with the package's own choice and
-# twice as many, and with 100, 150 and 250 runs (own choice of vectors); refined where the check by runs fails.
+# Does the evidence hang on the basis or on the design? Rscript bench/basis.R --out FILE [--threads N] log10 evidence of
+# five models of the Twin Houses with 8, 10, 12 and 16 basis vectors, with the package's own choice and twice as many,
+# and with 100, 150 and 250 runs (own choice of vectors); refined where the check by runs fails.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -9,7 +9,8 @@ out <- option("out", "basis.json")
 threads <- as.integer(option("threads", "2"))
 suppressPackageStartupMessages(library(amiss))
 
-with_mechanisms <- function(study, names) Reduce(function(model, name) study$catalogue[[name]]$edit(model), names, study$model)
+with_mechanisms <- function(study, names) Reduce(function(model, name) study$catalogue[[name]]$edit(model), names,
+                                                 study$model)
 cases <- list(list(house = "N2"), list(house = "N2", added = "neighbour coupling"), list(house = "O5"),
               list(house = "O5", added = "south solar aperture"),
               list(house = "O5", added = c("south solar aperture", "neighbour coupling")))
@@ -20,13 +21,17 @@ evidence <- function(case, label, runs, vectors = NULL, rounds = 2) {
   model <- with_mechanisms(study, case$added)
   first <- simulate_design(model, study$measurements, runs, seed = 1, threads = threads)
   emulator <- if (is.null(vectors)) list() else list(explained = 1, noise_fraction = 1e-6, max_vectors = vectors)
-  fit <- suppressWarnings(calibrate_refined(first, study$measurements, rounds = rounds, control = list(emulator = emulator),
+  fit <- suppressWarnings(calibrate_refined(first, study$measurements, rounds = rounds,
+                                            control = list(emulator = emulator),
                                             seed = 1, threads = threads))
-  row <- data.frame(model = paste(c(case$house, "base"[is.null(case$added)], case$added), collapse = " + "), varied = label,
-                    vectors = ncol(fit$emulator$basis$vectors), runs = runs, log10_evidence = fit$log_evidence / log(10),
+  row <- data.frame(model = paste(c(case$house, "base"[is.null(case$added)], case$added), collapse = " + "),
+                    varied = label,
+                    vectors = ncol(fit$emulator$basis$vectors), runs = runs,
+                    log10_evidence = fit$log_evidence / log(10),
                     standard_error = fit$standard_error / log(10), emulated = fit$posterior$log_evidence / log(10),
                     emulator_error = fit$check$ratio, trusted = fit$trust$trusted, refined = fit$rounds)
-  message(sprintf("%-50s Q = %2d, M = %3d: %.2f (se %.2f), emulator's error %.2f of the noise", row$model, row$vectors, runs,
+  message(sprintf("%-50s Q = %2d, M = %3d: %.2f (se %.2f), emulator's error %.2f of the noise", row$model, row$vectors,
+                  runs,
                   row$log10_evidence, row$standard_error, row$emulator_error))
   row
 }

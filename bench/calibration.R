@@ -3,9 +3,9 @@
 # [--seed 1] [--workers 2] [--figure FILE.png]
 #
 # Simulation-based calibration of posterior (5) with separate and with one noise precision, of posterior (6) and of the
-# joint posterior; calibration of the probabilities of the models M1 to M3; evidences against bridge sampling, where that
-# package is installed. Writes JSON, one row a quantity: case, quantity, draws, p_value and holds (p-values adjusted by
-# Holm's method over all rows stay above 0.05, so that a right implementation fails in one of twenty seeds).
+# joint posterior; calibration of the probabilities of the models M1 to M3; evidences against bridge sampling, where
+# that package is installed. Writes JSON, one row a quantity: case, quantity, draws, p_value and holds (p-values
+# adjusted by Holm's method over all rows stay above 0.05, so that a right implementation fails in one of twenty seeds).
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -36,7 +36,8 @@ rank_figure(parts, rows, figure)
 
 worlds <- box_worlds()
 for (name in names(sources)) {
-  cases <- do.call(rbind, spread_work(first + 3e4 + seq_len(3 * draws), function(seed) model_case(worlds, sources[[name]], seed), workers))
+  cases <- do.call(rbind, spread_work(first + 3e4 + seq_len(3 * draws),
+                                      function(seed) model_case(worlds, sources[[name]], seed), workers))
   rows <- rbind(rows, probability_rows(cases, name))
   said(paste("model probabilities,", name))
 }

@@ -14,7 +14,8 @@ rank_figure <- function(parts, rows, file) {
     ggplot2::annotate("rect", xmin = -0.5, xmax = sbc_draws + 0.5, ymin = band[1], ymax = band[2], fill = "grey85") +
     ggplot2::geom_bar(width = 0.9, fill = "#2b6c8f") +
     ggplot2::geom_hline(yintercept = band[1], colour = "white", linewidth = 0.3) +
-    ggplot2::geom_text(data = rows, ggplot2::aes(sbc_draws / 2, Inf, label = sprintf("p = %.2g", p_value)), vjust = 1.4, size = 2.7) +
+    ggplot2::geom_text(data = rows, ggplot2::aes(sbc_draws / 2, Inf, label = sprintf("p = %.2g", p_value)), vjust = 1.4,
+                       size = 2.7) +
     ggplot2::facet_wrap(~panel, ncol = 6) +
     ggplot2::scale_y_continuous(expand = ggplot2::expansion(c(0, 0.18))) +
     ggplot2::labs(x = sprintf("rank of the true value among %d draws from its posterior", sbc_draws), y = "records",

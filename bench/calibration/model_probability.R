@@ -9,7 +9,8 @@ box_worlds <- function(noise_sd = 1.5) {
   weather <- amiss::synthetic_weather(3, step_h = 1, seed = 5)
   weather$RHP <- amiss::rolbs(nrow(weather), step_h = 1, power = 100, seed = 5)
   weather$Ti <- 20 + sin(weather$hour)
-  record <- amiss::measurements(weather, time = "hour", target = "Ti", boundary = ~ Te + Gv + Ws + RHP, noise_sd = noise_sd,
+  record <- amiss::measurements(weather, time = "hour", target = "Ti", boundary = ~ Te + Gv + Ws + RHP,
+                                noise_sd = noise_sd,
                                 warmup = 24, unit = "K", name = "box")
   lapply(stats::setNames(box_models, box_models), function(model) {
     simulator <- amiss::paper_box(model)
@@ -27,7 +28,8 @@ sources <- list(
     draw = function(world, control) {
       m <- world$measurements
       values <- vapply(world$emulator$parameters, function(p) amiss:::prior_quantile(p$prior, stats::runif(1)), 0)
-      clean <- amiss:::simulate_measured(world$simulator, matrix(values, 1, dimnames = list(NULL, names(values))), m, "calibrate", 1)
+      clean <- amiss:::simulate_measured(world$simulator, matrix(values, 1, dimnames = list(NULL, names(values))), m,
+                                         "calibrate", 1)
       n <- length(clean)
       lambda <- draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence))
       clean[, 1] + stats::rnorm(n, 0, 1 / sqrt(lambda))
@@ -40,9 +42,11 @@ model_case <- function(worlds, source, seed) {
   set.seed(seed)
   true <- sample(length(worlds), 1)
   record <- worlds[[1]]$measurements
-  control <- amiss:::fill_calibration_control(utils::modifyList(list(ais = sbc_ais, check = 0), source$control), record, sum(record$use == "calibrate"))
+  control <- amiss:::fill_calibration_control(utils::modifyList(list(ais = sbc_ais, check = 0), source$control), record,
+                                              sum(record$use == "calibrate"))
   y <- source$draw(worlds[[true]], control)
-  evidence <- vapply(worlds, function(world) amiss::calibrate(world$emulator, observed(record, y), control, seed = seed)$log_evidence, 0)
+  evidence <- vapply(worlds, function(world) amiss::calibrate(world$emulator, observed(record, y), control,
+                                                              seed = seed)$log_evidence, 0)
   weight <- exp(evidence - max(evidence))
   c(true = true, weight / sum(weight))
 }
@@ -61,10 +65,12 @@ probability_rows <- function(cases, name, redraws = 4999) {
   own <- score(cases[, 1])
   set.seed(1)
   cumulative <- t(apply(p, 1, cumsum))
-  null <- replicate(redraws, score(1L + as.integer(rowSums(stats::runif(nrow(p)) > cumulative[, -ncol(p), drop = FALSE]))))
+  null <- replicate(redraws,
+                    score(1L + as.integer(rowSums(stats::runif(nrow(p)) > cumulative[, -ncol(p), drop = FALSE]))))
   above <- (1 + rowSums(null >= own)) / (1 + redraws)
   below <- (1 + rowSums(null <= own)) / (1 + redraws)
   p_value <- ifelse(names(own) == "reliability", above, pmin(1, 2 * pmin(above, below)))
   labels <- ifelse(names(own) %in% colnames(p), paste("share of", names(own)), names(own))
-  data.frame(case = paste("model probabilities,", name), quantity = labels, draws = nrow(p), p_value = p_value, row.names = NULL)
+  data.frame(case = paste("model probabilities,", name), quantity = labels, draws = nrow(p), p_value = p_value,
+             row.names = NULL)
 }

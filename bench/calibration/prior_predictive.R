@@ -22,7 +22,8 @@ draw_paper <- function(world, control, fictitious) {
   v <- stats::rnorm(n) %*% chol(covariance + diag(1 / outside_lambda, n))
   outside <- stats::lm.fit(k, as.numeric(v))$residuals
   list(y = as.numeric(k %*% coefficients) + outside,
-       inside = c(stats::setNames(unit, names(world$emulator$parameters)), stats::setNames(lambda, lambda_names(lambda))),
+       inside = c(stats::setNames(unit, names(world$emulator$parameters)),
+                  stats::setNames(lambda, lambda_names(lambda))),
        outside = c(stats::setNames(alpha, alpha_names(m)), t2 = t2, lambda = outside_lambda))
 }
 
@@ -48,7 +49,8 @@ draw_history <- function(world, control) {
   n <- nrow(k)
   unit <- stats::runif(length(emulator$parameters))
   w <- coefficients_at(emulator, unit)
-  variance <- 1 / draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)) + mean(emulator$basis$discarded_sd^2)
+  variance <- 1 / draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)) +
+    mean(emulator$basis$discarded_sd^2)
   level <- sample(length(control$error_ratios), length(control$error_times), replace = TRUE)
   reach <- sample(length(control$reach), 1)
   included <- stats::runif(length(m$conditions)) < control$inclusion
@@ -62,8 +64,10 @@ draw_history <- function(world, control) {
     ratio <- k %*% world$spread %*% t(k) / (control$reach[reach] * m$noise_sd^2)
     response <- solve(diag(n) + ratio %*% ratio, response)
   }
-  y <- k %*% stats::rnorm(ncol(k), w$mean, sqrt(w$variance)) + response + sqrt(variance) * crossprod(chol(error), stats::rnorm(n))
-  truth <- c(variance = variance, stats::setNames(level, ratio_names(control)), reach = reach, stats::setNames(strength, t_names(m)))
+  y <- k %*% stats::rnorm(ncol(k), w$mean, sqrt(w$variance)) + response +
+    sqrt(variance) * crossprod(chol(error), stats::rnorm(n))
+  truth <- c(variance = variance, stats::setNames(level, ratio_names(control)), reach = reach,
+             stats::setNames(strength, t_names(m)))
   list(y = as.numeric(y), joint = c(stats::setNames(unit, names(emulator$parameters)), truth))
 }
 
@@ -89,8 +93,10 @@ standardised_responses <- function(m, time_constants) {
     keep <- exp(-m$step_h / tau)
     as.numeric(stats::filter(x * (1 - keep), keep, method = "recursive", init = x[1]))
   }
-  columns <- do.call(cbind, lapply(seq_len(ncol(m$boundary)), function(j) vapply(time_constants, function(tau) response(m$boundary[, j], tau), m$boundary[, j])))
+  columns <- do.call(cbind, lapply(seq_len(ncol(m$boundary)), function(j) vapply(
+    time_constants, function(tau) response(m$boundary[, j], tau), m$boundary[, j])))
   columns <- columns[m$use == "calibrate", , drop = FALSE]
   centred <- sweep(columns, 2, colMeans(columns))
-  list(x = sweep(centred, 2, sqrt(colMeans(centred^2)), "/"), condition = rep(m$condition, each = length(time_constants)))
+  list(x = sweep(centred, 2, sqrt(colMeans(centred^2)), "/"),
+       condition = rep(m$condition, each = length(time_constants)))
 }

@@ -69,5 +69,6 @@ spread_work <- function(seeds, work, workers) {
 sbc_rows <- function(case, results, part) {
   all <- do.call(rbind, lapply(results, `[[`, part))
   set.seed(1)  # of the random breaking of ties in the test
-  data.frame(case = case, quantity = colnames(all), draws = nrow(all), p_value = apply(all, 2, uniformity), row.names = NULL)
+  data.frame(case = case, quantity = colnames(all), draws = nrow(all), p_value = apply(all, 2, uniformity),
+             row.names = NULL)
 }

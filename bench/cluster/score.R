@@ -1,7 +1,8 @@
 #!/usr/bin/env Rscript
-# Worlds S, S+1, ... of the hidden-effect benchmark, without the rivals: Rscript bench/cluster/score.R --worlds N --seed S
-# --chunk C --keep FOLDER [--plan FILE.R]. C worlds go into one future of the plan that FILE.R sets. Each finished world
-# is kept in FOLDER, and only those that are missing there are computed. When each began and ended goes to $AMISS_TIMES.
+# Worlds S, S+1, ... of the hidden-effect benchmark, without the rivals: Rscript bench/cluster/score.R --worlds N --seed
+# S --chunk C --keep FOLDER [--plan FILE.R]. C worlds go into one future of the plan that FILE.R sets. Each finished
+# world is kept in FOLDER, and only those that are missing there are computed. When each began and ended goes to
+# $AMISS_TIMES.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "..", "options.R"))

@@ -15,10 +15,12 @@ linear_gaussian <- function(d, sd = 0.3) {
 # Two shells of radius 2 and width 0.1 about +-3.5 on the first axis (Feroz, Hobson and Bridges 2009). What of a shell
 # overlaps the other, or lies outside the cube, is below 1e-20 of it: the exact value is a radial integral.
 shells <- function(d) {
-  shell <- function(x, centre) stats::dnorm(sqrt((x[, 1] - centre)^2 + rowSums(x[, -1, drop = FALSE]^2)), 2, 0.1, log = TRUE)
+  shell <- function(x, centre) stats::dnorm(sqrt((x[, 1] - centre)^2 + rowSums(x[, -1, drop = FALSE]^2)), 2, 0.1,
+                                            log = TRUE)
   log_sphere <- log(2) + d / 2 * log(pi) - lgamma(d / 2)  # area of the unit sphere
   radial <- stats::integrate(function(r) (r / 2)^(d - 1) * stats::dnorm(r, 2, 0.1), 1, 3, rel.tol = 1e-10)$value
-  list(name = "Gaussian shells", d = d, required = if (d == 20) 0.2 else 0.1, priors = named(rep(list(amiss::uniform(-6, 6)), d)),
+  list(name = "Gaussian shells", d = d, required = if (d == 20) 0.2 else 0.1,
+       priors = named(rep(list(amiss::uniform(-6, 6)), d)),
        f = function(x) {
          one <- shell(x, -3.5)
          other <- shell(x, 3.5)
@@ -63,21 +65,25 @@ evidence_cases <- function() {
 # One run: error of the log evidence, whether the stated interval holds the exact value, and the verdict.
 evidence_run <- function(case, seed) {
   result <- amiss::ais(case$f, case$priors, seed = seed)
-  data.frame(case = case$name, d = case$d, seed = seed, log_evidence = result$log_evidence, standard_error = result$standard_error,
-             estimator = result$estimator, inside = result$interval[1] <= case$exact && case$exact <= result$interval[2],
+  data.frame(case = case$name, d = case$d, seed = seed, log_evidence = result$log_evidence,
+             standard_error = result$standard_error,
+             estimator = result$estimator, inside = result$interval[1] <= case$exact &&
+               case$exact <= result$interval[2],
              trusted = result$trusted, evaluations = result$evaluations)
 }
 
 # One row of the table from the runs of one case. The mean of n runs is itself uncertain by sd / sqrt(n).
 evidence_row <- function(case, runs) {
   bias <- mean(runs$log_evidence) - case$exact
-  list(case = case$name, d = case$d, exact = case$exact, mean = mean(runs$log_evidence), bias = bias, sd = stats::sd(runs$log_evidence),
+  list(case = case$name, d = case$d, exact = case$exact, mean = mean(runs$log_evidence), bias = bias,
+       sd = stats::sd(runs$log_evidence),
        coverage = mean(runs$inside), required = case$required, holds = abs(bias) < case$required, repeats = nrow(runs),
        trusted = mean(runs$trusted), evaluations = mean(runs$evaluations))
 }
 
 coverage_row <- function(runs) {
   coverage <- mean(runs$inside)
-  list(case = "95 % interval, all cases", d = NA, exact = 0.95, mean = coverage, bias = coverage - 0.95, sd = sqrt(coverage * (1 - coverage) / nrow(runs)),
+  list(case = "95 % interval, all cases", d = NA, exact = 0.95, mean = coverage, bias = coverage - 0.95,
+       sd = sqrt(coverage * (1 - coverage) / nrow(runs)),
        coverage = coverage, required = "0.90-0.98", holds = coverage >= 0.90 && coverage <= 0.98, repeats = nrow(runs))
 }

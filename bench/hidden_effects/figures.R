@@ -1,7 +1,8 @@
 # The benchmark at a glance: how often each rule names the right condition, against the strength of the effect; and what
 # was told of each kind of world.
 
-rules <- c("amiss: mechanism named" = "mechanism", "amiss: condition" = "condition", "the paper's rule" = "paper_condition",
+rules <- c("amiss: mechanism named" = "mechanism", "amiss: condition" = "condition",
+           "the paper's rule" = "paper_condition",
            "correlation of residuals" = "correlation_condition", "random forest of residuals" = "forest_condition",
            "ARD lengthscales of residuals" = "ard_condition")
 
@@ -13,9 +14,11 @@ detection_table <- function(rows) {
   if (!length(with_effect)) return(NULL)
   one <- function(rule, strength) {
     own <- Filter(function(r) reached(r) == strength, with_effect)
-    right <- vapply(own, if (rules[[rule]] == "mechanism") named_right else function(r) condition_right(r, rules[[rule]]), NA)
+    right <- vapply(
+      own, if (rules[[rule]] == "mechanism") named_right else function(r) condition_right(r, rules[[rule]]), NA)
     found <- rate(right)
-    data.frame(rule = rule, strength = strength, share = found$rate, lower95 = found$lower95, upper95 = found$upper95, n = found$n)
+    data.frame(rule = rule, strength = strength, share = found$rate, lower95 = found$lower95, upper95 = found$upper95,
+               n = found$n)
   }
   strengths <- sort(unique(vapply(with_effect, reached, 0)))
   grid <- expand.grid(rule = names(rules), strength = strengths, stringsAsFactors = FALSE)
@@ -31,16 +34,19 @@ detection_figure <- function(rows) {
   table$rule <- factor(table$rule, names(rules))
   colours <- stats::setNames(c("#08519C", "#3182BD", "#E6550D", "grey35", "grey55", "grey70"), names(rules))
   ggplot2::ggplot(table, ggplot2::aes(.data$strength, 100 * .data$share, colour = .data$rule)) +
-    ggplot2::geom_linerange(ggplot2::aes(ymin = 100 * .data$lower95, ymax = 100 * .data$upper95), alpha = 0.35, position = ggplot2::position_dodge(0.05)) +
+    ggplot2::geom_linerange(ggplot2::aes(ymin = 100 * .data$lower95, ymax = 100 * .data$upper95), alpha = 0.35,
+                            position = ggplot2::position_dodge(0.05)) +
     ggplot2::geom_line(linewidth = 1) +
     ggplot2::geom_point(size = 2.4) +
-    ggplot2::scale_x_continuous("strength of the hidden effect (RMS over the noise, once the parameters have adapted)", trans = "log2",
+    ggplot2::scale_x_continuous("strength of the hidden effect (RMS over the noise, once the parameters have adapted)",
+                                trans = "log2",
                                 breaks = 2^(-2:4), labels = c("0.25", "0.5", "1", "2", "4", "8", "16")) +
     ggplot2::facet_wrap(~family) +
     ggplot2::scale_y_continuous("worlds in which the right one is named, per cent", limits = c(0, 100)) +
     ggplot2::scale_colour_manual(NULL, values = colours) +
     ggplot2::labs(title = "How often each rule names the right cause",
-                  subtitle = sprintf("%d worlds with an effect of the catalogue. Lines: 95 %% intervals.", sum(table$n[table$rule == names(rules)[1]]))) +
+                  subtitle = sprintf("%d worlds with an effect of the catalogue. Lines: 95 %% intervals.",
+                                     sum(table$n[table$rule == names(rules)[1]]))) +
     ggplot2::theme_minimal(base_size = 13) +
     ggplot2::theme(legend.position = "right", plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank())
 }
@@ -71,7 +77,8 @@ confusion_figure <- function(rows, name = rows[[1]]$family, family = families[[n
     ggplot2::scale_y_discrete("what was hidden", drop = FALSE) +
     ggplot2::labs(title = "What was hidden and what was told", subtitle = subtitle) +
     ggplot2::theme_minimal(base_size = 13) +
-    ggplot2::theme(axis.text.x = ggplot2::element_text(angle = 40, hjust = 0), panel.grid = ggplot2::element_blank(), plot.title.position = "plot",
+    ggplot2::theme(axis.text.x = ggplot2::element_text(angle = 40, hjust = 0), panel.grid = ggplot2::element_blank(),
+                   plot.title.position = "plot",
                    plot.margin = ggplot2::margin(6, 50, 6, 6))
 }
 

@@ -2,7 +2,8 @@
 
 fit_seed <- function(world) world$seed + 77L  # never the world's own
 
-score_world <- function(world, control = list(max_steps = 2, calibration = list(ais = list(precision = 0.3))), runs = 120, rivals = TRUE) {
+score_world <- function(world, control = list(max_steps = 2, calibration = list(ais = list(precision = 0.3))),
+                        runs = 120, rivals = TRUE) {
   started <- proc.time()[["elapsed"]]
   upgrade <- amiss::upgrade_model(world$base, world$measurements, world$catalogue, runs = runs, control = control,
                                   seed = fit_seed(world), threads = 1, quiet = TRUE)
@@ -14,8 +15,10 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
   best <- best_rmse(world)
   row <- list(seed = world$seed, family = world$family, structure = c(world$structure, NA)[1],
               misfit = c(world$misfit, NA)[1], hidden = length(world$kinds) > 0, kind = world$kind,
-              strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1, days = world$days, true_boundary = world$true_boundary,
-              true_mechanism = intersect(world$kinds, names(world$catalogue)), condition = told_condition(upgrade, attributed),
+              strength = world$strength, achieved = world$achieved, noise = world$noise, ar1 = world$ar1,
+              days = world$days, true_boundary = world$true_boundary,
+              true_mechanism = intersect(world$kinds, names(world$catalogue)),
+              condition = told_condition(upgrade, attributed),
               attributed_condition = attributed, mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
               verdicts = mechanism_verdicts(upgrade, verdict$verdict), check_passed = check_passed(upgrade),
               verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
@@ -23,7 +26,8 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
               rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall,
               runs_total = upgrade$runs_total)
-  if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world), list(paper_condition = paper_condition(world, runs)))
+  if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world),
+                       list(paper_condition = paper_condition(world, runs)))
   row
 }
 
@@ -43,8 +47,8 @@ check_passed <- function(upgrade) {
   if (is.null(passed)) NA else passed
 }
 
-# The RMSE in calibration that least squares reaches with what is really there; NA where no model of the catalogue is it,
-# or where the effort is not worth it (the box). The search starts from the truth as well.
+# The RMSE in calibration that least squares reaches with what is really there; NA where no model of the catalogue is
+# it, or where the effort is not worth it (the box). The search starts from the truth as well.
 best_rmse <- function(world) {
   if (!world$family %in% c("network", "runoff")) return(NA)
   true <- Reduce(function(model, k) world$catalogue[[k]]$edit(model), world$kinds, world$base)
@@ -58,7 +62,8 @@ attributed_condition <- function(upgrade) {
   if (any(table$significant)) table$boundary[table$significant][1] else NA
 }
 
-# What the tool tells: the condition of the cause it names or, where it names none, the one that the discrepancy answers to.
+# What the tool tells: the condition of the cause it names or, where it names none, the one that the discrepancy answers
+# to.
 told_condition <- function(upgrade, attributed) {
   of_cause <- upgrade$named_cause$boundary
   if (is.null(of_cause) || attributed %in% of_cause) attributed else of_cause[1]
@@ -98,8 +103,8 @@ parameter_covered <- function(world, upgrade) {
   own$conf.low <= true[[1]] && true[[1]] <= own$conf.high
 }
 
-# What is done today: the residuals of the calibrated base model held against each condition. The lengthscales are fitted to
-# every k-th row, at most 400 of them.
+# What is done today: the residuals of the calibrated base model held against each condition. The lengthscales are
+# fitted to every k-th row, at most 400 of them.
 rival_conditions <- function(fit, world, most = 400) {
   m <- fit$measurements
   x <- m$boundary[fit$rows, , drop = FALSE]
@@ -108,11 +113,14 @@ rival_conditions <- function(fit, world, most = 400) {
   strongest <- function(score) unname(names_of[which.max(score)])
   unit <- apply(x, 2, function(v) (v - min(v)) / diff(range(v)))
   thin <- seq(1, length(r), by = ceiling(length(r) / most))
-  ard <- amiss:::train_emulator_(unit[thin, , drop = FALSE], list(vectors = matrix(1, 3, 1), coefficients = matrix(r[thin]), singular_values = 1, discarded_ss = 0),
-                                 utils::modifyList(amiss:::emulator_control, list(starts = 2, searches = 1, max_evaluations = 40)),
+  ard <- amiss:::train_emulator_(unit[thin, , drop = FALSE], list(
+    vectors = matrix(1, 3, 1), coefficients = matrix(r[thin]), singular_values = 1, discarded_ss = 0),
+                                 utils::modifyList(amiss:::emulator_control,
+                                                   list(starts = 2, searches = 1, max_evaluations = 40)),
                                  list(seed = 1, threads = 1))
   forest <- if (requireNamespace("ranger", quietly = TRUE)) {
-    strongest(ranger::ranger(x = as.data.frame(unname(x)), y = r, importance = "permutation", num.trees = 300, seed = 1, num.threads = 1)$variable.importance)
+    strongest(ranger::ranger(x = as.data.frame(unname(x)), y = r, importance = "permutation", num.trees = 300, seed = 1,
+                             num.threads = 1)$variable.importance)
   }  # not asked where the package is not there
   list(correlation_condition = strongest(abs(stats::cor(x, r))), forest_condition = forest,
        ard_condition = strongest(-ard$hyperparameters[1, -(1:3)]))
@@ -144,12 +152,15 @@ score_rates <- function(rows) {
   # Where the base is wrong in structure, effects can be smaller than what its structure leaves, whatever the noise is.
   above <- Filter(function(r) isTRUE(r$achieved >= r$misfit), strong)
   weak <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved < 0.8)
-  rivals <- c("condition", "attributed_condition", "paper_condition", "correlation_condition", "forest_condition", "ard_condition")
-  right <- lapply(stats::setNames(rivals, paste0("right_", rivals)), function(rule) rate(flags(strong, function(r) condition_right(r, rule))))
+  rivals <- c("condition", "attributed_condition", "paper_condition", "correlation_condition", "forest_condition",
+              "ard_condition")
+  right <- lapply(stats::setNames(rivals, paste0("right_", rivals)),
+                  function(rule) rate(flags(strong, function(r) condition_right(r, rule))))
   c(list(right_mechanism = rate(flags(strong, named_right))), right,
     list(detection_at_1 = rate(flags(one, named_right)), detection_below_1 = rate(flags(weak, named_right)),
          parameter_covered = rate(flags(strong, function(r) r$covered)),
-         false_condition = rate(flags(none, function(r) !is.na(r$condition))), false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
+         false_condition = rate(flags(none, function(r) !is.na(r$condition))),
+         false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
          false_paper_condition = rate(flags(none, function(r) !is.na(r$paper_condition))),
          false_named = rate(flags(rows, function(r) any(!named_mechanisms(r) %in% r$true_mechanism))),
          hidden_among_adopted = rate(flags(strong, function(r) all(r$true_mechanism %in% r$adopted))),
@@ -168,7 +179,8 @@ by_family <- function(rows, of) {
   lapply(stats::setNames(nm = unique(family)), function(f) of(rows[family == f]))
 }
 
-# Means, with their standard errors: held-out error removed, as a share of what knowing the truth would remove, and time.
+# Means, with their standard errors: held-out error removed, as a share of what knowing the truth would remove, and
+# time.
 score_means <- function(rows) {
   strong <- Filter(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95, rows)
   of <- function(rows, field) {

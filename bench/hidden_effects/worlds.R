@@ -2,22 +2,30 @@
 # parameters, noise, the hidden effect and its strength. Truth is simulated on a finer grid, in space and time, than the
 # models that are fitted, so that nothing is recovered by sharing an error.
 
-catalogue_kinds <- c("wind-driven infiltration", "window transmission", "heater lag", "missing thermal mass", "glazing U-value",
+catalogue_kinds <- c("wind-driven infiltration", "window transmission", "heater lag", "missing thermal mass",
+                     "glazing U-value",
                      "sky exchange", "wind-dependent outside convection", "neighbour coupling")
 outside_kinds <- c("door opened daily", "drifting sensor", "unmetered load")
 world_kinds <- c("none", catalogue_kinds, "two effects", outside_kinds)
 
 # Conditions that may rightly be named for each mechanism.
-true_boundary <- list("wind-driven infiltration" = c("Ws", "Wd", "Te"), "window transmission" = "Gv", "heater lag" = "RHP",
-                      "missing thermal mass" = c("RHP", "Te", "Gv"), "glazing U-value" = "Te", "sky exchange" = c("Lw", "Te"),
+true_boundary <- list("wind-driven infiltration" = c("Ws", "Wd", "Te"), "window transmission" = "Gv",
+                      "heater lag" = "RHP",
+                      "missing thermal mass" = c("RHP", "Te", "Gv"), "glazing U-value" = "Te",
+                      "sky exchange" = c("Lw", "Te"),
                       "wind-dependent outside convection" = c("Ws", "Wd", "Gv", "Te"), "neighbour coupling" = "Tn")
 
 climates <- list(
-  coast_spring = list(latitude = 36.8, day_of_year = 100, temperature = 17, daily_range = 9, cloudiness = 0.3, wind = 3.5),
-  alps_autumn = list(latitude = 47.9, day_of_year = 250, temperature = 13, daily_range = 10, cloudiness = 0.5, wind = 2.0),
-  north_winter = list(latitude = 57.0, day_of_year = 330, temperature = 1, daily_range = 4, cloudiness = 0.7, wind = 4.5),
-  inland_summer = list(latitude = 40.4, day_of_year = 190, temperature = 25, daily_range = 14, cloudiness = 0.1, wind = 2.5),
-  island_spring = list(latitude = 52.0, day_of_year = 80, temperature = 7, daily_range = 6, cloudiness = 0.6, wind = 5.5))
+  coast_spring = list(latitude = 36.8, day_of_year = 100, temperature = 17, daily_range = 9, cloudiness = 0.3,
+                      wind = 3.5),
+  alps_autumn = list(latitude = 47.9, day_of_year = 250, temperature = 13, daily_range = 10, cloudiness = 0.5,
+                     wind = 2.0),
+  north_winter = list(latitude = 57.0, day_of_year = 330, temperature = 1, daily_range = 4, cloudiness = 0.7,
+                      wind = 4.5),
+  inland_summer = list(latitude = 40.4, day_of_year = 190, temperature = 25, daily_range = 14, cloudiness = 0.1,
+                       wind = 2.5),
+  island_spring = list(latitude = 52.0, day_of_year = 80, temperature = 7, daily_range = 6, cloudiness = 0.6,
+                       wind = 5.5))
 
 columns <- c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
 step_h <- 0.25
@@ -42,11 +50,13 @@ outside_effect <- function(kind, data, amplitude) {
 
 simulate_truth <- function(zone, values, data) {
   drivers <- as.matrix(data[setdiff(names(data), "hour")])
-  amiss::simulate_zone(zone, t(values), drivers, step_s = 3600 * step_h, control = list(max_substep_s = 150, cells = 2))[, 1]
+  amiss::simulate_zone(zone, t(values), drivers, step_s = 3600 * step_h,
+                       control = list(max_substep_s = 150, cells = 2))[, 1]
 }
 
 middle_values <- function(zone, low = 0.2, high = 0.8) {
-  vapply(amiss::zone_parameters(zone), function(p) p$prior$lower + stats::runif(1, low, high) * (p$prior$upper - p$prior$lower), 0)
+  vapply(amiss::zone_parameters(zone),
+         function(p) p$prior$lower + stats::runif(1, low, high) * (p$prior$upper - p$prior$lower), 0)
 }
 
 # What is left of a difference once the base model's parameters have adapted (to first order).
@@ -81,7 +91,8 @@ effect_zone <- function(kind, base, size) {
   new <- setdiff(names(amiss::zone_parameters(zone)), names(amiss::zone_parameters(base)))
   prior <- amiss::zone_parameters(zone)[[new]]$prior
   believed <- c("window transmission" = 0.61 * 0.52^2 / 0.36, "glazing U-value" = 1.5)
-  value <- if (kind %in% names(believed)) believed[[kind]] + size * (0.95 * prior$upper - believed[[kind]]) else prior$lower + 0.95 * size * (prior$upper - prior$lower)
+  value <- if (kind %in% names(believed)) believed[[kind]] +
+    size * (0.95 * prior$upper - believed[[kind]]) else prior$lower + 0.95 * size * (prior$upper - prior$lower)
   list(zone = zone, value = stats::setNames(value, new))
 }
 
@@ -97,7 +108,8 @@ find_size <- function(rms_at, wanted) {
 }
 
 #' @param seed Everything follows from it.
-#' @param kind,strength,days To fix these; drawn if NULL. Strength is the ratio of the adapted effect's RMS to the noise.
+#' @param kind,strength,days To fix these; drawn if NULL. Strength is the ratio of the adapted effect's RMS to the
+#'   noise.
 draw_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
   set.seed(seed, kind = "Mersenne-Twister", normal.kind = "Inversion", sample.kind = "Rejection")
   drawn_kind <- sample(c(rep("none", 4), rep(catalogue_kinds, 2), rep("two effects", 2), outside_kinds), 1)
@@ -133,11 +145,14 @@ draw_world <- function(seed, kind = NULL, strength = NULL, days = NULL) {
   achieved <- if (length(kinds)) adapted_rms((clean - plain)[rows], sensitivity) / noise else 0
   data$Ti <- clean + draw_noise(nrow(data), noise, ar1)
   average <- c(0.25, 0.5, 1)[findInterval(sum(calibrate) - 96, c(0, 500, 1000))]
-  measured <- suppressMessages(amiss::measurements(data, time = "hour", target = "Ti", boundary = c("Te", "Gv", "Ws", "circular(Wd)", "RHP", "Lw", "Tn"),
-                                                   noise_sd = noise, average = if (average > step_h) average, warmup = 24, calibrate = calibrate,
+  measured <- suppressMessages(amiss::measurements(data, time = "hour", target = "Ti",
+                                                   boundary = c("Te", "Gv", "Ws", "circular(Wd)", "RHP", "Lw", "Tn"),
+                                                   noise_sd = noise, average = if (average > step_h) average,
+                                                   warmup = 24, calibrate = calibrate,
                                                    validate = !calibrate, name = kind, unit = "K"))
   # What the walls were before the record is unknown to whoever fits.
-  fitted <- amiss::change_component(base, "zone", initial_wall_offset = amiss::free("initial_wall_offset", amiss::normal(0, 1, -3, 3), "K"))
+  fitted <- amiss::change_component(base, "zone", initial_wall_offset = amiss::free("initial_wall_offset",
+                                                                                    amiss::normal(0, 1, -3, 3), "K"))
   list(seed = seed, family = "box", kind = kind, kinds = kinds, strength = strength, achieved = achieved, noise = noise,
        ar1 = ar1, days = days, values = values, effects = effects, clean = clean, data = data, measurements = measured,
        base = fitted, catalogue = amiss::box_catalogue(columns),

@@ -11,7 +11,8 @@ parity_record <- function(n = 168) {
   outdoor <- 8 + 5 * sin(2 * pi * (hour - 9) / 24) + 2 * sin(2 * pi * hour / 71)
   sun <- pmax(0, sin(2 * pi * (hour - 6) / 24)) * (300 + 150 * sin(2 * pi * hour / 53))
   data.frame(hour, Te = outdoor, Gv = sun,
-             Ti = parity_run(c(a = 0.6, b = 0.8), cbind(Te = outdoor, Gv = sun)) + 0.05 * sqrt(2) * sin(12.9898 * hour^2))
+             Ti = parity_run(c(a = 0.6, b = 0.8), cbind(Te = outdoor, Gv = sun)) +
+               0.05 * sqrt(2) * sin(12.9898 * hour^2))
 }
 
 slow <- function(x, hours) {
@@ -63,7 +64,8 @@ parity_cases <- list(
     list(exact = c(air = air[c(1, 100, 288)], loss = heat_loss_coefficient(paper_box("M2"), values)))
   },
   basis = function() {
-    emulator <- train_emulator(simulate_design(parity_model(), parity_measurements(), 30, seed = 1), parity_measurements())
+    emulator <- train_emulator(simulate_design(parity_model(), parity_measurements(), 30, seed = 1),
+                               parity_measurements())
     list(exact = c(vectors = ncol(emulator$basis$vectors), singular = emulator$basis$singular_values[1:3]))
   },
   emulator = function() {
@@ -85,7 +87,8 @@ parity_cases <- list(
   },
   refined = function() {
     set <- parity_measurements()
-    fit <- calibrate_refined(simulate_design(parity_model(), set, 10, seed = 1), set, control = list(calibration = quick),
+    fit <- calibrate_refined(simulate_design(parity_model(), set, 10, seed = 1), set,
+                             control = list(calibration = quick),
                              seed = 2)
     list(sampled = list(evidence(fit), medians(fit)))
   },
@@ -130,7 +133,8 @@ parity_rows <- function(cases = parity_cases) {
 
 # The rows that differ by more than their kind allows; `unchanged`: by more than their digits.
 parity_differences <- function(rows, reference, unchanged = FALSE) {
-  both <- merge(rows, reference, by = c("case", "kind", "quantity"), all = TRUE, suffixes = c("", "_before"), sort = FALSE)
+  both <- merge(rows, reference, by = c("case", "kind", "quantity"), all = TRUE, suffixes = c("", "_before"),
+                sort = FALSE)
   allowed <- ifelse(both$kind == "sampled", 4 * sqrt(both$error^2 + both$error_before^2),
                     c(exact = 1e-8, searched = 1e-3)[both$kind] * pmax(1, abs(both$value_before)))
   if (unchanged) allowed <- 1e-13 * pmax(1, abs(both$value_before))

@@ -1,5 +1,6 @@
 #!/usr/bin/env Rscript
-# Against a peer: the ball-drop example of SEPIA (bench/peers/ball_drop/README.md). Rscript bench/peers/ball_drop.R --out FILE
+# Against a peer: the ball-drop example of SEPIA (bench/peers/ball_drop/README.md). Rscript bench/peers/ball_drop.R
+# --out FILE
 #
 # Times t(h) of falling balls; the simulator has drag linear in the speed, h'' = g - (C / R) h', the balls that were
 # timed had quadratic drag. The model is SEPIA's (Higdon et al. 2008) with its default priors,
@@ -21,7 +22,8 @@ ball_drop <- function(folder, seed = 1) {
   parameters <- list(amiss::free("R", range_of("R"), "m"), amiss::free("C", range_of("C")))
   emulator <- amiss::train_emulator(amiss::ensemble(design, runs, parameters), noise_sd = 0.01)
   priors <- list(C = range_of("C"), rho = amiss::beta_prior(1, 0.1), v = amiss::uniform(0, 1), o = amiss::uniform(0, 1))
-  posterior <- amiss::ais(higdon_likelihood(emulator, field, heights, stats::sd(runs - rowMeans(runs))), priors, seed = seed)
+  posterior <- amiss::ais(higdon_likelihood(emulator, field, heights, stats::sd(runs - rowMeans(runs))), priors,
+                          seed = seed)
   mean <- sum(posterior$weights * posterior$draws[, "C"])
   list(posterior = posterior, mean = mean, sd = sqrt(sum(posterior$weights * (posterior$draws[, "C"] - mean)^2)))
 }
@@ -70,8 +72,10 @@ if (sys.nframe() == 0) {
   out <- if (is.na(at)) "ball_drop.json" else arguments[at + 1]
   here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
   own <- ball_drop(file.path(here, "ball_drop"))
-  row <- list(case = "ball drop", peer = "SEPIA", mean = own$mean, sd = own$sd, peer_mean = published[["mean"]], peer_sd = published[["sd"]],
+  row <- list(case = "ball drop", peer = "SEPIA", mean = own$mean, sd = own$sd, peer_mean = published[["mean"]],
+              peer_sd = published[["sd"]],
               difference_in_sd = (own$mean - published[["mean"]]) / published[["sd"]], trusted = own$posterior$trusted)
   jsonlite::write_json(row, out, auto_unbox = TRUE, digits = 6, pretty = TRUE)
-  cat(sprintf("C = %.4f, sd %.4f; SEPIA %.4f, sd %.4f: %.2f standard deviations apart; %s\n", own$mean, own$sd, published[["mean"]], published[["sd"]], row$difference_in_sd, own$posterior$verdict))
+  cat(sprintf("C = %.4f, sd %.4f; SEPIA %.4f, sd %.4f: %.2f standard deviations apart; %s\n", own$mean, own$sd,
+              published[["mean"]], published[["sd"]], row$difference_in_sd, own$posterior$verdict))
 }

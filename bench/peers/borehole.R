@@ -9,7 +9,8 @@ borehole <- function(unit) {
   upper <- c(0.15, 50000, 115600, 1110, 116, 820, 1680, 12045)
   v <- sweep(sweep(unit, 2, upper - lower, "*"), 2, lower, "+")
   colnames(v) <- c("rw", "r", "Tu", "Hu", "Tl", "Hl", "L", "Kw")
-  with(as.data.frame(v), 2 * pi * Tu * (Hu - Hl) / (log(r / rw) * (1 + 2 * L * Tu / (log(r / rw) * rw^2 * Kw) + Tu / Tl)))
+  with(as.data.frame(v),
+       2 * pi * Tu * (Hu - Hl) / (log(r / rw) * (1 + 2 * L * Tu / (log(r / rw) * rw^2 * Kw) + Tu / Tl)))
 }
 hypercube <- function(n) vapply(1:8, function(i) (sample(n) - stats::runif(n)) / n, numeric(n))
 
@@ -21,7 +22,8 @@ interval <- function(mean, sd, df = Inf) {
 # Each fits and returns its predictions of runs: mean and 95 % limits, with the nugget where it estimates one.
 # train_emulator() is for series: ours is what it does for each of their coefficients.
 amiss_fit <- function(x, y) {
-  basis <- list(vectors = matrix(1, 3, 1), coefficients = matrix((y - mean(y)) / stats::sd(y)), singular_values = 1, discarded_ss = 0)
+  basis <- list(vectors = matrix(1, 3, 1), coefficients = matrix((y - mean(y)) / stats::sd(y)), singular_values = 1,
+                discarded_ss = 0)
   e <- amiss:::train_emulator_(x, basis, amiss:::emulator_control, list(seed = 1, threads = 1))
   function(at) {
     p <- amiss:::predict_emulator_(e, stats::qnorm(at))
@@ -53,8 +55,8 @@ hetgp <- function(x, y) {
   function(at) with(stats::predict(fit, at), interval(mean, sqrt(sd2 + nugs)))
 }
 
-# Nearly no nugget, and longer ranges than its defaults allow: with them, or with an estimated nugget, its errors are several
-# times as large or its variances NaN.
+# Nearly no nugget, and longer ranges than its defaults allow: with them, or with an estimated nugget, its errors are
+# several times as large or its variances NaN.
 lagp <- function(x, y) {
   gp <- laGP::newGPsep(x, y, d = laGP::darg(NULL, x)$start, g = 1e-6, dK = TRUE)
   laGP::mleGPsep(gp, "d", tmin = sqrt(.Machine$double.eps), tmax = 100)
@@ -87,7 +89,8 @@ fitted_once <- function(name, runs, seed) {
   }
   p <- fit(at)
   data.frame(emulator = name, runs = runs, seed = seed, seconds = stats::median(seconds),
-             error = sqrt(mean((p$mean - truth)^2)) / stats::sd(truth), coverage = mean(p$lower <= truth & truth <= p$upper))
+             error = sqrt(mean((p$mean - truth)^2)) / stats::sd(truth),
+             coverage = mean(p$lower <= truth & truth <= p$upper))
 }
 
 # Small designs differ much in how well their intervals hold: more of them.

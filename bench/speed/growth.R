@@ -1,12 +1,13 @@
-# How cost grows: time against the sizes of a problem, the exponent fitted to its upper half, and the limit: the flops of
-# the factorisations at the rate that this machine reaches for them or, against threads, the time of one shared by all. Where
-# a stage is more than three times from it: small matrices do not reach the rate of large ones, and what is no factorisation
-# counts (the emulator's exponentials and its gradient by each parameter, the gathering of the history model's matrix, the
-# filter that whitens the record, a recursion in time); of many threads all but one wait while the basis is made, modes are
-# sought, and the sampler draws, resamples and fits.
+# How cost grows: time against the sizes of a problem, the exponent fitted to its upper half, and the limit: the flops
+# of the factorisations at the rate that this machine reaches for them or, against threads, the time of one shared by
+# all. Where a stage is more than three times from it: small matrices do not reach the rate of large ones, and what is
+# no factorisation counts (the emulator's exponentials and its gradient by each parameter, the gathering of the history
+# model's matrix, the filter that whitens the record, a recursion in time); of many threads all but one wait while the
+# basis is made, modes are sought, and the sampler draws, resamples and fits.
 
 rate <- micro("micro_machine")
-dpotrf <- stats::approxfun(log(c(50, 100, 200, 384, 1000, 2000)), log(vapply(c(50, 100, 200, 384, 1000, 2000), function(n) {
+dpotrf <- stats::approxfun(log(c(50, 100, 200, 384, 1000, 2000)),
+                           log(vapply(c(50, 100, 200, 384, 1000, 2000), function(n) {
   rate[[paste0("machine/dpotrf/", n)]]$flops
 }, 0)), rule = 2)
 potrf_rate <- function(n) exp(dpotrf(log(n)))
@@ -23,11 +24,14 @@ against <- function(stage, size, of, at, seconds, limit = rep(NA_real_, length(a
   series[[length(series) + 1]] <<- data.frame(title = title, at = at, seconds = seconds, limit = limit)
   measured(sprintf("%s against %s: exponent", stage, size), exponent, "")
   last <- length(at)
-  scaled(sprintf("%s, %s = %s", stage, size, format(at[last], big.mark = ",")), seconds[last], if (seconds[last] < 1e-3) "us" else "ms")
-  if (!is.na(limit[last])) measured(sprintf("%s over its limit, %s = %s", stage, size, format(at[last], big.mark = ",")), seconds[last] / limit[last], "")
+  scaled(sprintf("%s, %s = %s", stage, size, format(at[last], big.mark = ",")), seconds[last],
+         if (seconds[last] < 1e-3) "us" else "ms")
+  if (!is.na(limit[last])) measured(sprintf("%s over its limit, %s = %s", stage, size,
+                                            format(at[last], big.mark = ",")), seconds[last] / limit[last], "")
 }
 least_seconds <- function(at, job) vapply(at, function(x) min(replicate(3, system.time(job(x))[["elapsed"]])), 0)
-seconds_of <- function(r, prefix, at, after = "") vapply(at, function(n) r[[paste0(prefix, "/", format(n, scientific = FALSE, trim = TRUE), after)]]$seconds, 0)
+seconds_of <- function(r, prefix, at, after = "") vapply(
+  at, function(n) r[[paste0(prefix, "/", format(n, scientific = FALSE, trim = TRUE), after)]]$seconds, 0)
 
 # Per value and gradient of the emulator's density: a factor and an inverse, M^3 flops in all.
 density_limit <- function(m) m^3 / 3 / potrf_rate(m) + 2 * m^3 / 3 / gemm_rate
@@ -48,20 +52,25 @@ q <- c(2, 4, 8, 16, 32)
 against("emulator, training", "coefficients Q", "M = 200, P = 8", q, least_seconds(q, trained),
         vapply(q, function(q) trained(q)$evaluations, 0) * density_limit(200))
 at <- c(50, 200, 384, 1000, 2000)
-against("emulator, prediction at 64 points", "runs M", "P = 8", at, seconds_of(emulator, "emulator/prediction", at), 64 * at^2 / gemm_rate)
+against("emulator, prediction at 64 points", "runs M", "P = 8", at, seconds_of(emulator, "emulator/prediction", at),
+        64 * at^2 / gemm_rate)
 
 history <- micro("micro_history", "setup/(384|1440|5760|52560)$|conditions|likelihood")
 n <- c(384, 1440, 5760, 52560)
-against("history model, set-up of one error", "time steps N", "p = 49", n, seconds_of(history, "history/setup", n), n * (55^2 + 2 * 6 * 55) / gemm_rate)
+against("history model, set-up of one error", "time steps N", "p = 49", n, seconds_of(history, "history/setup", n),
+        n * (55^2 + 2 * 6 * 55) / gemm_rate)
 n <- c(384, 5760, 525600)
-against("history model, likelihood and gradient", "time steps N", "p = 49", n, seconds_of(history, "history/likelihood", n))
+against("history model, likelihood and gradient", "time steps N", "p = 49", n,
+        seconds_of(history, "history/likelihood", n))
 s <- c(2, 4, 8, 16, 32, 40)
 columns <- 7 * s
-against("history model, likelihood and gradient", "conditions S", "7 columns each", s, seconds_of(history, "history/conditions", s),
+against("history model, likelihood and gradient", "conditions S", "7 columns each", s,
+        seconds_of(history, "history/conditions", s),
         columns^3 / 3 / potrf_rate(columns) + columns^3 / 3 / gemm_rate)
 kernel <- micro("micro_kernel", "dense/(96|384|1536)$|skeleton|low_rank")
 n <- c(96, 384, 1536)
-against("equation (6), dense value", "time steps N", "S = 5", n, seconds_of(kernel, "kernel/dense", n), n^3 / 3 / potrf_rate(n))
+against("equation (6), dense value", "time steps N", "S = 5", n, seconds_of(kernel, "kernel/dense", n),
+        n^3 / 3 / potrf_rate(n))
 n <- c(384, 1536, 5760)
 against("equation (6), value at low rank", "time steps N", "S = 5", n, seconds_of(kernel, "kernel/low_rank", n))
 
@@ -103,7 +112,8 @@ peak <- vapply(n, function(n) {
   micro("micro_history", sprintf("setup/%s$", format(n, scientific = FALSE)))[[1]]$peak_memory
 }, 0)
 for (i in seq_along(n)) {
-  measured(sprintf("history model, most memory held (data included), N = %s", format(n[i], big.mark = ",")), peak[i], "MB", if (n[i] == 525600) 1000 else NA)
+  measured(sprintf("history model, most memory held (data included), N = %s", format(n[i], big.mark = ",")), peak[i],
+           "MB", if (n[i] == 525600) 1000 else NA)
 }
 measured("history model, most memory held against time steps N: exponent", power_of(n, peak), "")
 
@@ -119,7 +129,8 @@ figure <- ggplot2::ggplot(table, ggplot2::aes(.data$at, 1e3 * .data$seconds)) +
   ggplot2::facet_wrap("title", scales = "free", ncol = 3) +
   ggplot2::scale_x_log10(breaks = function(x) Filter(function(b) b == round(b), scales::breaks_log()(x)),
                          labels = function(x) format(x, big.mark = ",", scientific = FALSE, trim = TRUE)) +
-  ggplot2::scale_y_log10(labels = function(x) format(x, big.mark = ",", scientific = FALSE, trim = TRUE, drop0trailing = TRUE)) +
+  ggplot2::scale_y_log10(labels = function(x) format(x, big.mark = ",", scientific = FALSE, trim = TRUE,
+                                                     drop0trailing = TRUE)) +
   ggplot2::scale_colour_manual(NULL, values = stats::setNames(c("#08519C", "grey45"), c("measured", what_limits))) +
   ggplot2::labs(x = NULL, y = "milliseconds", title = "How the cost of each stage grows") +
   ggplot2::theme_minimal(base_size = 11) +

@@ -1,9 +1,10 @@
-# What the instruction sets bring: the package as R CMD INSTALL builds it, without and with its AVX2 library, and compiled
-# for this processor (as tools/ does). Then what a BLAS for the matrix products brings (AMISS_BLAS=1): R's own and OpenBLAS
-# (bench/peers/install.R), each beside Eigen's products in a session that has the same BLAS for R's.
+# What the instruction sets bring: the package as R CMD INSTALL builds it, without and with its AVX2 library, and
+# compiled for this processor (as tools/ does). Then what a BLAS for the matrix products brings (AMISS_BLAS=1): R's own
+# and OpenBLAS (bench/peers/install.R), each beside Eigen's products in a session that has the same BLAS for R's.
 
 installed <- function(variant) {
-  run("bash", "-c", shQuote(sprintf("source %s && install_package %s", shQuote(file.path(root, "tools", "lib.sh")), variant)))
+  run("bash", "-c",
+      shQuote(sprintf("source %s && install_package %s", shQuote(file.path(root, "tools", "lib.sh")), variant)))
   file.path(root, "build", variant, "library")
 }
 whole <- 'suppressPackageStartupMessages(library(amiss))
@@ -14,8 +15,10 @@ whole <- 'suppressPackageStartupMessages(library(amiss))
   })[["elapsed"]])'
 seconds <- function(library, simd = "", preload = "") {
   libraries <- paste(c(library, .libPaths()), collapse = ":")
-  env <- c("OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1", paste0(c("R_LIBS=", "AMISS_SIMD=", "LD_PRELOAD="), shQuote(c(libraries, simd, preload))))
-  one <- function(i) as.numeric(system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(whole)), stdout = TRUE, env = env))
+  env <- c("OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1",
+           paste0(c("R_LIBS=", "AMISS_SIMD=", "LD_PRELOAD="), shQuote(c(libraries, simd, preload))))
+  one <- function(i) as.numeric(system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(whole)), stdout = TRUE,
+                                        env = env))
   stats::median(vapply(1:3, one, 0))
 }
 portable <- installed("portable")

@@ -1,9 +1,11 @@
-# Equation (6): single values, and posterior with evidence; each case of the latter in a process of its own, as only a process
-# knows the most memory it held. That of 384 steps is run with eight seeds: the mean time, and the worst of the rest.
+# Equation (6): single values, and posterior with evidence; each case of the latter in a process of its own, as only a
+# process knows the most memory it held. That of 384 steps is run with eight seeds: the mean time, and the worst of the
+# rest.
 
 r <- micro("micro_kernel", "dense|cholesky|skeleton|low_rank")
 scaled("equation (6), dense value, N = 384", r[["kernel/dense/384"]]$seconds, "ms")
-measured("the same over one Cholesky factor (with kernel fill)", r[["kernel/dense/384"]]$seconds / r[["kernel/cholesky/384"]]$seconds, "")
+measured("the same over one Cholesky factor (with kernel fill)",
+         r[["kernel/dense/384"]]$seconds / r[["kernel/cholesky/384"]]$seconds, "")
 scaled("equation (6), value from a skeleton, N = 384", r[["kernel/skeleton/384"]]$seconds, "ms", 0.5)
 scaled("equation (6), value from a skeleton, N = 5760", r[["kernel/skeleton/5760"]]$seconds, "ms", 0.5)
 scaled("equation (6), value at low rank, N = 5760", r[["kernel/low_rank/5760"]]$seconds, "ms")

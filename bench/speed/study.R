@@ -13,19 +13,22 @@ whole_model <- function(model, threads = 1) {
 }
 elapsed <- function(expression) system.time(expression)[["elapsed"]]
 
-scaled("a paper-sized model: train, calibrate, both discrepancies, evidence", elapsed(paper <- whole_model(paper_box("M3"))), "s", 10)
+scaled("a paper-sized model: train, calibrate, both discrepancies, evidence",
+       elapsed(paper <- whole_model(paper_box("M3"))), "s", 10)
 measured("its evidence: standard error", paper$standard_error / log(10), "decade", 0.1)
 scaled("models M1 to M6, the same", elapsed(for (name in paste0("M", 1:6)) whole_model(paper_box(name))), "s", 60)
 gains <- replicate(5, elapsed(whole_model(paper_box("M5"), 1)) / elapsed(whole_model(paper_box("M5"), 2)))
 measured("two threads over one, a paper-sized model, median of five", stats::median(gains), "", 1.8, above = TRUE)
 # What the machine has to give: the same work on one thread, done by two processes at once.
 one <- replicate(5, elapsed(whole_model(paper_box("M5"))))
-both <- replicate(5, elapsed(parallel::mclapply(1:2, function(i) whole_model(paper_box("M5"))$log_evidence, mc.cores = 2)))
+both <- replicate(5,
+                  elapsed(parallel::mclapply(1:2, function(i) whole_model(paper_box("M5"))$log_evidence, mc.cores = 2)))
 measured("two processes at once over one, the same work each", 2 * stats::median(one) / stats::median(both), "")
 
 # The whole attribution of a house's base model: all conditions, the evidence without each, surrogates.
 open_house <- read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))
-emulator <- train_emulator(simulate_design(open_house$model, open_house$measurements, 150, seed = 1, threads = 2), open_house$measurements, threads = 2)
+emulator <- train_emulator(simulate_design(open_house$model, open_house$measurements, 150, seed = 1, threads = 2),
+                           open_house$measurements, threads = 2)
 fit <- calibrate(emulator, open_house$measurements, seed = 1, threads = 2)
 scaled("history attribution of O5", elapsed(attribute_discrepancy(fit, seed = 1)), "s", 2)
 
@@ -41,6 +44,7 @@ house <- function(name) {
   stats::setNames(as.numeric(strsplit(out[length(out)], " ")[[1]]), c("seconds", "peak"))
 }
 houses <- vapply(c(O5 = "O5", N2 = "N2"), house, c(seconds = 0, peak = 0))
-for (name in colnames(houses)) scaled(sprintf("house %s, eight mechanisms, two cores", name), houses["seconds", name], "s")
+for (name in colnames(houses))
+  scaled(sprintf("house %s, eight mechanisms, two cores", name), houses["seconds", name], "s")
 scaled("houses O5 and N2 together, two cores", sum(houses["seconds", ]), "s", 60)
 measured("most memory held by either session", max(houses["peak", ]), "MB", 300)

@@ -1,5 +1,5 @@
-# What every exported function must refuse. A row is list(f, arg, value, class, pattern): `f` called as in valid_calls(), but
-# with `value` for `arg`, must stop with a condition of `class` whose message matches `pattern`.
+# What every exported function must refuse. A row is list(f, arg, value, class, pattern): `f` called as in
+# valid_calls(), but with `value` for `arg`, must stop with a condition of `class` whose message matches `pattern`.
 
 bad_input <- new.env()
 
@@ -7,17 +7,21 @@ bad_input <- new.env()
 bad_input_objects <- function() {
   if (!is.null(bad_input$objects)) return(bad_input$objects)
   quietly <- function(x) suppressWarnings(suppressMessages(x))
-  ais <- list(pilot_chains = 8, groups = 2, max_groups = 2, chains = 4, sweeps = 1, max_sweeps = 1, importance_draws = 50)
+  ais <- list(pilot_chains = 8, groups = 2, max_groups = 2, chains = 4, sweeps = 1, max_sweeps = 1,
+              importance_draws = 50)
   o <- list(record = linear_data(60), simulator = linear_simulator(), ais = ais)
-  o$calibration <- list(ais = ais, error_ratios = c(0, 1), error_times = 2, reach = Inf, error_draws = 4, check = 4, exact = 0)
+  o$calibration <- list(ais = ais, error_ratios = c(0, 1), error_times = 2, reach = Inf, error_draws = 4, check = 4,
+                        exact = 0)
   o$measurements <- linear_measurements(o$record, calibrate = 1:60 <= 45, validate = 1:60 > 45)
   o$ensemble <- quietly(simulate_design(o$simulator, o$measurements, runs = 10, seed = 1))
   o$emulator <- quietly(train_emulator(o$ensemble, o$measurements))
   o$fit <- quietly(calibrate(o$emulator, o$measurements, o$calibration, seed = 1))
   o$paper <- quietly(calibrate_paper(o$emulator, o$measurements, list(ais = ais), seed = 1))
   o$gain <- free("gain", uniform(0, 1))
-  o$function_simulator <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"], o$gain, boundary = "Te")
-  o$program <- program_simulator(c("awk", "{{gain}}"), o$gain, output = c(file = "stdout.txt", column = "Ti"), cache = tempfile())
+  o$function_simulator <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"], o$gain,
+                                             boundary = "Te")
+  o$program <- program_simulator(c("awk", "{{gain}}"), o$gain, output = c(file = "stdout.txt", column = "Ti"),
+                                 cache = tempfile())
   o$room <- zone(zone_wall("wall", 1, zone_layer(0.1, 1, 1e6), outside = "Te"), zone_heater("heater", "P"),
                  zone_infiltration("leak", free("ach", uniform(0, 1)), "Te"), volume = 10)
   o$drivers <- cbind(Te = rep(5, 10), P = rep(100, 10))
@@ -30,11 +34,14 @@ bad_input_objects <- function() {
 # One call of every exported function with all its arguments, as good ones; `list()` stands for what is never used.
 valid_calls <- function() {
   o <- bad_input_objects()
-  opening <- list(outside = "Te", height = 0, azimuth = 0, wind_speed = NULL, wind_direction = NULL, exposure = "exposed", shelter = 1)
-  upgrade <- list(measurements = o$measurements, runs = 10, control = list(), seed = 1, threads = 1, quiet = TRUE, checkpoint = NULL)
+  opening <- list(outside = "Te", height = 0, azimuth = 0, wind_speed = NULL, wind_direction = NULL,
+                  exposure = "exposed", shelter = 1)
+  upgrade <- list(measurements = o$measurements, runs = 10, control = list(), seed = 1, threads = 1, quiet = TRUE,
+                  checkpoint = NULL)
   list(
     add_component = list(zone = o$room, component = zone_gain("gain", "P")),
-    ais = list(log_likelihood = function(z) -z[, 1]^2, priors = list(a = uniform(0, 1)), control = o$ais, seed = 1, gradient = NULL),
+    ais = list(log_likelihood = function(z) -z[, 1]^2, priors = list(a = uniform(0, 1)), control = o$ais, seed = 1,
+               gradient = NULL),
     attribute_discrepancy = list(fit = o$fit, control = list(), seed = 1, threads = 1),
     augment = list(x = o$fit, data = NULL, newdata = NULL),
     autoplot = list(object = structure(list(), class = "amiss_upgrade"), which = "fit"),
@@ -42,9 +49,12 @@ valid_calls <- function() {
     beta_prior = list(shape1 = 1, shape2 = 1, lower = 0, upper = 1),
     bootstrap_noise = list(replicates = 50, detrend = FALSE, seed = 1),
     box_catalogue = list(columns = "Te", azimuth = 180),
-    calibrate = list(emulator = o$emulator, measurements = o$measurements, control = o$calibration, seed = 1, threads = 1),
-    calibrate_paper = list(emulator = o$emulator, measurements = o$measurements, control = list(), seed = 1, threads = 1),
-    calibrate_refined = list(ensemble = o$ensemble, measurements = o$measurements, rounds = 0, runs = 10, control = list(), seed = 1,
+    calibrate = list(emulator = o$emulator, measurements = o$measurements, control = o$calibration, seed = 1,
+                     threads = 1),
+    calibrate_paper = list(emulator = o$emulator, measurements = o$measurements, control = list(), seed = 1,
+                           threads = 1),
+    calibrate_refined = list(ensemble = o$ensemble, measurements = o$measurements, rounds = 0, runs = 10,
+                             control = list(), seed = 1,
                              threads = 1),
     catalogue = o$catalogue[1],
     change_component = list(zone = o$room, name = "heater", capacity = 3),
@@ -53,45 +63,59 @@ valid_calls <- function() {
     discrepancy = list(fit = o$fit),
     driver_names = list(simulator = o$simulator),
     drop_component = list(zone = o$room, name = "leak"),
-    ensemble = list(design = o$ensemble$values, outputs = o$ensemble$outputs, parameters = unname(o$ensemble$parameters),
+    ensemble = list(design = o$ensemble$values, outputs = o$ensemble$outputs,
+                    parameters = unname(o$ensemble$parameters),
                     measurements = o$measurements, validation = NULL, time = NULL),
     free = list(name = "a", prior = uniform(0, 1), unit = "K", label = "A"),
     free_parameters = list(simulator = o$simulator),
     function_simulator = list(f = o$function_simulator$f, o$gain, boundary = "Te", name = "a"),
     glance = list(x = o$fit),
-    heat_loss_coefficient = list(simulator = o$room, values = cbind(ach = 0.5), drivers = numeric(), outside = 10, inside = 30),
+    heat_loss_coefficient = list(simulator = o$room, values = cbind(ach = 0.5), drivers = numeric(), outside = 10,
+                                 inside = 30),
     lognormal = list(meanlog = 0, sdlog = 1, lower = 0, upper = Inf),
-    measurements = list(data = o$record, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1, average = NULL,
+    measurements = list(data = o$record, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+                        average = NULL,
                         calibrate = 1:60 <= 45, validate = 1:60 > 45, warmup = 0, name = "a", unit = "K"),
     mechanism = list(name = "a", edit = identity, boundary = "Te", sentence = "A."),
     normal = list(mean = 0, sd = 1, lower = -Inf, upper = Inf),
     paper_box = list(model = "M1", azimuth = 0),
-    predict = list(object = o$fit, newdata = NULL, use = "calibrate", draws = 4, discrepancy = FALSE, interval = "prediction",
+    predict = list(object = o$fit, newdata = NULL, use = "calibrate", draws = 4, discrepancy = FALSE,
+                   interval = "prediction",
                    level = 0.95, seed = 1, threads = 1),
-    program_simulator = list(command = c("awk", "{{gain}}"), o$gain, output = c(file = "a", column = "b"), templates = list(),
-                             boundary = "Te", drivers = "d.csv", time_limit = 1, retries = 0, cache = "runs", version = "", name = "p"),
+    program_simulator = list(command = c("awk", "{{gain}}"), o$gain, output = c(file = "a", column = "b"),
+                             templates = list(),
+                             boundary = "Te", drivers = "d.csv", time_limit = 1, retries = 0, cache = "runs",
+                             version = "", name = "p"),
     read_calibro = list(folder = o$folder, parameters = NULL, relative = FALSE, step_h = 1),
-    read_study = list(path = system.file("studies", "paper_synthetic.yml", package = "amiss"), quiet = TRUE, trust = FALSE),
+    read_study = list(path = system.file("studies", "paper_synthetic.yml", package = "amiss"), quiet = TRUE,
+                      trust = FALSE),
     refine_ensemble = list(ensemble = o$ensemble, fit = o$fit, runs = 10, threads = 1),
-    report = list(x = structure(list(), class = "amiss_upgrade"), file = file.path(o$folder, "report.html"), quiet = TRUE),
+    report = list(x = structure(list(), class = "amiss_upgrade"), file = file.path(o$folder, "report.html"),
+                  quiet = TRUE),
     rolbs = list(n = 10, step_h = 0.25, power = 100, lengths = c(1, 2), seed = 1),
-    run_study = list(path = system.file("studies", "paper_synthetic.yml", package = "amiss"), out = NULL, seed = 1, threads = 1,
+    run_study = list(path = system.file("studies", "paper_synthetic.yml", package = "amiss"), out = NULL, seed = 1,
+                     threads = 1,
                      quiet = TRUE, trust = FALSE),
     simulate = list(object = o$fit, nsim = 2, seed = 1, threads = 1),
     simulate_design = list(simulator = o$simulator, measurements = o$measurements, runs = 10, seed = 1, threads = 1),
-    simulate_runs = list(simulator = o$function_simulator, values = cbind(gain = 0.5), drivers = o$drivers, step_h = 1, hold = NULL,
+    simulate_runs = list(simulator = o$function_simulator, values = cbind(gain = 0.5), drivers = o$drivers, step_h = 1,
+                         hold = NULL,
                          threads = 1),
-    simulate_zone = list(zone = o$room, values = cbind(ach = 0.5), drivers = o$drivers, step_s = 900, hold = NULL, threads = 1,
+    simulate_zone = list(zone = o$room, values = cbind(ach = 0.5), drivers = o$drivers, step_s = 900, hold = NULL,
+                         threads = 1,
                          control = list()),
-    synthetic_weather = list(days = 1, step_h = 0.25, day_of_year = 100, latitude = 36, temperature = 17, daily_range = 9,
+    synthetic_weather = list(days = 1, step_h = 0.25, day_of_year = 100, latitude = 36, temperature = 17,
+                             daily_range = 9,
                              cloudiness = 0.3, wind = 3, wind_direction = 240, azimuth = 180, seed = 1),
     tidy = list(x = o$fit, conf.level = 0.95),
     train_emulator = list(ensemble = o$ensemble, noise_sd = 0.1, control = list(), threads = 1),
     triangular = list(lower = 0, mode = 1, upper = 2),
     uniform = list(lower = 0, upper = 1),
     upgrade_model = c(list(simulator = o$simulator, catalogue = o$catalogue), upgrade),
-    with_parameters = list(model = o$function_simulator, free("k", uniform(0, 1)), f = NULL, boundary = "Te", name = "b"),
-    with_template = list(simulator = o$program, templates = list(b.txt = I("{{k}}")), free("k", uniform(0, 1)), boundary = "Gv"),
+    with_parameters = list(model = o$function_simulator, free("k", uniform(0, 1)), f = NULL, boundary = "Te",
+                           name = "b"),
+    with_template = list(simulator = o$program, templates = list(b.txt = I("{{k}}")), free("k", uniform(0, 1)),
+                         boundary = "Gv"),
     zone = list(zone_heater("h", "P"), volume = 10, air_capacity_factor = 1, initial_air = 20, initial_wall_offset = 0),
     zone_boundary = list(zone = o$room),
     zone_coupling = list(name = "c", conductance = 1, temperature = "T"),
@@ -104,7 +128,8 @@ valid_calls <- function() {
     zone_parameters = list(zone = o$room),
     zone_resolve = list(zone = o$room, values = c(ach = 0.5)),
     zone_supply = list(name = "s", flow = "F", temperature = "T", scale = 1),
-    zone_wall = list(name = "w", area = 1, zone_layer(0.1, 1, 1e6), outside = "Te", outside_film = 25, sun = NULL, absorptance = 0.5,
+    zone_wall = list(name = "w", area = 1, zone_layer(0.1, 1, 1e6), outside = "Te", outside_film = 25, sun = NULL,
+                     absorptance = 0.5,
                      sky = NULL, sky_view = 0.5, wind_speed = "Ws", wind_direction = "Wd", azimuth = 0, wind_film = 0.1,
                      inside_convection = 3, inside_emissivity = 0.9, outside_emissivity = 0.9),
     zone_window = list(name = "w", area = 1, outside = "Te", u_value = 1, solar_factor = 0.5, sun = NULL, to_air = 0.1))
@@ -138,7 +163,8 @@ kinds <- list(
 rows_of <- function(.function, ...) {
   arguments <- list(...)
   rows <- lapply(names(arguments), function(arg) {
-    lapply(unlist(kinds[arguments[[arg]]], recursive = FALSE), function(value) list(f = .function, arg = arg, value = value))
+    lapply(unlist(kinds[arguments[[arg]]], recursive = FALSE),
+           function(value) list(f = .function, arg = arg, value = value))
   })
   lapply(unlist(rows, recursive = FALSE), function(row) {
     row$class <- "amiss_error_input"
@@ -163,7 +189,8 @@ rows_of_control <- function(f, defaults, depth = character(), wrong = list("nons
       bad(f, "control", nested(stats::setNames(list(value), option)), paste0(where, "\\$", option))
     })
   })
-  c(unlist(unlist(rows, recursive = FALSE), recursive = FALSE), bad(f, "control", nested(list(nonsense = 1)), paste0(where, ".*nonsense")))
+  c(unlist(unlist(rows, recursive = FALSE), recursive = FALSE),
+    bad(f, "control", nested(list(nonsense = 1)), paste0(where, ".*nonsense")))
 }
 
 # Outcome of a row, within ten seconds: "" where it is refused as it should be, and otherwise what happened.
@@ -191,10 +218,12 @@ row_outcome <- function(row, calls) {
 bad_study <- function(fields) {
   o <- bad_input_objects()
   utils::write.csv(o$record, file.path(o$folder, "data.csv"), row.names = FALSE)
-  writeLines('function_simulator(function(values, drivers) drivers[, "Te"], free("gain", uniform(0, 1)), boundary = "Te")',
+  writeLines(
+    'function_simulator(function(values, drivers) drivers[, "Te"], free("gain", uniform(0, 1)), boundary = "Te")',
              file.path(o$folder, "model.R"))
   writeLines('catalogue(mechanism("sun", identity, "Gv", "The sun."))', file.path(o$folder, "catalogue.R"))
-  study <- list(study = "linear", data = "data.csv", time = "hour", target = "Ti", boundary = list("Te", "Gv"), noise_sd = 0.1,
+  study <- list(study = "linear", data = "data.csv", time = "hour", target = "Ti", boundary = list("Te", "Gv"),
+                noise_sd = 0.1,
                 model = "model.R", catalogue = "catalogue.R", runs = 10, seed = 1)
   study[names(fields)] <- fields
   path <- file.path(o$folder, "study.yml")
@@ -204,11 +233,13 @@ bad_study <- function(fields) {
 
 # As row_outcome(), of a field of a study file.
 study_outcome <- function(row) {
-  calls <- list(run_study = list(path = bad_study(stats::setNames(list(row$value), row$arg)), quiet = TRUE, trust = TRUE))
+  calls <- list(run_study = list(path = bad_study(stats::setNames(list(row$value), row$arg)), quiet = TRUE,
+                                 trust = TRUE))
   row_outcome(utils::modifyList(row, list(f = "run_study", arg = "quiet", value = TRUE)), calls)
 }
 
 # Rows of a field: what it cannot be, each said with its name.
-study_rows <- function(field, ..., pattern = field) unlist(lapply(list(...), function(value) bad("study", field, value, pattern)), recursive = FALSE)
+study_rows <- function(field, ..., pattern = field) unlist(
+  lapply(list(...), function(value) bad("study", field, value, pattern)), recursive = FALSE)
 
 row_name <- function(row) sprintf("%s(%s = %s)", row$f, row$arg, substr(deparse1(row$value), 1, 60))

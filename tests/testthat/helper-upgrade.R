@@ -2,14 +2,17 @@
 
 upgrade_cache <- new.env()
 
-lagged <- function(x, hours) as.numeric(stats::filter(x * (1 - exp(-1 / hours)), exp(-1 / hours), method = "recursive", init = x[1]))
+lagged <- function(x, hours) as.numeric(stats::filter(x * (1 - exp(-1 / hours)), exp(-1 / hours), method = "recursive",
+                                                      init = x[1]))
 
 small_record <- function(n = 240) {
   withr::with_seed(1, {
     hour <- seq_len(n)
     table <- data.frame(time = as.POSIXct("2024-03-01", tz = "UTC") + 3600 * hour,
-                        Te = 5 + 4 * sin(2 * pi * (hour - 9) / 24) + as.numeric(stats::filter(rnorm(n, 0, 0.5), 0.95, method = "recursive")),
-                        Gv = pmax(0, sin(2 * pi * (hour - 6) / 24)) * rep(runif(ceiling(n / 24), 0.1, 1), each = 24)[seq_len(n)] * 500)
+                        Te = 5 + 4 * sin(2 * pi * (hour - 9) / 24) +
+                          as.numeric(stats::filter(rnorm(n, 0, 0.5), 0.95, method = "recursive")),
+                        Gv = pmax(0, sin(2 * pi * (hour - 6) / 24)) *
+                          rep(runif(ceiling(n / 24), 0.1, 1), each = 24)[seq_len(n)] * 500)
     table$Ti <- 15 + 0.8 * lagged(table$Te, 6) + 0.006 * lagged(table$Gv, 3) + rnorm(n, 0, 0.05)
     table
   })
@@ -17,22 +20,32 @@ small_record <- function(n = 240) {
 
 small_upgrade <- function() {
   if (is.null(upgrade_cache$upgrade)) {
-    m <- measurements(small_record(), time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05, unit = "K", name = "small room",
+    m <- measurements(small_record(), time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05, unit = "K",
+                      name = "small room",
                       calibrate = seq_len(240) <= 168, validate = seq_len(240) > 168, warmup = 12)
-    base <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * lagged(drivers[, "Te"], 6),
-                               free("offset", uniform(10, 20), "K", "offset"), free("gain", uniform(0, 2), "", "gain"), boundary = "Te")
-    sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters through a window <that> the model *leaves* out.", edit = function(model) {
-      function_simulator(function(values, drivers) model$f(values, drivers) + values[["sun_gain"]] * lagged(drivers[, "Gv"], 3),
-                         model$parameters$offset, model$parameters$gain, free("sun_gain", uniform(0, 0.02), "Km2/W", "gain of the sun"),
+    base <- function_simulator(function(values, drivers) values[["offset"]] +
+                               values[["gain"]] * lagged(drivers[, "Te"], 6),
+                               free("offset", uniform(10, 20), "K", "offset"), free("gain", uniform(0, 2), "", "gain"),
+                               boundary = "Te")
+    sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters through a window <that> the model *leaves* out.",
+                     edit = function(model) {
+      function_simulator(function(values, drivers) model$f(values, drivers) +
+                         values[["sun_gain"]] * lagged(drivers[, "Gv"], 3),
+                         model$parameters$offset, model$parameters$gain,
+                         free("sun_gain", uniform(0, 0.02), "Km2/W", "gain of the sun"),
                          boundary = c("Te", "Gv"))
     })
     nothing <- mechanism("drift", boundary = "Te", sentence = "The target drifts.", edit = function(model) {
-      function_simulator(function(values, drivers) model$f(values, drivers) + values[["drift"]] * seq_len(nrow(drivers)) / 100,
-                         model$parameters$offset, model$parameters$gain, free("drift", uniform(-1, 1), "K", "drift"), boundary = "Te")
+      function_simulator(function(values, drivers) model$f(values, drivers) +
+                         values[["drift"]] * seq_len(nrow(drivers)) / 100,
+                         model$parameters$offset, model$parameters$gain, free("drift", uniform(-1, 1), "K", "drift"),
+                         boundary = "Te")
     })
     upgrade_cache$upgrade <- upgrade_model(base, m, catalogue(sun, nothing), runs = 30, seed = 1, quiet = TRUE,
-      control = list(max_steps = 1, calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 8, importance_draws = 200)),
-                     attribution = list(surrogates = 39, ais = list(pilot_chains = 24, groups = 4, importance_draws = 200))))
+      control = list(max_steps = 1,
+                     calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 8, importance_draws = 200)),
+                     attribution = list(surrogates = 39,
+                                        ais = list(pilot_chains = 24, groups = 4, importance_draws = 200))))
   }
   upgrade_cache$upgrade
 }

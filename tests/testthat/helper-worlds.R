@@ -14,7 +14,8 @@ linear_simulator <- function() {
 linear_data <- function(n = 240, noise = 0.1, seed = 11) {
   set.seed(seed)
   hour <- seq_len(n)
-  data <- data.frame(hour = hour, Te = 10 + 5 * sin(2 * pi * hour / 24) + as.numeric(stats::filter(stats::rnorm(n), 0.9, "recursive")),
+  data <- data.frame(hour = hour, Te = 10 + 5 * sin(2 * pi * hour / 24) +
+                     as.numeric(stats::filter(stats::rnorm(n), 0.9, "recursive")),
                      Gv = pmax(0, 300 * sin(2 * pi * (hour - 6) / 24)) * stats::runif(n, 0.3, 1))
   data$Ti <- 20 + 0.4 * data$Te + stats::rnorm(n, 0, noise)
   data

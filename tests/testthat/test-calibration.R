@@ -58,7 +58,8 @@ test_that("the reach has the probabilities that separate calibrations give it", 
   data$Ti <- data$Ti + 0.3 * lagged(data$Tn, 3) + 0.3 * data$Te
   m <- linear_measurements(data, boundary = c("Te", "Gv", "Tn"))
   fit <- linear_fit(m)
-  alone <- lapply(fit$control$reach, function(reach) calibrate(fit$emulator, m, c(quick_ais, list(reach = reach)), seed = 3))
+  alone <- lapply(fit$control$reach,
+                  function(reach) calibrate(fit$emulator, m, c(quick_ais, list(reach = reach)), seed = 3))
   of_each <- vapply(alone, `[[`, 0, "log_evidence")
   se <- vapply(alone, `[[`, 0, "standard_error")
   expected <- exp(of_each - max(of_each)) / sum(exp(of_each - max(of_each)))
@@ -75,7 +76,8 @@ test_that("what the reach says is put into words", {
 
 test_that("same seed, one or two threads: same bits", {
   m <- linear_measurements()
-  expect_identical(linear_fit(m, threads = 1)[c("values", "log_evidence")], linear_fit(m, threads = 2)[c("values", "log_evidence")])
+  expect_identical(linear_fit(m, threads = 1)[c("values", "log_evidence")],
+                   linear_fit(m, threads = 2)[c("values", "log_evidence")])
 })
 
 test_that("validation rows are never touched by calibration", {
@@ -88,7 +90,8 @@ test_that("validation rows are never touched by calibration", {
   b <- linear_fit(spoilt)
   expect_identical(b$values, a$values)
   expect_identical(b$log_evidence, a$log_evidence)
-  expect_identical(attribute_discrepancy(b, list(surrogates = 19), seed = 1)$table, attribute_discrepancy(a, list(surrogates = 19), seed = 1)$table)
+  expect_identical(attribute_discrepancy(b, list(surrogates = 19), seed = 1)$table,
+                   attribute_discrepancy(a, list(surrogates = 19), seed = 1)$table)
 })
 
 test_that("the evidence does not depend on the unit of a boundary condition", {
@@ -112,7 +115,8 @@ test_that("the unit of the basis and the order of the conditions do not matter",
     expect_equal(other$reach, fit$reach, tolerance = if (factor == 1000) 1e-2 else 1e-8)
     expect_equal(coef(other), coef(fit), tolerance = if (factor == 1000) 1e-3 else 1e-8)
   }
-  # Another order gives each condition other random numbers: the likelihood is the same (tests/cpp), the evidence within its error.
+  # Another order gives each condition other random numbers: the likelihood is the same (tests/cpp), the evidence within
+  # its error.
   turned <- calibrate(emulator, linear_measurements(boundary = ~ Gv + Te), quick_ais, seed = 3)
   expect_lt(abs(turned$log_evidence - fit$log_evidence), 4 * sqrt(turned$standard_error^2 + fit$standard_error^2))
 })
@@ -121,7 +125,8 @@ test_that("options are checked", {
   m <- linear_measurements()
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
   expect_error(calibrate(emulator, m, list(chains = 3)), "unknown option", class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1), "control\\$ais\\$chains` = 1 cannot", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1), "control\\$ais\\$chains` = 1 cannot",
+               class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(confidence = 3)), "confidence", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, threads = 0), "threads", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(reach = c(0, Inf))), "reach", class = "amiss_error_input")
@@ -151,6 +156,7 @@ test_that("a Bayes factor needs one record", {
   b <- linear_fit(linear_measurements(linear_data(seed = 12)))
   expect_error(bayes_factor(a, b), "different records", class = "amiss_error_input")
   expect_equal(bayes_factor(a, a)$log10_bf, 0)
-  expect_equal(amiss:::evidence_word(c(-1, 0.2, 0.7, 1.5, 3), rep(8, 5)), c("undecided", "weak", "substantial", "strong", "decisive"))
+  expect_equal(amiss:::evidence_word(c(-1, 0.2, 0.7, 1.5, 3), rep(8, 5)),
+               c("undecided", "weak", "substantial", "strong", "decisive"))
   expect_equal(amiss:::evidence_word(-3, -1), "negative")
 })

@@ -26,7 +26,8 @@ test_that("a folder of four tables becomes data, design and runs", {
 })
 
 test_that("the base case is left out where it is no run of the design", {
-  expect_message(files <- read_calibro(write_folder(relative, run(relative)[, -1]), parameters, relative = TRUE), "base case")
+  expect_message(files <- read_calibro(write_folder(relative, run(relative)[, -1]), parameters, relative = TRUE),
+                 "base case")
   expect_equal(dim(files$design), c(5, 2))
   expect_equal(files$outputs, run(relative)[, -1])
   absolute <- rbind(0, cbind((1 + relative[, 1]) / 2, 20 + 10 * relative[, 2])[-1, ])

@@ -20,7 +20,8 @@ test_that("a good emulator passes the check by runs", {
   expect_true(fit$check$passed)
   expect_lt(fit$check$ratio, 0.01)  # two vectors hold a linear simulator exactly
   expect_true(fit$trust$trusted)
-  expect_match(fit$check$verdict, sprintf("by %d runs of the simulator at posterior draws", fit$check$runs), fixed = TRUE)
+  expect_match(fit$check$verdict, sprintf("by %d runs of the simulator at posterior draws", fit$check$runs),
+               fixed = TRUE)
   expect_identical(glance(fit)$emulator_error, fit$check$ratio)
   expect_equal(fitted(fit), fit$check$mean)
 })
@@ -52,8 +53,8 @@ test_that("a smooth error counts less where the measurement error is smooth", {
   white <- ratio(0L, smooth)
   expect_equal(white, sqrt(mean(smooth^2)) / 0.1, tolerance = 1e-8)
   expect_equal(ratio(0L, rough), sqrt(mean(rough^2)) / 0.1, tolerance = 1e-8)
-  # Setting 5: an Ornstein-Uhlenbeck part of 30 times the white variance over two steps. Its spectrum over its variance is 4.1 for
-  # slow errors and 0.25 for those that alternate; both count over the larger noise seen, by the root of 31.
+  # Setting 5: an Ornstein-Uhlenbeck part of 30 times the white variance over two steps. Its spectrum over its variance
+  # is 4.1 for slow errors and 0.25 for those that alternate; both count over the larger noise seen, by the root of 31.
   expect_equal(ratio(5L, smooth) / white, sqrt(31 / (1 + 30 * 4.1)), tolerance = 0.1)
   expect_equal(ratio(5L, rough) / white, sqrt(31 / (1 + 30 * 0.25)), tolerance = 0.1)
 })
@@ -105,7 +106,8 @@ test_that("where more than a fifth of the runs at posterior draws fail, one of t
   expect_error(checked(function(k, y) if (k %% 3 == 0) NaN * y else y),
                "failed at 1[23] of [34][0-9] draws.*more than 20 %.*first is run 3 at offset = [0-9.]+, gain = [0-9.]+",
                class = "amiss_error_numerical")
-  expect_error(checked(function(k, y) stop("no steady state")), "failed at ([34][0-9]) of \\1", class = "amiss_error_numerical")
+  expect_error(checked(function(k, y) stop("no steady state")), "failed at ([34][0-9]) of \\1",
+               class = "amiss_error_numerical")
 })
 
 test_that("a simulator that returns another number of values at posterior draws is refused", {

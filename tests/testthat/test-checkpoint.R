@@ -53,7 +53,8 @@ test_that("what cannot be written is told and does not stop the run", {
   blocked <- file.path(folder, "afile")
   writeLines("", blocked)
   expect_error(checkpoint_keeper(blocked, list()), "is a file", class = "amiss_error_input")
-  expect_error(checkpoint_keeper(file.path(blocked, "sub"), list()), "is a file, not a folder", class = "amiss_error_input")
+  expect_error(checkpoint_keeper(file.path(blocked, "sub"), list()), "is a file, not a folder",
+               class = "amiss_error_input")
   later <- file.path(folder, "later")
   keep <- checkpoint_keeper(later, list())
   writeLines("", later)  # in its place since the run began
@@ -66,7 +67,8 @@ test_that("a process killed while it writes leaves nothing that is taken for who
   kill <- "function(object, file) { writeBin(as.raw(1:99), file); tools::pskill(Sys.getpid(), 9); Sys.sleep(9) }"
   code <- sprintf("amiss:::keep_value(1, '%s', 'x', %s)", file.path(folder, "amiss-x.rds"), kill)
   withr::with_envvar(c(R_LIBS = paste(.libPaths(), collapse = ":")), {
-    suppressWarnings(system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)), stdout = FALSE, stderr = FALSE))
+    suppressWarnings(system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)), stdout = FALSE,
+                             stderr = FALSE))
   })
   expect_match(dir(folder), "^amiss-part-")
   expect_null(read_kept(file.path(folder, "amiss-x.rds"), "x"))
@@ -107,7 +109,8 @@ test_that("the key knows the globals that a function names", {
   withr::defer(rm(list = c("amiss_test_f", "amiss_test_g"), envir = globalenv()))
   made <- function(by) {
     assign("amiss_test_g", by, globalenv())
-    assign("amiss_test_f", eval(quote(function(x) if (x > 9) amiss_test_f(x - 1) else amiss_test_g), globalenv()), globalenv())
+    assign("amiss_test_f", eval(quote(function(x) if (x > 9) amiss_test_f(x - 1) else amiss_test_g), globalenv()),
+           globalenv())
     content_hash(plain(list(eval(quote(function(x) amiss_test_f(x)), globalenv()))))
   }
   expect_equal(made(1), made(1))
@@ -118,7 +121,8 @@ test_that("an edited model does not go on with the old one's work", {
   folder <- withr::local_tempdir()
   m <- linear_measurements(linear_data(60))
   kept <- function(slope) {
-    model <- function_simulator(function(values, drivers) values[["offset"]] + slope * drivers[, "Te"], free("offset", uniform(10, 30)), boundary = "Te")
+    model <- function_simulator(function(values, drivers) values[["offset"]] + slope * drivers[, "Te"],
+                                free("offset", uniform(10, 30)), boundary = "Te")
     checkpoint_keeper(folder, list(m))(list("fit", "base", plain(model)), slope)
   }
   expect_equal(kept(0.4), 0.4)

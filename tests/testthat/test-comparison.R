@@ -4,8 +4,10 @@ offset <- free("offset", uniform(10, 30), "K")
 gain <- free("gain", uniform(0, 1))
 blind <- line(offset, gain, f = function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"])
 sunny <- line(offset, gain, free("sun", uniform(0, 0.01), "K/(W/m2)"),
-              f = function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"] + values[["sun"]] * drivers[, "Gv"])
-other <- line(offset, free("slope", uniform(-1, 1)), f = function(values, drivers) values[["offset"]] + values[["slope"]] * drivers[, "Gv"] / 100)
+              f = function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"] +
+                values[["sun"]] * drivers[, "Gv"])
+other <- line(offset, free("slope", uniform(-1, 1)),
+              f = function(values, drivers) values[["offset"]] + values[["slope"]] * drivers[, "Gv"] / 100)
 
 sunny_data <- function(n = 90) {
   data <- linear_data(n)
@@ -15,10 +17,12 @@ sunny_data <- function(n = 90) {
 
 rough_ais <- list(ais = list(pilot_chains = 24, groups = 4, chains = 12, importance_draws = 200))
 
-compare_linear <- function(models = list(blind = blind, sunny = sunny, other = other), method = "paper", m = NULL, ...) {
+compare_linear <- function(models = list(blind = blind, sunny = sunny, other = other), method = "paper", m = NULL,
+                           ...) {
   data <- sunny_data()
   m <- m %||% linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60)
-  compare_models(models, m, method, runs = 12, control = list(calibration = rough_ais, ...), seed = 3, threads = 2, quiet = TRUE)
+  compare_models(models, m, method, runs = 12, control = list(calibration = rough_ais, ...), seed = 3, threads = 2,
+                 quiet = TRUE)
 }
 
 compared <- compare_linear()
@@ -38,7 +42,8 @@ test_that("likelihood, AIC, BIC and the likelihood ratio are those of lm()", {
   expect_equal(table$lr[2], 2 * as.numeric(stats::logLik(fits[[2]]) - stats::logLik(fits[[1]])), tolerance = 1e-6)
   expect_equal(table$lr_p_value[2], stats::pchisq(table$lr[2], 1, lower.tail = FALSE))
   expect_identical(table$nested, c(NA, "blind", NA))
-  expect_equal(table$autocorrelation[1], stats::cor(residuals(fits[[1]])[-1], residuals(fits[[1]])[-60]), tolerance = 1e-5)
+  expect_equal(table$autocorrelation[1], stats::cor(residuals(fits[[1]])[-1], residuals(fits[[1]])[-60]),
+               tolerance = 1e-5)
   expect_true(all(table$converged))
   best <- compared$models$sunny$best$values
   expect_equal(unname(best[c("offset", "gain", "sun")]), unname(stats::coef(fits[[2]])), tolerance = 1e-5)
@@ -55,7 +60,8 @@ test_that("evidence, Bayes factors and probabilities are those of the calibratio
   expect_equal(log10(table$probability[1] / table$probability[2]), table$log10_evidence[1] - table$log10_evidence[2])
   factor <- bayes_factor(compared$models$sunny$fit, compared$models$blind$fit)
   expect_identical(table$model[which.min(table$rank)], "sunny")
-  expect_equal(unlist(table[2, c("log10_bf", "bf_lower95", "bf_upper95")], use.names = FALSE), unlist(factor[1:3], use.names = FALSE))
+  expect_equal(unlist(table[2, c("log10_bf", "bf_lower95", "bf_upper95")], use.names = FALSE),
+               unlist(factor[1:3], use.names = FALSE))
   expect_identical(table$word[2], factor$word)
   expect_gt(table$log10_bf[2], 1)
   expect_identical(table$against[2], table$model[table$rank == 2])
@@ -114,11 +120,13 @@ test_that("the chi-square test is called invalid at the edge of a range", {
 })
 
 test_that("the history method carries its own attribution", {
-  x <- compare_linear(list(blind = blind, sunny = sunny), "history", attribution = list(surrogates = 19, ais = list(pilot_chains = 24, groups = 4)))
+  x <- compare_linear(list(blind = blind, sunny = sunny), "history",
+                      attribution = list(surrogates = 19, ais = list(pilot_chains = 24, groups = 4)))
   expect_s3_class(x$models$blind$fit, "amiss_calibration")
   expect_true(all(c("log10_bf_dropped", "p_value") %in% names(tidy(x, "attribution"))))
   expect_identical(glance(x)$model, "sunny")
-  expect_error(bayes_factor(x$models$blind$fit, compared$models$blind$fit), "different methods", class = "amiss_error_input")
+  expect_error(bayes_factor(x$models$blind$fit, compared$models$blind$fit), "different methods",
+               class = "amiss_error_input")
   expect_true(ggplot2::is.ggplot(ggplot2::autoplot(x, "attribution")))
 })
 
@@ -133,8 +141,10 @@ test_that("a comparison prints within fifteen lines, draws all figures and says 
   expect_error(compare_models(list(blind, sunny), m), "named list", class = "amiss_error_input")
   expect_error(compare_models(list(a = blind, b = 3), m), "Model \"b\" is no simulator", class = "amiss_error_input")
   expect_error(compare_models(list(a = blind), m, "guess"), "method", class = "amiss_error_input")
-  expect_error(compare_models(list(a = blind), m, control = list(attribution = list(surrogates = 9))), "belongs to", class = "amiss_error_input")
-  expect_error(compare_models(list(a = blind), m, control = list(steps = 1)), "unknown option", class = "amiss_error_input")
+  expect_error(compare_models(list(a = blind), m, control = list(attribution = list(surrogates = 9))), "belongs to",
+               class = "amiss_error_input")
+  expect_error(compare_models(list(a = blind), m, control = list(steps = 1)), "unknown option",
+               class = "amiss_error_input")
   expect_error(compare_models(list(a = blind), m, truth = list(values = 1)), "truth", class = "amiss_error_input")
   nameless <- line(offset, f = blind$f, boundary = "Gh")
   expect_error(compare_models(list(lacking = nameless), m, quiet = TRUE), "lacking", class = "amiss_error_input")
@@ -142,7 +152,8 @@ test_that("a comparison prints within fifteen lines, draws all figures and says 
 
 test_that("an interrupted comparison goes on where it stopped, with the same bits on one thread", {
   folder <- withr::local_tempdir()
-  again <- function(models) compare_models(models, compared$measurements, runs = 12, control = list(calibration = rough_ais), seed = 3, quiet = TRUE, checkpoint = folder)
+  again <- function(models) compare_models(models, compared$measurements, runs = 12, control = list(
+    calibration = rough_ais), seed = 3, quiet = TRUE, checkpoint = folder)
   again(list(blind = blind))
   before <- list.files(folder)
   expect_length(before, 2)
@@ -158,7 +169,8 @@ test_that("the paper's discrepancy over time has the mean of the engine and the 
   d <- discrepancy(fit)
   expect_s3_class(d, "amiss_discrepancy")
   expect_equal(d$series$simulated, unname(fitted(fit)))
-  expect_lt(max(abs(crossprod(fit$emulator$basis$vectors, d$series$discrepancy))), 1e-6 * max(abs(fit$emulator$basis$vectors)) * nrow(d$series))
+  expect_lt(max(abs(crossprod(fit$emulator$basis$vectors, d$series$discrepancy))),
+            1e-6 * max(abs(fit$emulator$basis$vectors)) * nrow(d$series))
   # Brute force with H formed: covariance of H v' is H'ZH - H'ZH (H'AH)^-1 H'ZH.
   x <- scaled_conditions(fit$measurements, fit$rows)
   basis <- qr.Q(qr(fit$emulator$basis$vectors))
@@ -168,5 +180,6 @@ test_that("the paper's discrepancy over time has the mean of the engine and the 
   for (i in seq_len(nrow(x))) z[i, ] <- 4 * prod_kernel(x, i, alpha[attr(x, "condition")])
   inside <- t(h) %*% z %*% h
   covariance <- inside - inside %*% solve(inside + diag(0.1, nrow(inside)), inside)
-  expect_equal(conditional_variance(x, basis, alpha, t2 = 0.2, lambda = 10), diag(h %*% covariance %*% t(h)), tolerance = 1e-8)
+  expect_equal(conditional_variance(x, basis, alpha, t2 = 0.2, lambda = 10), diag(h %*% covariance %*% t(h)),
+               tolerance = 1e-8)
 })

@@ -21,14 +21,17 @@ test_that("a basis that explains too little is said to", {
   set.seed(1)
   design <- cbind(offset = runif(30, 10, 30), gain = runif(30))
   noise <- matrix(rnorm(240 * 30), 240)
-  expect_warning(train_emulator(ensemble(design, noise), 0.01, list(max_vectors = 3)), "unexplained", class = "amiss_warning_result")
+  expect_warning(train_emulator(ensemble(design, noise), 0.01, list(max_vectors = 3)), "unexplained",
+                 class = "amiss_warning_result")
   emulator <- suppressWarnings(train_emulator(ensemble(design, noise), 0.01, list(max_vectors = 3)))
   expect_false(emulator$trust$trusted)
   expect_match(emulator$trust$verdict, "basis of 3 vectors leaves 0.9.*more than the noise of 0.01")
   expect_match(printed(emulator), "basis of 3 vectors leaves")
-  expect_error(train_emulator(ensemble(design, noise), 0.01, list(vectors = 3)), "unknown option.*vectors", class = "amiss_error_input")
+  expect_error(train_emulator(ensemble(design, noise), 0.01, list(vectors = 3)), "unknown option.*vectors",
+               class = "amiss_error_input")
   same <- matrix(sin(1:240), 240, 30)
-  expect_error(train_emulator(ensemble(design, same), 0.01), "All 30 runs are the same.*offset.*gain", class = "amiss_error_input")
+  expect_error(train_emulator(ensemble(design, same), 0.01), "All 30 runs are the same.*offset.*gain",
+               class = "amiss_error_input")
 })
 
 test_that("the emulator refuses points it knows nothing of", {
@@ -43,7 +46,8 @@ box_runs <- function(model, seed = 1, unit = NULL) {
   data <- synthetic_weather(4, seed = seed)
   data$RHP <- rolbs(nrow(data), power = 100, seed = seed)
   data$Ti <- 20
-  m <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv + Ws + circular(Wd) + RHP, noise_sd = 0.1, warmup = 24)
+  m <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv + Ws + circular(Wd) + RHP, noise_sd = 0.1,
+                    warmup = 24)
   box <- paper_box(model)
   parameters <- free_parameters(box)
   if (is.null(unit)) return(simulate_design(box, m, runs = 10 * length(parameters), seed = seed))
@@ -53,21 +57,24 @@ box_runs <- function(model, seed = 1, unit = NULL) {
 
 # The Borehole function (Morris, Mitchell and Ylvisaker 1993), its length as time goes on.
 borehole_runs <- function(runs = 70) {
-  ranges <- list(rw = c(0.05, 0.15), r = c(100, 50000), Tu = c(63070, 115600), Hu = c(990, 1110), Tl = c(63.1, 116), Hl = c(700, 820), Kw = c(9855, 12045))
+  ranges <- list(rw = c(0.05, 0.15), r = c(100, 50000), Tu = c(63070, 115600), Hu = c(990, 1110), Tl = c(63.1, 116),
+                 Hl = c(700, 820), Kw = c(9855, 12045))
   parameters <- lapply(names(ranges), function(n) free(n, uniform(ranges[[n]][1], ranges[[n]][2])))
   names(parameters) <- names(ranges)
   design <- amiss:::unit_to_values(amiss:::with_seed(5, lhs::randomLHS(runs, 7)), parameters)
   length <- seq(1120, 1680, length.out = 60)
   outputs <- apply(design, 1, function(v) {
     ratio <- log(v[["r"]] / v[["rw"]])
-    2 * pi * v[["Tu"]] * (v[["Hu"]] - v[["Hl"]]) / (ratio * (1 + 2 * length * v[["Tu"]] / (ratio * v[["rw"]]^2 * v[["Kw"]]) + v[["Tu"]] / v[["Tl"]]))
+    2 * pi * v[["Tu"]] * (v[["Hu"]] - v[["Hl"]]) / (
+      ratio * (1 + 2 * length * v[["Tu"]] / (ratio * v[["rw"]]^2 * v[["Kw"]]) + v[["Tu"]] / v[["Tl"]]))
   })
   ensemble(design, outputs, parameters)
 }
 
 test_that("95 % intervals of runs left out hold 95 % of them, coefficients and series", {
   study <- suppressWarnings(read_study(twinhouse_study("O5")))
-  runs <- c(lapply(paste0("M", 1:6), box_runs), list(borehole_runs(), simulate_design(study$model, study$measurements, runs = 150, seed = 1)))
+  runs <- c(lapply(paste0("M", 1:6), box_runs),
+            list(borehole_runs(), simulate_design(study$model, study$measurements, runs = 150, seed = 1)))
   noise <- c(rep(0.1, 6), 1, 0.1)
   diagnostics <- Map(function(r, n) train_emulator(r, n)$diagnostics, runs, noise)
   size <- vapply(seq_along(runs), function(i) ncol(runs[[i]]$outputs) * nrow(diagnostics[[i]]$coefficients), 0)
@@ -81,8 +88,8 @@ test_that("95 % intervals of runs left out hold 95 % of them, coefficients and s
   expect_lt(coefficients, 0.97)
   expect_gt(series, 0.93)
   expect_lt(series, 0.97)
-  # A selection that is caught where the nugget has no slope is over-confident: its intervals held 0.78 here, which asks for
-  # a factor of (1.96 / 1.23)^2 = 2.5.
+  # A selection that is caught where the nugget has no slope is over-confident: its intervals held 0.78 here, which asks
+  # for a factor of (1.96 / 1.23)^2 = 2.5.
   expect_lt(max(train_emulator(runs[[7]], 1, list(selection = "forward"))$diagnostics$coefficients$widened), 1.6)
 })
 
@@ -113,8 +120,10 @@ test_that("forward selection finds the parameters that act, with one thread and 
   expect_true(all(first$parameter[first$vector == 1] %in% c("b", "e")))
   expect_true(all(forward$selection$parameter[forward$selection$step == 1] %in% c("b", "e")))
   beta <- tidy(forward)
-  expect_lt(max(beta$beta[beta$vector == 1 & beta$parameter == "e"]), min(beta$beta[beta$vector == 1 & beta$parameter %in% c("a", "c", "d", "f")]))
-  expect_setequal(beta$step[beta$vector == 1 & !is.na(beta$step)], forward$selection$step[forward$selection$vector == 1])
+  expect_lt(max(beta$beta[beta$vector == 1 & beta$parameter == "e"]),
+            min(beta$beta[beta$vector == 1 & beta$parameter %in% c("a", "c", "d", "f")]))
+  expect_setequal(beta$step[beta$vector == 1 & !is.na(beta$step)],
+                  forward$selection$step[forward$selection$vector == 1])
   expect_identical(train_emulator(runs, 0.1, list(selection = "forward"), threads = 2), forward)
   ard <- train_emulator(runs, 0.1)
   expect_equal(nrow(ard$selection), 0)

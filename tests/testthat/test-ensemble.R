@@ -41,7 +41,8 @@ test_that("rows of given runs are told by their number or their times", {
   refused("90 values?, the runs have 96", w$runs, time = 1:90)
   refused("54 calibration and 36", w$runs[7:60, ], validation = w$runs[1:5, ])
   refused("each row of the design needs its run", w$runs[7:60, ], validation = w$runs[61:96, -1])
-  expect_error(ensemble(w$values, w$runs[7:60, ], validation = w$runs[61:96, ]), "needs `measurements`", class = "amiss_error_input")
+  expect_error(ensemble(w$values, w$runs[7:60, ], validation = w$runs[61:96, ]), "needs `measurements`",
+               class = "amiss_error_input")
 })
 
 test_that("runs at the step before averaging are averaged like the measurements", {
@@ -59,9 +60,11 @@ test_that("runs of other rows are refused, even if as many", {
   data <- linear_data(96)
   later <- linear_measurements(data, calibrate = data$hour > 42, validate = data$hour <= 42)
   expect_equal(sum(later$use == "calibrate"), 54)
-  expect_error(train_emulator(made, later), "other rows.*row 1 is at 7 h in the runs, at 43 h", class = "amiss_error_input")
+  expect_error(train_emulator(made, later), "other rows.*row 1 is at 7 h in the runs, at 43 h",
+               class = "amiss_error_input")
   expect_error(calibrate(train_emulator(made, w$m), later, quick_ais), "other rows", class = "amiss_error_input")
-  expect_error(train_emulator(simulate_design(linear_simulator(), w$m, runs = 20, seed = 1), later), "other rows", class = "amiss_error_input")
+  expect_error(train_emulator(simulate_design(linear_simulator(), w$m, runs = 20, seed = 1), later), "other rows",
+               class = "amiss_error_input")
   timed <- ensemble(w$values, w$runs[7:60, ], w$parameters, time = 7:60)
   expect_error(train_emulator(timed, later), "other rows", class = "amiss_error_input")
   expect_s3_class(train_emulator(timed, w$m), "amiss_emulator")
@@ -106,12 +109,16 @@ test_that("designs that do not fit their parameters are refused", {
 
 test_that("bad runs are refused or left out with a word", {
   m <- linear_measurements()
-  make <- function(f) function_simulator(f, free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
+  make <- function(f) function_simulator(f, free("offset", uniform(10, 30)), free("gain", uniform(0, 1)),
+                                         boundary = "Te")
   expect_error(simulate_design(make(function(v, d) 1:3), m, 20), "returned 3 values", class = "amiss_error_input")
-  sometimes <- make(function(v, d) if (v[["offset"]] > 25) rep(NaN, nrow(d)) else v[["offset"]] + v[["gain"]] * d[, "Te"])
-  expect_warning(e <- simulate_design(sometimes, m, 40, seed = 1), "not finite.*left out", class = "amiss_warning_input")
+  sometimes <- make(function(v, d) if (v[["offset"]] > 25) rep(NaN, nrow(d)) else v[["offset"]] +
+                    v[["gain"]] * d[, "Te"])
+  expect_warning(e <- simulate_design(sometimes, m, 40, seed = 1), "not finite.*left out",
+                 class = "amiss_warning_input")
   expect_equal(ncol(e$outputs) + e$failed, 40)
-  expect_error(simulate_design(make(function(v, d) rep(NaN, nrow(d))), m, 20), "40|20 runs hold values", class = "amiss_error_input")
+  expect_error(simulate_design(make(function(v, d) rep(NaN, nrow(d))), m, 20), "40|20 runs hold values",
+               class = "amiss_error_input")
   expect_error(simulate_design(linear_simulator(), m, runs = 3), "too few", class = "amiss_error_input")
   expect_error(simulate_design("a model", m), "no simulator", class = "amiss_error_input")
   wrong <- function_simulator(function(v, d) d[, 1], free("a", uniform(0, 1)), boundary = "humidity")
@@ -144,25 +151,30 @@ test_that("whole-number runs are as good as any", {
 
 test_that("runs that cover a part of the prior are told, by parameter and number", {
   r <- simulate_design(linear_simulator(), linear_measurements(), runs = 30, seed = 3)
-  with_prior <- function(prior, values = r$values) ensemble(values, r$outputs, list(free("offset", prior), free("gain", uniform(0, 1))))
-  expect_warning(part <- with_prior(uniform(10, 60)), "only 38 % of the prior of offset \\(from 10.51 to 29.36\\)", class = "amiss_warning_input")
+  with_prior <- function(prior, values = r$values) ensemble(values, r$outputs,
+                                                            list(free("offset", prior), free("gain", uniform(0, 1))))
+  expect_warning(part <- with_prior(uniform(10, 60)), "only 38 % of the prior of offset \\(from 10.51 to 29.36\\)",
+                 class = "amiss_warning_input")
   emulator <- train_emulator(part, 0.1)
   expect_false(emulator$trust$trusted)
   expect_match(emulator$trust$verdict, "only 38 % of the prior of offset")
   expect_true(train_emulator(r, 0.1)$trust$trusted)
   # An untruncated prior reaches everywhere: its mass between the runs counts, not its limits.
-  expect_error(with_prior(normal(500, 2)), "offset.*next to no mass.*between 10.51 and 29.36", class = "amiss_error_input")
+  expect_error(with_prior(normal(500, 2)), "offset.*next to no mass.*between 10.51 and 29.36",
+               class = "amiss_error_input")
   expect_no_warning(with_prior(normal(20, 4)))
   still <- r$values
   still[, "offset"] <- 20
-  expect_error(with_prior(uniform(10, 30), still), "offset.*same value, 20, in all 30 runs", class = "amiss_error_input")
+  expect_error(with_prior(uniform(10, 30), still), "offset.*same value, 20, in all 30 runs",
+               class = "amiss_error_input")
   expect_error(ensemble(still, r$outputs), "offset.*same value", class = "amiss_error_input")
 })
 
 test_that("runs are added where the posterior lies, and the emulator is better there", {
   hour <- seq_len(72)
   data <- data.frame(hour = hour, Te = 10 + 5 * sin(2 * pi * hour / 24))
-  bent <- function_simulator(function(values, drivers) 20 + exp(3 * values[["a"]]) * 0.02 * drivers[, "Te"] + values[["b"]] * seq_len(nrow(drivers)) / 100,
+  bent <- function_simulator(function(values, drivers) 20 + exp(3 * values[["a"]]) * 0.02 * drivers[, "Te"] +
+                             values[["b"]] * seq_len(nrow(drivers)) / 100,
                              free("a", uniform(0, 2)), free("b", uniform(-1, 1)), boundary = "Te")
   data$Ti <- bent$f(c(a = 0.12, b = 0.2), as.matrix(data["Te"])) + withr::with_seed(1, rnorm(72, 0, 0.02))
   m <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te, noise_sd = 0.02)
@@ -184,13 +196,15 @@ test_that("runs are added where the posterior lies, and the emulator is better t
   beyond <- amiss:::region_design(within(region, radius <- 1.5 * radius), 50, 1)
   expect_identical(amiss:::in_region(region, beyond), amiss:::region_distance(region, beyond) <= 1)
   expect_true(any(!amiss:::in_region(region, beyond)))
-  expect_error(stats::predict(train_emulator(more, m), cbind(a = 1.9, b = -0.9)), "outside the region", class = "amiss_error_input")
+  expect_error(stats::predict(train_emulator(more, m), cbind(a = 1.9, b = -0.9)), "outside the region",
+               class = "amiss_error_input")
   truth <- bent$f(c(a = 0.12, b = 0.2), as.matrix(data["Te"]))
   off <- function(ensemble) max(abs(stats::predict(train_emulator(ensemble, m), cbind(a = 0.12, b = 0.2))$mean - truth))
   expect_lt(off(more), off(first))
   elsewhere <- suppressWarnings(ensemble(first$values, first$outputs))
   expect_error(refine_ensemble(elsewhere, fit), "elsewhere", class = "amiss_error_input")
   expect_error(refine_ensemble(first, "fit"), "fit", class = "amiss_error_input")
-  shorter <- simulate_design(bent, measurements(data[1:60, ], time = "hour", target = "Ti", boundary = ~ Te, noise_sd = 0.02), runs = 12, seed = 2)
+  shorter <- simulate_design(bent, measurements(data[1:60, ], time = "hour", target = "Ti", boundary = ~ Te,
+                                                noise_sd = 0.02), runs = 12, seed = 2)
   expect_error(refine_ensemble(shorter, fit), "72 rows.*60", class = "amiss_error_input")
 })

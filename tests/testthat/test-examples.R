@@ -25,7 +25,8 @@ test_that("the R Markdown report names the window", {
   skip_if_not(rmarkdown::pandoc_available("1.12.3"))
   folder <- withr::local_tempdir()
   made <- new.env()
-  file <- rmarkdown::render(example_file("report.Rmd"), "html_document", output_dir = folder, intermediates_dir = folder,
+  file <- rmarkdown::render(example_file("report.Rmd"), "html_document", output_dir = folder,
+                            intermediates_dir = folder,
                             params = list(runs = 30), envir = made, quiet = TRUE)
   expect_gt(file.size(file), 1e5)
   expect_equal(made$words$headline, "The window passes another share of the sun than assumed.")
@@ -35,7 +36,8 @@ test_that("the targets pipeline runs", {
   skip_if_not_installed("targets")
   folder <- withr::local_tempdir()
   file.copy(list.files(example_file("targets"), full.names = TRUE), folder)
-  writeLines("targets::tar_make(callr_function = NULL); cat(targets::tar_read(parameters)$term)", file.path(folder, "make.R"))
+  writeLines("targets::tar_make(callr_function = NULL); cat(targets::tar_read(parameters)$term)",
+             file.path(folder, "make.R"))
   result <- run_example("make.R", folder = folder)
   expect_equal(result$status, 0, info = result$stderr)
   expect_match(result$stdout, "gain$")

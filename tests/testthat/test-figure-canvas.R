@@ -69,11 +69,14 @@ test_that("figures look as they did", {
   skip_if_not_installed("vdiffr")
   version <- utils::packageVersion("ggplot2")
   skip_if_not(version >= "3.4.1" && version < "3.5", "drawn with ggplot2 3.4")
-  m <- measurements(data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4)), time = "hour", target = "Ti",
+  m <- measurements(data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4)), time = "hour",
+                    target = "Ti",
                     boundary = ~Te, noise_sd = 0.1, warmup = 6, unit = "K", name = "a room")
   vdiffr::expect_doppelganger("measurements", ggplot2::autoplot(m))
-  ladder <- data.frame(beta = c(0.1, 0.4, 1), step = 1, sweeps = 3, acceptance = c(0.4, 0.3, 0.25), ess = c(0.7, 0.6, 0.65))
-  sampler <- list(ladder = ladder, annealed = c(-12.3, 0.2), second = c(-12.1, 0.1), trusted = TRUE, verdict = "trusted")
+  ladder <- data.frame(beta = c(0.1, 0.4, 1), step = 1, sweeps = 3, acceptance = c(0.4, 0.3, 0.25),
+                       ess = c(0.7, 0.6, 0.65))
+  sampler <- list(ladder = ladder, annealed = c(-12.3, 0.2), second = c(-12.1, 0.1), trusted = TRUE,
+                  verdict = "trusted")
   vdiffr::expect_doppelganger("sampler", figure_sampler(list("the model" = sampler)))
 })
 

@@ -1,12 +1,14 @@
 quietly <- function(...) suppressMessages(linear_measurements(...), classes = "amiss_message_gap")
 lag_simulator <- function() {
-  function_simulator(function(values, drivers) 20 + values[["gain"]] * lagged(drivers[, "Te"], 8), free("gain", uniform(0, 1)),
+  function_simulator(function(values, drivers) 20 + values[["gain"]] * lagged(drivers[, "Te"], 8),
+                     free("gain", uniform(0, 1)),
                      boundary = "Te", name = "lag")
 }
 
 test_that("a lost row costs one row, and no warm-up", {
   data <- linear_data()
-  expect_message(m <- linear_measurements(data[-100, ], warmup = 10), "1 lost row in 1 gap is bridged, the first after row 99",
+  expect_message(m <- linear_measurements(data[-100, ], warmup = 10),
+                 "1 lost row in 1 gap is bridged, the first after row 99",
                  class = "amiss_message_gap")
   whole <- linear_measurements(data, warmup = 10)
   expect_identical(m[c("hours", "segment", "use", "step_h")], whole[c("hours", "segment", "use", "step_h")])
@@ -44,14 +46,16 @@ test_that("what a driver lacks is filled as far as is asked, and told", {
   lacking <- replace(data, "Te", replace(data$Te, c(30:32, 70), NA))
   expect_error(linear_measurements(lacking), "Te.*4 missing.*row 30.*fill_gaps", class = "amiss_error_input")
   expect_error(quietly(lacking, fill_gaps = 2), "Te.*3 missing.*row 30", class = "amiss_error_input")
-  expect_message(m <- linear_measurements(lacking, fill_gaps = 3), "4 values of .*Te.* in 2 gaps of at most 3 h", class = "amiss_message_gap")
+  expect_message(m <- linear_measurements(lacking, fill_gaps = 3), "4 values of .*Te.* in 2 gaps of at most 3 h",
+                 class = "amiss_message_gap")
   expect_equal(m$boundary[30:32, 1], stats::approx(c(29, 33), data$Te[c(29, 33)], 30:32)$y)
   expect_equal(m$y, data$Ti)
   # Beside a lost row the gap is as long as both.
   expect_error(quietly(lacking[-33, ], fill_gaps = 3), "row 30", class = "amiss_error_input")
   expect_length(quietly(lacking[-33, ], fill_gaps = 4)$y, 240)
   # At an end, or beside a cut, there is nothing to draw a line to.
-  expect_error(quietly(replace(data, "Te", replace(data$Te, 240, NA)), fill_gaps = 3), "row 240", class = "amiss_error_input")
+  expect_error(quietly(replace(data, "Te", replace(data$Te, 240, NA)), fill_gaps = 3), "row 240",
+               class = "amiss_error_input")
   beside <- replace(data, "Te", replace(data$Te, 99, NA))[-(100:130), ]
   expect_error(suppressWarnings(quietly(beside, fill_gaps = 3)), "row 99", class = "amiss_error_input")
 })
@@ -78,7 +82,8 @@ test_that("stamps that stray are taken at equal steps", {
   expect_grid(1:240 + stray, -c(7, 100))
   expect_grid(1:240 + round(60 * stray) / 60, -(20:24), fill_gaps = 5)
   data$hour <- 1:240 + stray
-  expect_message(linear_measurements(data), "unequal steps.*equal steps of 1 h, 7.. s away", class = "amiss_message_gap")
+  expect_message(linear_measurements(data), "unequal steps.*equal steps of 1 h, 7.. s away",
+                 class = "amiss_message_gap")
   stamped <- data
   stamped$hour <- as.POSIXct("2024-03-01", tz = "Europe/Berlin") + 3600 * data$hour
   expect_equal(quietly(stamped)$time, as.POSIXct("2024-03-01", tz = "Europe/Berlin") + 3600 * 1:240)
@@ -92,7 +97,8 @@ test_that("stamps that stray are taken at equal steps", {
 test_that("readings between two steps are left out, and many of them refused", {
   data <- linear_data()
   between <- rbind(data, transform(data[c(20, 90), ], hour = hour + 0.5, Ti = 99))
-  expect_message(m <- linear_measurements(between[order(between$hour), ]), "2 rows between two steps are left out; the first is row 21")
+  expect_message(m <- linear_measurements(between[order(between$hour), ]),
+                 "2 rows between two steps are left out; the first is row 21")
   expect_equal(m$y, data$Ti)
   # Of two at one step, the nearer.
   twice <- rbind(data, transform(data[c(20, 90), ], hour = hour + c(0.1, -0.1), Ti = 99))
@@ -100,7 +106,8 @@ test_that("readings between two steps are left out, and many of them refused", {
   early <- replace(data, "hour", replace(data$hour, 9, 9.3))
   expect_equal(suppressMessages(linear_measurements(early))$y, replace(data$Ti, 9, NA))
   many <- rbind(data, transform(data[1:60, ], hour = hour + 0.5))
-  expect_error(linear_measurements(many[order(many$hour), ]), "unequal steps: 0.5 h after row 1", class = "amiss_error_input")
+  expect_error(linear_measurements(many[order(many$hour), ]), "unequal steps: 0.5 h after row 1",
+               class = "amiss_error_input")
 })
 
 test_that("uses and expressions stay with their rows", {

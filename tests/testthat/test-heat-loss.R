@@ -25,7 +25,8 @@ test_that("sun, gains and sky do not count; infiltration adds its air", {
 })
 
 test_that("openings lose what wind and buoyancy drive through two orifices in series", {
-  opened <- function(drivers) heat_loss_coefficient(paper_box("M3"), c(values, crack_area = 790), drivers) - box_loss(values)
+  opened <- function(drivers) heat_loss_coefficient(paper_box("M3"), c(values, crack_area = 790), drivers) -
+    box_loss(values)
   density <- 1.1881 * 293.15 / (273.15 + c(10, 30))
   flow <- function(dp) 0.65 * 790e-6 * sqrt(2 * mean(density) * abs(dp) / 2)
   buoyancy <- diff(rev(density)) * 9.81 * 0.6
@@ -38,5 +39,6 @@ test_that("openings lose what wind and buoyancy drive through two orifices in se
 test_that("bad arguments are refused", {
   expect_error(heat_loss_coefficient(linear_simulator(), values), "zone", class = "amiss_error_input")
   expect_error(heat_loss_coefficient(paper_box("M3"), values), "crack_area", class = "amiss_error_input")
-  expect_error(heat_loss_coefficient(paper_box("M2"), values, outside = 20, inside = 20), "inside", class = "amiss_error_input")
+  expect_error(heat_loss_coefficient(paper_box("M2"), values, outside = 20, inside = 20), "inside",
+               class = "amiss_error_input")
 })

@@ -1,6 +1,6 @@
-# A fixed subset of the worlds of bench/hidden_effects: every kind of effect, and none, hidden in five to seven days of data.
-# Of 24 worlds at least 22 must come out right: the effect's mechanism named (either of two), nothing where there is
-# nothing, and what the catalogue does not hold not blamed on it with confidence. AMISS_WORLD_SEED moves all seeds.
+# A fixed subset of the worlds of bench/hidden_effects: every kind of effect, and none, hidden in five to seven days of
+# data. Of 24 worlds at least 22 must come out right: the effect's mechanism named (either of two), nothing where there
+# is nothing, and what the catalogue does not hold not blamed on it with confidence. AMISS_WORLD_SEED moves all seeds.
 skip_on_cran()  # second tier: tools/test --quick
 bench <- test_path("..", "..", "bench", "hidden_effects")
 
@@ -29,7 +29,8 @@ test_that("what is hidden in 24 worlds is found", {
   failed <- vapply(rows, inherits, NA, "try-error")
   expect_false(any(failed), info = paste(unlist(rows[failed]), collapse = "; "))
   right <- vapply(rows[!failed], came_out_right, NA)
-  wrong <- vapply(rows[!failed][!right], function(r) sprintf("%s (seed %d, ratio %.1f): %s, %s", r$kind, r$seed, r$achieved, r$mechanism, r$verdict), "")
+  wrong <- vapply(rows[!failed][!right], function(r) sprintf("%s (seed %d, ratio %.1f): %s, %s", r$kind, r$seed,
+                                                             r$achieved, r$mechanism, r$verdict), "")
   expect_gte(sum(right), 22, label = paste0("number right (wrong: ", paste(wrong, collapse = "; "), ")"))
   rates <- scope$score_rates(rows[!failed])
   expect_equal(rates$false_mechanism$n, 4)

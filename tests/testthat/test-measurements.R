@@ -17,7 +17,8 @@ test_that("bad tables are refused with what, where, the value and the mend", {
   fails(broken(hour = function(v) replace(v, 9, v[8])), "duplicated.*row 9")
   fails(broken(hour = function(v) replace(v, 9, 2)), "duplicated|goes back")
   fails(broken(hour = function(v) cumsum(rep(c(0.5, 1, 1.5), 80))), "unequal steps")
-  fails(broken(hour = function(v) replace(format(as.POSIXct("2026-01-01", tz = "UTC") + 3600 * v, "%Y-%m-%d %H:%M:%S"), 3, "noon")), "row 3 holds.*noon")
+  fails(broken(hour = function(v) replace(format(as.POSIXct("2026-01-01", tz = "UTC") + 3600 * v, "%Y-%m-%d %H:%M:%S"),
+                                          3, "noon")), "row 3 holds.*noon")
   fails(data, "noise_sd.*positive", noise_sd = -1)
   fails(data, "needed", noise_sd = NULL)
   fails(data, "whole multiple", average = 1.5)
@@ -32,7 +33,8 @@ test_that("a constant boundary condition is left out with a warning", {
   data$Ws <- 3
   expect_warning(m <- linear_measurements(data, boundary = ~ Te + Ws), "Ws.*not vary", class = "amiss_warning_input")
   expect_equal(m$conditions, "Te")
-  expect_error(linear_measurements(data, boundary = ~Ws), "No boundary condition varies", class = "amiss_error_input") |> suppressWarnings()
+  expect_error(linear_measurements(data, boundary = ~Ws), "No boundary condition varies",
+               class = "amiss_error_input") |> suppressWarnings()
 })
 
 test_that("a gap makes two segments, each with its own warm-up, and is told", {
@@ -98,18 +100,22 @@ test_that("the bootstrapped noise is that of the closed form", {
   m <- linear_measurements(data, average = 6, noise_sd = bootstrap_noise(replicates = 4000))
   windows <- matrix(data$Ti, 6)
   exact <- apply(windows, 2, stats::sd) * sqrt(5 / 6) / sqrt(6)
-  # A standard deviation from B draws has a relative error of about 1 / sqrt(2 B) = 0.011; the largest of 40 is within 4.
+  # A standard deviation from B draws has a relative error of about 1 / sqrt(2 B) = 0.011; the largest of 40 is within
+  # 4.
   expect_lt(max(abs(m$noise$per_step / exact - 1)), 4 * 0.011)
   expect_equal(m$noise_sd, sqrt(mean(m$noise$per_step^2)))
   expect_equal(m$noise_sd, sqrt(mean(exact^2)), tolerance = 4 * 0.011 / sqrt(40))
   expect_match(printed(m), "bootstrap of readings.*6 an average.*4000 times")
-  expect_identical(linear_measurements(data, average = 6, noise_sd = "bootstrap"), linear_measurements(data, average = 6, noise_sd = bootstrap_noise()))
+  expect_identical(linear_measurements(data, average = 6, noise_sd = "bootstrap"),
+                   linear_measurements(data, average = 6, noise_sd = bootstrap_noise()))
 })
 
 test_that("a trend inside the windows is noise to the plain bootstrap, and not to the detrended one", {
   set.seed(8)
-  data <- data.frame(hour = 1:1200, Te = sin(1:1200 / 9), Ti = 20 + 0.3 * (1:1200) + stats::rnorm(1200, 0, 0.2), Gv = stats::runif(1200))
-  noise <- function(...) linear_measurements(data, average = 6, noise_sd = bootstrap_noise(replicates = 500, ...))$noise_sd
+  data <- data.frame(hour = 1:1200, Te = sin(1:1200 / 9), Ti = 20 + 0.3 * (1:1200) + stats::rnorm(1200, 0, 0.2),
+                     Gv = stats::runif(1200))
+  noise <- function(...) linear_measurements(data, average = 6,
+                                             noise_sd = bootstrap_noise(replicates = 500, ...))$noise_sd
   # 200 windows: the variance of detrended windows has 800 degrees of freedom, a relative error of 2.5 % of the sd.
   expect_equal(noise(detrend = TRUE), 0.2 / sqrt(6), tolerance = 0.08)
   expect_equal(noise(), sqrt((0.3^2 * (6^2 - 1) / 12 + 0.2^2 * 5 / 6) / 6), tolerance = 0.08)
@@ -133,7 +139,8 @@ test_that("a study may ask for the bootstrap", {
   path <- twinhouse_study("N2")
   study <- yaml::read_yaml(path)
   study$noise_sd <- "bootstrap"
-  for (field in c("data", "model", "catalogue")) study[[field]] <- file.path(normalizePath(dirname(path)), study[[field]])
+  for (field in c("data", "model", "catalogue"))
+    study[[field]] <- file.path(normalizePath(dirname(path)), study[[field]])
   file <- withr::local_tempfile(fileext = ".yml")
   yaml::write_yaml(study, file)
   m <- read_study(file, trust = TRUE)$measurements

@@ -4,7 +4,8 @@ test_that("mechanisms and catalogues are checked", {
   expect_error(catalogue(m, m), "twice", class = "amiss_error_input")
   expect_error(mechanism("a", 3, "Te", "A."), "edit", class = "amiss_error_input")
   broken <- mechanism("b", function(model) stop("no such wall"), "Te", "B.")
-  expect_error(amiss:::extend(linear_simulator(), broken), "cannot be applied.*no such wall", class = "amiss_error_input")
+  expect_error(amiss:::extend(linear_simulator(), broken), "cannot be applied.*no such wall",
+               class = "amiss_error_input")
   other <- mechanism("c", function(model) 3, "Te", "C.")
   expect_error(amiss:::extend(linear_simulator(), other), "not a simulator", class = "amiss_error_input")
 })
@@ -73,7 +74,8 @@ test_that("two mechanisms of a function, adopted one after the other, are both k
                       f = function(values, drivers, base) base(values) + values[[name]] * drivers[, column])
     })
   }
-  upgrade <- upgrade_model(linear_simulator(), m, catalogue(added("wind", "Ws", normal(0, 1)), added("sun", "Gv", uniform(0, 0.02))),
+  upgrade <- upgrade_model(linear_simulator(), m,
+                           catalogue(added("wind", "Ws", normal(0, 1)), added("sun", "Gv", uniform(0, 0.02))),
                            runs = 30, seed = 1, quiet = TRUE,
                            control = list(calibration = quick_ais, attribution = list(surrogates = 19)))
   expect_setequal(vapply(upgrade$models[-1], `[[`, "", "mechanism"), c("sun", "wind"))

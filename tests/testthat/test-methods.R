@@ -79,9 +79,11 @@ test_that("an upgrade answers by its last model", {
 })
 
 test_that("what is asked and not known is an error", {
-  calls <- list(coef, confint, vcov, fitted, residuals, nobs, generics::tidy, generics::glance, generics::augment, summary,
+  calls <- list(coef, confint, vcov, fitted, residuals, nobs, generics::tidy, generics::glance, generics::augment,
+                summary,
                 predict, simulate, as.data.frame, as.matrix, update)
-  for (own in list(fit, paper)) for (call in calls) expect_error(call(own, nonsense = 1), class = "rlib_error_dots_nonempty")
+  for (own in list(fit, paper)) for (call in calls)
+    expect_error(call(own, nonsense = 1), class = "rlib_error_dots_nonempty")
   for (call in list(coef, confint, generics::tidy, generics::glance, predict)) {
     expect_error(call(upgrade, nonsense = 1), class = "rlib_error_dots_nonempty")
   }
@@ -90,10 +92,12 @@ test_that("what is asked and not known is an error", {
 })
 
 test_that("everything prints on standard output, in fifteen lines, and names the next step", {
-  shown <- list(upgrade, upgrade$catalogue, upgrade$catalogue$sun, upgrade$models[[1]]$attribution, fit, paper, summary(fit),
+  shown <- list(upgrade, upgrade$catalogue, upgrade$catalogue$sun, upgrade$models[[1]]$attribution, fit, paper,
+                summary(fit),
                 summary(paper), fit$measurements, discrepancy(fit), fit$emulator, fit$emulator$simulator,
                 simulate_design(linear_simulator(), fit$measurements, runs = 12, seed = 1),
-                ais(function(values) -0.5 * rowSums(values^2), list(a = normal(0, 1)), list(pilot_chains = 24), seed = 1))
+                ais(function(values) -0.5 * rowSums(values^2), list(a = normal(0, 1)), list(pilot_chains = 24),
+                    seed = 1))
   for (x in shown) {
     expect_silent(lines <- capture.output(same <- print(x)))
     expect_identical(same, x)

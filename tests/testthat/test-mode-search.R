@@ -7,7 +7,8 @@ wide_simulator <- function(...) {
   }, ..., boundary = "Te", name = "wide")
 }
 
-wide_parameters <- list(free("rate", uniform(-2, 0)), free("gain", uniform(-2, 0)), free("offset", normal(0, 1, -4, 4), "K"))
+wide_parameters <- list(free("rate", uniform(-2, 0)), free("gain", uniform(-2, 0)),
+                        free("offset", normal(0, 1, -4, 4), "K"))
 
 wide_record <- function(simulator, values) {
   data <- linear_data()
@@ -55,6 +56,7 @@ test_that("an ensemble far too coarse leads to a calibration that its check conf
   table <- tidy(fit)
   expect_true(all(table$conf.low < truth[table$term] & truth[table$term] < table$conf.high))
   # The same evidence from another design, within four standard errors.
-  other <- calibrate_refined(simulate_design(simulator, m, 12, seed = 2), m, control = list(calibration = quick_ais), seed = 2)
+  other <- calibrate_refined(simulate_design(simulator, m, 12, seed = 2), m, control = list(calibration = quick_ais),
+                             seed = 2)
   expect_lt(abs(fit$log_evidence - other$log_evidence), 4 * sqrt(fit$standard_error^2 + other$standard_error^2))
 })

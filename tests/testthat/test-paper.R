@@ -80,7 +80,8 @@ test_that("draws have the shape that is promised and obey their priors' limits",
   expect_identical(nrow(fit$values), length(fit$weights))
   # Posterior mean discrepancy: orthogonal to the simulation space.
   d <- amiss:::paper_discrepancy_(amiss:::paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
-                                  lapply(fit$hyperparameters[c("alpha", "t2", "lambda")], function(v) if (is.matrix(v)) v[1:2, ] else v[1:2]))
+                                  lapply(fit$hyperparameters[c("alpha", "t2", "lambda")],
+                                         function(v) if (is.matrix(v)) v[1:2, ] else v[1:2]))
   expect_identical(dim(d), c(60L, 2L))
   expect_lt(max(abs(crossprod(fit$emulator$basis$vectors, d))), 1e-6 * max(abs(fit$emulator$basis$vectors)))
 })
@@ -116,20 +117,25 @@ test_that("a longer record is annealed through thinned ones, and its values are 
 test_that("it prints, and options are checked", {
   fit <- paper_fit()
   expect_match(printed(fit), "log10 evidence.*significant")
-  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(chains = 3)), "unknown option", class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(chains = 3)), "unknown option",
+               class = "amiss_error_input")
   expect_error(calibrate_paper(fit$emulator, fit$measurements, list(alpha = 1)), "alpha", class = "amiss_error_input")
   expect_error(calibrate_paper(fit$emulator, fit$measurements, list(t2 = c(1, -1))), "t2", class = "amiss_error_input")
-  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(confidence = 3)), "confidence", class = "amiss_error_input")
-  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(shared_lambda = 2)), "shared_lambda", class = "amiss_error_input")
-  expect_error(calibrate_paper(fit$emulator, paper_measurements(paper_data_frame(n = 40))), "60 steps.*40", class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(confidence = 3)), "confidence",
+               class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(shared_lambda = 2)), "shared_lambda",
+               class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, paper_measurements(paper_data_frame(n = 40))), "60 steps.*40",
+               class = "amiss_error_input")
 })
 
 test_that("the unit of the basis does not matter", {
   m <- paper_measurements(paper_data_frame(sun))
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
   fit <- calibrate_paper(emulator, m, quick_ais, seed = 3)
-  # Rounding of the last digit, which chains and the emulator's inverse (condition 1e10) amplify, is all that remains: by a
-  # power of two only that of the logarithms. Without the Jacobian |K'K|^(-1/2) it would be Q log(factor), more than 13.
+  # Rounding of the last digit, which chains and the emulator's inverse (condition 1e10) amplify, is all that remains:
+  # by a power of two only that of the logarithms. Without the Jacobian |K'K|^(-1/2) it would be Q log(factor), more
+  # than 13.
   for (factor in c(2^10, 2^-10, 1000)) {
     other <- calibrate_paper(rescaled(emulator, factor), m, quick_ais, seed = 3)
     tolerance <- if (factor == 1000) 1e-5 else 1e-8

@@ -21,7 +21,8 @@ test_that("intervals hold the share of the weight that they should", {
 })
 
 test_that("median and covariance are those of the weighted draws", {
-  for (name in names(coef(fit))) expect_lte(abs(share_below(fit$values[, name], coef(fit)[[name]]) - 0.5), max(w) + 1e-12)
+  for (name in names(coef(fit)))
+    expect_lte(abs(share_below(fit$values[, name], coef(fit)[[name]]) - 0.5), max(w) + 1e-12)
   centred <- sweep(fit$values, 2, colSums(w * fit$values))
   expect_equal(vcov(fit), t(centred) %*% (w * centred), tolerance = 1e-10)
 })

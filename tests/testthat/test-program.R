@@ -4,11 +4,14 @@ rc_lines <- c("BEGIN { FS = \",\"; print \"hours,Ti\" }",
 
 rc_log <- function() tempfile("log", fileext = ".txt")
 
-rc_program <- function(cache = withr::local_tempdir(.local_envir = parent.frame()), lines = rc_lines, log = rc_log(), ...) {
+rc_program <- function(cache = withr::local_tempdir(.local_envir = parent.frame()), lines = rc_lines, log = rc_log(),
+                       ...) {
   lines <- c(lines, sprintf("END { print \"ran\" >> \"%s\" }", log))
-  program_simulator(c("awk", "-v", "gain={{gain}}", "-v", "OFMT=%.15g", "-v", "CONVFMT=%.15g", "-f", "model.awk", "drivers.csv"),
+  program_simulator(c("awk", "-v", "gain={{gain}}", "-v", "OFMT=%.15g", "-v", "CONVFMT=%.15g", "-f", "model.awk",
+                      "drivers.csv"),
                     free("lag", uniform(2, 10), "h"), free("gain", uniform(0, 1)),
-                    output = c(file = "stdout.txt", column = "Ti"), templates = list(model.awk = I(lines)), boundary = "Te",
+                    output = c(file = "stdout.txt", column = "Ti"), templates = list(model.awk = I(lines)),
+                    boundary = "Te",
                     cache = cache, name = "rc", ...)
 }
 
@@ -42,7 +45,8 @@ test_that("runs in parallel are the same", {
 
 test_that("failed runs are NaN, told with directory and stderr; the others are kept", {
   fails <- function(line, why, ...) {
-    expect_warning(runs <- simulate_runs(rc_program(lines = c(rc_lines, line), ...), rc_values, rc_drivers, 1), why, class = "amiss_warning_input")
+    expect_warning(runs <- simulate_runs(rc_program(lines = c(rc_lines, line), ...), rc_values, rc_drivers, 1), why,
+                   class = "amiss_warning_input")
     expect_true(all(is.nan(runs[, 2])))
     runs
   }
@@ -53,18 +57,22 @@ test_that("failed runs are NaN, told with directory and stderr; the others are k
   fails(only("print \"1,nonsense\""), "not numeric")
   fails(only("print \"1,20\""), "49 rows, where 48")
   fails(only("getline; getline"), "46 rows, where 48")
-  expect_warning(simulate_runs(rc_program(lines = "BEGIN { } {{lag}} { }"), rc_values, rc_drivers, 1), "3 of 3.*wrote nothing")
+  expect_warning(simulate_runs(rc_program(lines = "BEGIN { } {{lag}} { }"), rc_values, rc_drivers, 1),
+                 "3 of 3.*wrote nothing")
   missing <- rc_program()
   missing$command[1] <- "no-such-program"
-  expect_error(simulate_runs(missing, rc_values, rc_drivers, 1), "no-such-program.*not there", class = "amiss_error_input")
+  expect_error(simulate_runs(missing, rc_values, rc_drivers, 1), "no-such-program.*not there",
+               class = "amiss_error_input")
 })
 
 test_that("a failed run is tried again, and a changed script runs anew", {
   tried <- tempfile()
   script <- withr::local_tempfile(fileext = ".sh")
   writeLines(c(sprintf("[ -e %s ] || { touch %s; exit 1; }", tried, tried), "echo Ti; echo 1; echo $1"), script)
-  program <- program_simulator(c("sh", script, "{{a}}"), free("a", uniform(0, 2)), retries = 1, cache = withr::local_tempdir(),
-                               output = function(directory) as.numeric(readLines(file.path(directory, "stdout.txt"))[-1]))
+  program <- program_simulator(c("sh", script, "{{a}}"), free("a", uniform(0, 2)), retries = 1,
+                               cache = withr::local_tempdir(),
+                               output = function(directory) as.numeric(
+                                 readLines(file.path(directory, "stdout.txt"))[-1]))
   run <- function() simulate_runs(program, cbind(a = 1.5), matrix(0, 2, 0), 1)
   expect_equal(run(), cbind(c(1, 1.5)))
   writeLines("echo Ti; echo 7; echo $1", script)
@@ -72,15 +80,19 @@ test_that("a failed run is tried again, and a changed script runs anew", {
 })
 
 test_that("a placeholder and a parameter need each other", {
-  expect_error(rc_program(lines = c(rc_lines, "# {{k}}")), "model.awk.*\"k\".*no parameter", class = "amiss_error_input")
+  expect_error(rc_program(lines = c(rc_lines, "# {{k}}")), "model.awk.*\"k\".*no parameter",
+               class = "amiss_error_input")
   expect_error(rc_program(lines = "BEGIN {}"), "\"lag\" stands in no template", class = "amiss_error_input")
-  expect_error(with_template(rc_program(), list(x.txt = I("a")), free("k", uniform(0, 1))), "\"k\" stands in no", class = "amiss_error_input")
-  expect_error(with_template(rc_program(), list(x.txt = "nowhere")), "x.txt.*no file nowhere", class = "amiss_error_input")
+  expect_error(with_template(rc_program(), list(x.txt = I("a")), free("k", uniform(0, 1))), "\"k\" stands in no",
+               class = "amiss_error_input")
+  expect_error(with_template(rc_program(), list(x.txt = "nowhere")), "x.txt.*no file nowhere",
+               class = "amiss_error_input")
 })
 
 test_that("a mechanism edits templates, and the extended program is calibrated", {
   sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters.", edit = function(model) {
-    with_template(model, list(model.awk = function(lines) sub("gain * x", "gain * x + {{sun}} * $4", lines, fixed = TRUE)),
+    with_template(model,
+                  list(model.awk = function(lines) sub("gain * x", "gain * x + {{sun}} * $4", lines, fixed = TRUE)),
                   free("sun", uniform(0, 0.02)), boundary = "Gv")
   })
   data <- small_record(120)

@@ -8,7 +8,8 @@ test_that("a check that fails is mended by its own runs", {
   expect_gte(fit$rounds, 1L)
   expect_true(fit$check$passed)
   expect_true(fit$trust$trusted)
-  # In a region of its own, of 40 runs and those of the checks; the emulator over the priors says how far the simulator moves.
+  # In a region of its own, of 40 runs and those of the checks; the emulator over the priors says how far the simulator
+  # moves.
   expect_false(is.null(fit$emulator$processes$region))
   expect_gte(nrow(fit$emulator$unit), 40)
   expect_gte(fit$runs_made, 40 + fit$check$runs)
@@ -101,6 +102,7 @@ test_that("bad arguments are refused", {
   expect_error(calibrate_refined(runs, m, rounds = -1), "rounds", class = "amiss_error_input")
   expect_error(calibrate_refined(runs, m, control = list(check = 3)), "unknown option.*check",
                class = "amiss_error_input")
-  expect_error(calibrate_refined(runs, m, control = list(calibration = list(check = 1.5))), "control\\$calibration\\$check` = 1.5",
+  expect_error(calibrate_refined(runs, m, control = list(calibration = list(check = 1.5))),
+               "control\\$calibration\\$check` = 1.5",
                class = "amiss_error_input")
 })

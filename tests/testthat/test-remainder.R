@@ -110,5 +110,6 @@ test_that("slopes of the output are those of the emulated series", {
   unit <- amiss:::posterior_unit(fit)
   own <- colSums(fit$weights * unit)
   near <- function(by) fit$emulator$basis$vectors %*% t(amiss:::emulated_coefficients(fit$emulator, t(own + by))$mean)
-  expect_equal(slopes[, 1], as.numeric(near(replace(0 * own, 1, 0.01)) - near(replace(0 * own, 1, -0.01))) / 0.02, tolerance = 0.02)
+  expect_equal(slopes[, 1], as.numeric(near(replace(0 * own, 1, 0.01)) - near(replace(0 * own, 1, -0.01))) / 0.02,
+               tolerance = 0.02)
 })

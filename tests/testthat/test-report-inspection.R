@@ -122,9 +122,11 @@ test_that("a calibration tells what it does not know", {
 test_that("models that are not told apart are so where their simulations differ most", {
   data <- linear_data(90)
   m <- linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60)
-  steep <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], free("gain", uniform(0, 1)), boundary = "Te")
+  steep <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+                              free("gain", uniform(0, 1)), boundary = "Te")
   rough <- list(calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 12, importance_draws = 200)))
-  compared <- compare_models(list(a = linear_simulator(), b = steep), m, "paper", runs = 12, control = rough, seed = 3, quiet = TRUE)
+  compared <- compare_models(list(a = linear_simulator(), b = steep), m, "paper", runs = 12, control = rough, seed = 3,
+                             quiet = TRUE)
   compared$tables$evidence$log10_bf <- c(1, 1)
   compared$models$b$prediction$mean <- compared$models$a$prediction$mean + c(data$Te / 10)
   told <- summary(compared)$inspect

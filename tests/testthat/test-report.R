@@ -119,8 +119,10 @@ test_that("odds are written out while they can be read", {
 
 test_that("text from data is never markup", {
   skip_without_pandoc()
-  hostile <- c("javascript:alert(1)", "see http://a.b/c", "```\n\n# x", "1. a", "- a", "[a](b)", "![a](b)", "$a$ \\(b\\) 'c'",
-               "<script>alert(1)</script>", "&lt;b&gt;", "{.a} *b* _c_", "# h", ": d", "a | b", "~~s~~ @k", "`r stop()`")
+  hostile <- c("javascript:alert(1)", "see http://a.b/c", "```\n\n# x", "1. a", "- a", "[a](b)", "![a](b)",
+               "$a$ \\(b\\) 'c'",
+               "<script>alert(1)</script>", "&lt;b&gt;", "{.a} *b* _c_", "# h", ": d", "a | b", "~~s~~ @k",
+               "`r stop()`")
   file <- withr::local_tempfile(fileext = ".md")
   html <- withr::local_tempfile(fileext = ".html")
   for (text in hostile) {
@@ -187,7 +189,8 @@ test_that("a report says what result.json says", {
   jsonlite::write_json(result_list(small_upgrade()), file, auto_unbox = TRUE, digits = NA, null = "null", na = "null")
   told <- jsonlite::read_json(file)
   page <- xml2::read_html(small_report())
-  text <- function(class) trimws(xml2::xml_text(xml2::xml_find_all(page, sprintf("//*[contains(@class, '%s')]", class))))
+  text <- function(class) trimws(xml2::xml_text(xml2::xml_find_all(page,
+                                                                   sprintf("//*[contains(@class, '%s')]", class))))
   expect_identical(text("headline"), told$diagnosis$headline)
   expect_identical(text("tag"), told$diagnosis$tag)
   expect_true(grepl(told$diagnosis$verdict, text("verdict")[1]) || length(text(told$diagnosis$verdict)) > 0)
@@ -201,7 +204,8 @@ test_that("a report says what result.json says", {
   trials <- table_with(tables, c("step", "mechanism"))
   for (trial in told$candidates) {
     row <- trials[trials[, 2] == trial$mechanism, ]
-    expect_identical(row[c(4, 5, 7, 8)], c(signed(trial$log10_bf), paste(signed(unlist(trial$interval)), collapse = " to "),
+    expect_identical(row[c(4, 5, 7, 8)],
+                     c(signed(trial$log10_bf), paste(signed(unlist(trial$interval)), collapse = " to "),
                                            percent(trial$probability), if (trial$trusted) "sound" else "rough"))
     expect_identical(row[9] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
   }
@@ -216,11 +220,13 @@ test_that("a report says what result.json says", {
   drivers <- table_with(tables, "boundary condition")
   for (condition in last$attribution) {
     row <- drivers[drivers[, 1] == condition$boundary, ]
-    expect_identical(row[c(2, 5)], c(sprintf("%+.1f", condition$log10_bf_dropped), if (condition$significant) "yes" else "no"))
+    expect_identical(row[c(2, 5)],
+                     c(sprintf("%+.1f", condition$log10_bf_dropped), if (condition$significant) "yes" else "no"))
   }
   method <- table_with(tables, "quantity")
   expect_identical(as.numeric(method[1:3, 3]), as.numeric(unlist(last[c("N", "Q", "M")])))
-  if (!any(vapply(last$attribution, `[[`, NA, "significant"))) expect_match(text("wide"), "answers to no boundary", all = FALSE)
+  if (!any(vapply(last$attribution, `[[`, NA, "significant")))
+    expect_match(text("wide"), "answers to no boundary", all = FALSE)
 })
 
 test_that("a report of one calibration has its tables in Word, too", {
@@ -274,25 +280,29 @@ test_that("fragments go into a document of one's own, of any level, twice", {
 
 test_that("a report is refused with a reason, and nothing half-written stays", {
   folder <- withr::local_tempdir()
-  expect_error(report(small_upgrade(), file.path(folder, "absent", "a.html")), "does not exist", class = "amiss_error_input")
+  expect_error(report(small_upgrade(), file.path(folder, "absent", "a.html")), "does not exist",
+               class = "amiss_error_input")
   expect_error(report(small_upgrade(), folder), "is a folder", class = "amiss_error_input")
   expect_error(report(small_upgrade(), file.path(folder, "a.tex")), "html.*pdf.*docx", class = "amiss_error_input")
   expect_error(report(list(), file.path(folder, "a.html")), "upgrade_model", class = "amiss_error_input")
   skip_without_pandoc()
   withr::local_envvar(CHROMOTE_CHROME = "/nowhere/chrome")
-  expect_error(report(small_upgrade(), file.path(folder, "a.pdf")), "apt-get install chromium", class = "amiss_error_input")
+  expect_error(report(small_upgrade(), file.path(folder, "a.pdf")), "apt-get install chromium",
+               class = "amiss_error_input")
   broken <- small_upgrade()
   broken$models[[1]]$prediction <- NULL
   expect_error(suppressMessages(report(broken, file.path(folder, "a.html"))))
   expect_length(list.files(folder, all.files = TRUE, no.. = TRUE), 0)
 })
 
-browser_or_skip <- function() tryCatch(find_browser(), amiss_error_input = function(e) skip("no browser of the Chromium family"))
+browser_or_skip <- function() tryCatch(find_browser(),
+                                       amiss_error_input = function(e) skip("no browser of the Chromium family"))
 
 # What a browser makes of a page in a frame of a given width, and what its console says.
 seen_in_browser <- function(browser, file, width) {
   page <- withr::local_tempfile(fileext = ".html")
-  html <- htmltools::htmlEscape(paste(readLines(file, warn = FALSE, encoding = "UTF-8"), collapse = "\n"), attribute = TRUE)
+  html <- htmltools::htmlEscape(paste(readLines(file, warn = FALSE, encoding = "UTF-8"), collapse = "\n"),
+                                attribute = TRUE)
   script <- "frame.onload = function() {
     const page = frame.contentDocument, images = [...page.images];
     probe.textContent = JSON.stringify({width: page.documentElement.scrollWidth,
@@ -300,7 +310,8 @@ seen_in_browser <- function(browser, file, width) {
       natural: images.map(i => i.naturalWidth), shown: images.map(i => i.clientWidth)});
   }"
   writeLines(sprintf("<pre id='probe'></pre><script>%s</script>",
-                     paste0("</script><iframe id='frame' style='border:0; height:900px; width:", width, "px' srcdoc=\"", html,
+                     paste0("</script><iframe id='frame' style='border:0; height:900px; width:", width, "px' srcdoc=\"",
+                            html,
                             "\"></iframe><script>", script)), page, useBytes = TRUE)
   ran <- browse(browser, page, c("--enable-logging=stderr", "--dump-dom"))
   seen <- jsonlite::fromJSON(sub(".*<pre id=\"probe\">(\\{[^<]*\\}).*", "\\1", substr(ran$stdout, 1, 10000)))

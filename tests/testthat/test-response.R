@@ -11,13 +11,16 @@ extensions <- function(...) lapply(catalogue(...), amiss:::extend, simulator = b
 
 adding <- function(name, f, ..., boundary = "Te") {
   mechanism(name, boundary = boundary, sentence = "It acts.", edit = function(model) {
-    with_parameters(model, ..., boundary = boundary, f = function(values, drivers, base) base(values) + f(values, drivers))
+    with_parameters(model, ..., boundary = boundary,
+                    f = function(values, drivers, base) base(values) + f(values, drivers))
   })
 }
 
 test_that("responses tell the mechanism that acts from those that do not, and one that fails from all", {
-  acts <- adding("sun", function(values, drivers) values[["s"]] * lagged(drivers[, "Gv"], 3), free("s", uniform(0, 0.02)), boundary = "Gv")
-  idle <- adding("drift", function(values, drivers) values[["d"]] * seq_len(nrow(drivers)) / 100, free("d", uniform(-1, 1)))
+  acts <- adding("sun", function(values, drivers) values[["s"]] * lagged(drivers[, "Gv"], 3),
+                 free("s", uniform(0, 0.02)), boundary = "Gv")
+  idle <- adding("drift", function(values, drivers) values[["d"]] * seq_len(nrow(drivers)) / 100,
+                 free("d", uniform(-1, 1)))
   none <- adding("nothing", function(values, drivers) 0 * values[["n"]], free("n", uniform(0, 1)))
   fails <- adding("fails", function(values, drivers) NaN * values[["n"]], free("n", uniform(0, 1)))
   own <- amiss:::response_factors(base_fit(), extensions(acts, idle, none, fails), settings())
@@ -38,7 +41,8 @@ test_that("responses lie near the full Bayes factor, and not above twice of it",
 })
 
 test_that("the runs that show responses spread a mechanism's parameters and keep the model's", {
-  trial <- extensions(adding("two", function(values, drivers) 0, free("a", uniform(0, 1)), free("b", uniform(5, 6))))[[1]]
+  trial <- extensions(adding("two", function(values, drivers) 0, free("a", uniform(0, 1)),
+                             free("b", uniform(5, 6))))[[1]]
   centre <- cbind(offset = 15, gain = 3)  # beyond its prior, 0 to 2
   values <- amiss:::response_design(trial, centre)
   expect_equal(nrow(values), 6)
@@ -54,7 +58,8 @@ test_that("the runs that show responses spread a mechanism's parameters and keep
 
 test_that("a mechanism is out of reach where twice its response and the margin do not come to adoption", {
   out <- function(log10_bf, error = 0) {
-    amiss:::out_of_reach(data.frame(log10_bf = log10_bf, upper95 = log10_bf + 1.96 * error), list(decisive = 2, margin = 1.5))
+    amiss:::out_of_reach(data.frame(log10_bf = log10_bf, upper95 = log10_bf + 1.96 * error),
+                         list(decisive = 2, margin = 1.5))
   }
   expect_true(out(0.2))
   expect_false(out(0.3))
@@ -71,8 +76,10 @@ tried <- function(...) {
   amiss:::try_mechanisms(upgrade$models[[1]], catalogue(...), own, say = function(...) NULL)
 }
 
-drift <- adding("drift", function(values, drivers) values[["d"]] * seq_len(nrow(drivers)) / 100, free("d", uniform(-1, 1)))
-sun <- adding("sun", function(values, drivers) values[["s"]] * lagged(drivers[, "Gv"], 3), free("s", uniform(0, 0.02)), boundary = "Gv")
+drift <- adding("drift", function(values, drivers) values[["d"]] * seq_len(nrow(drivers)) / 100,
+                free("d", uniform(-1, 1)))
+sun <- adding("sun", function(values, drivers) values[["s"]] * lagged(drivers[, "Gv"], 3), free("s", uniform(0, 0.02)),
+              boundary = "Gv")
 
 test_that("where no mechanism promises anything none is calibrated, and the table says so", {
   trials <- tried(drift)
@@ -98,7 +105,8 @@ counted_loop <- function(file, folder = NULL, ...) {
     cat(".", file = file, append = TRUE)
     values[["offset"]] + values[["gain"]] * drivers[, "Te"]
   }, free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
-  sun <- adding("sun", function(values, drivers) values[["s"]] * drivers[, "Gv"], free("s", uniform(0, 0.02)), boundary = "Gv")
+  sun <- adding("sun", function(values, drivers) values[["s"]] * drivers[, "Gv"], free("s", uniform(0, 0.02)),
+                boundary = "Gv")
   upgrade_model(base, m, catalogue(sun), runs = 20, seed = 1, quiet = TRUE,
                 control = list(max_steps = 1, calibration = quick_ais, attribution = list(surrogates = 19), ...),
                 checkpoint = folder)

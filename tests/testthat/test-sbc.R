@@ -1,10 +1,12 @@
-# The checks of bench/calibration.R: a short form with fixed seeds, and the long one when AMISS_EXTENDED_TESTS is "true".
+# The checks of bench/calibration.R: a short form with fixed seeds, and the long one when AMISS_EXTENDED_TESTS is
+# "true".
 skip_on_cran()  # second tier: tools/test --quick
 bench <- test_path("..", "..", "bench", "calibration")
 extended <- identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true")
 checks <- new.env()
 if (dir.exists(bench)) {
-  for (part in c("world", "prior_predictive", "ranks", "model_probability", "bridge")) sys.source(file.path(bench, paste0(part, ".R")), checks)
+  for (part in c("world", "prior_predictive", "ranks", "model_probability", "bridge"))
+    sys.source(file.path(bench, paste0(part, ".R")), checks)
   checks$world <- checks$sbc_world()
 }
 skip_without_bench <- function() if (!dir.exists(bench)) skip("bench/ is not part of the installed package")

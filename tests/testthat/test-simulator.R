@@ -32,7 +32,8 @@ test_that("functions of two arguments go on working, others are refused with a w
 })
 
 test_that("what a function returned is shown, and for which values", {
-  run <- function(f, values = cbind(gain = c(0.25, 1))) simulate_runs(function_simulator(f, gain), values, drivers, step_h = 1)
+  run <- function(f, values = cbind(gain = c(0.25, 1))) simulate_runs(function_simulator(f, gain), values, drivers,
+                                                                      step_h = 1)
   expect_error(run(function(v, d) c(1.5, 2)), "returned 2 values.*At gain = 0.25 it returned: num \\[1:2\\] 1.5 2",
                class = "amiss_error_input")
   expect_error(run(function(v, d) letters[1:4]), "<character>.*chr \\[1:4\\] \"a\"", class = "amiss_error_input")

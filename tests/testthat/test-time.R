@@ -7,8 +7,10 @@ test_that("one time is read the same from all its forms", {
   stamps <- at("2020-01-21 00:00:00") + 900 * (1:200)  # into the 23rd
   forms <- list(
     format(stamps, "%Y-%m-%d %H:%M:%S"), format(stamps, "%Y-%m-%dT%H:%M"), format(stamps, "%Y-%m-%dT%H:%M:%SZ"),
-    format(stamps, "%Y/%m/%d %H:%M"), format(stamps, "%Y-%m-%dT%H:%M:%S.000+00:00"), format(stamps + 5400, "%Y-%m-%d %H:%M +0130"),
-    format(stamps - 3600, "%Y-%m-%d %H:%M:%S-01"), format(stamps, "%d.%m.%Y %H:%M:%S"), format(stamps, "%d.%m.%y, %H:%M"),
+    format(stamps, "%Y/%m/%d %H:%M"), format(stamps, "%Y-%m-%dT%H:%M:%S.000+00:00"),
+    format(stamps + 5400, "%Y-%m-%d %H:%M +0130"),
+    format(stamps - 3600, "%Y-%m-%d %H:%M:%S-01"), format(stamps, "%d.%m.%Y %H:%M:%S"),
+    format(stamps, "%d.%m.%y, %H:%M"),
     format(stamps, "%d/%m/%Y %H:%M"), format(stamps, "%m/%d/%Y %H:%M"), format(stamps, "%m-%d-%Y %I:%M:%S %p"),
     sub("^0", " ", format(stamps, "%m/%d/%Y %I:%M%p")), factor(format(stamps, "%Y-%m-%d %H:%M:%S")),
     as.POSIXlt(stamps), as.POSIXlt(stamps, tz = "America/New_York"), as.numeric(stamps), as.numeric(stamps) * 1000,
@@ -21,7 +23,8 @@ test_that("one time is read the same from all its forms", {
   expect_identical(attr(read(forms[[16]]), "tzone"), "America/New_York")
   expect_identical(read(stamps), stamps)
   patterns <- list("%b %d %Y %H:%M", "%Y%m%d%H%M", "%d/%m/%Y %H.%M", "%Y%m%dT%H%M%S%z")
-  for (pattern in patterns) expect_equal(as.numeric(read(format(stamps, pattern), format = pattern)), as.numeric(stamps))
+  for (pattern in patterns)
+    expect_equal(as.numeric(read(format(stamps, pattern), format = pattern)), as.numeric(stamps))
   digits <- as.numeric(format(stamps, "%Y%m%d%H%M"))
   expect_equal(as.numeric(read(digits, format = "%Y%m%d%H%M")), as.numeric(stamps))
   refused("neither hours nor Unix time", digits)
@@ -30,9 +33,11 @@ test_that("one time is read the same from all its forms", {
 test_that("midnight, days alone and fractions of seconds are read", {
   expect_equal(as_utc(read(c("2024-02-28 24:00:00", "2024-02-29 24:00", "2024-03-01 01:00"))),
                c("2024-02-29 00:00:00.0", "2024-03-01 00:00:00.0", "2024-03-01 01:00:00.0"))
-  expect_equal(as_utc(read(c("2024-02-28", "2024-02-29 06:30:00.5"))), c("2024-02-28 00:00:00.0", "2024-02-29 06:30:00.5"))
+  expect_equal(as_utc(read(c("2024-02-28", "2024-02-29 06:30:00.5"))),
+               c("2024-02-28 00:00:00.0", "2024-02-29 06:30:00.5"))
   expect_equal(as_utc(read(as.Date("2024-02-28") + 0:1)), c("2024-02-28 00:00:00.0", "2024-02-29 00:00:00.0"))
-  expect_equal(as_utc(read(c("1/21/2020 12:15 AM", "1/21/2020 12:15 pm"))), c("2020-01-21 00:15:00.0", "2020-01-21 12:15:00.0"))
+  expect_equal(as_utc(read(c("1/21/2020 12:15 AM", "1/21/2020 12:15 pm"))),
+               c("2020-01-21 00:15:00.0", "2020-01-21 12:15:00.0"))
 })
 
 test_that("numbers are hours unless they are said, or too large, to be", {
@@ -41,7 +46,8 @@ test_that("numbers are hours unless they are said, or too large, to be", {
   for (case in list(list("seconds", 3600), list("minutes", 60), list("hours", 1), list("days", 1 / 24))) {
     expect_equal(read(case[[2]] * 1:3, format = case[[1]]), 1:3)
   }
-  expect_message(amiss:::read_time(1.6e9 + 60 * 1:3, "t"), "Unix time, from 2020-09-13 12:27:40 UTC", class = "amiss_message_time")
+  expect_message(amiss:::read_time(1.6e9 + 60 * 1:3, "t"), "Unix time, from 2020-09-13 12:27:40 UTC",
+                 class = "amiss_message_time")
   expect_no_message(time <- amiss:::read_time(60 * 1:3, "t", format = "unix"))
   expect_equal(as_utc(time[1]), "1970-01-01 00:01:00.0")
   expect_equal(format(read(1.6e9, zone = "Europe/Berlin"), "%H:%M"), "14:26")
@@ -86,12 +92,15 @@ test_that("rubbish is refused with its row and the option", {
 local_text <- function(from, zone, minutes, n) format(at(from) + 60 * minutes * seq_len(n), "%Y-%m-%d %H:%M", tz = zone)
 
 test_that("both changes of daylight saving are read in their zone", {
-  zones <- c("Europe/Berlin", "Europe/London", "America/New_York", "Australia/Sydney", "America/Santiago", "Australia/Lord_Howe", "UTC")
-  for (zone in zones) for (minutes in c(10, 30, 60)) for (day in c("03-10", "03-31", "04-07", "09-08", "10-06", "10-27", "11-03")) {
+  zones <- c("Europe/Berlin", "Europe/London", "America/New_York", "Australia/Sydney", "America/Santiago",
+             "Australia/Lord_Howe", "UTC")
+  for (zone in zones) for (minutes in c(10, 30, 60))
+    for (day in c("03-10", "03-31", "04-07", "09-08", "10-06", "10-27", "11-03")) {
     from <- paste0("2024-", day, " 00:00")
     n <- 30 * 60 / minutes
     time <- read(local_text(from, zone, minutes, n), zone = zone)
-    expect_identical(as.numeric(time), as.numeric(at(from) + 60 * minutes * seq_len(n)), info = paste(zone, minutes, day))
+    expect_identical(as.numeric(time), as.numeric(at(from) + 60 * minutes * seq_len(n)),
+                     info = paste(zone, minutes, day))
     expect_identical(attr(time, "tzone"), zone)
   }
 })
@@ -107,7 +116,8 @@ test_that("a record that begins, ends or lacks rows in the repeated hour is read
   read_part(1:6)       # ends in the first
   read_part(c(1:7, 12:20))
   read_part(c(1:2, 8:20))
-  sorted <- c("2024-10-27 02:00", "2024-10-27 02:00", "2024-10-27 02:15", "2024-10-27 02:15", "2024-10-27 02:30", "2024-10-27 02:30")
+  sorted <- c("2024-10-27 02:00", "2024-10-27 02:00", "2024-10-27 02:15", "2024-10-27 02:15", "2024-10-27 02:30",
+              "2024-10-27 02:30")
   refused("more than once", sorted, zone = "Europe/Berlin")
 })
 
@@ -167,7 +177,8 @@ test_that("a study says how its time is to be read", {
   study <- yaml::read_yaml(path)
   study$time_zone <- "Etc/GMT-1"
   study$fill_gaps_h <- 1
-  for (field in c("data", "model", "catalogue")) study[[field]] <- file.path(normalizePath(dirname(path)), study[[field]])
+  for (field in c("data", "model", "catalogue"))
+    study[[field]] <- file.path(normalizePath(dirname(path)), study[[field]])
   file <- withr::local_tempfile(fileext = ".yml")
   yaml::write_yaml(study, file)
   local <- read_study(file, trust = TRUE)$measurements

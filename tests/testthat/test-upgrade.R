@@ -24,7 +24,8 @@ test_that("a coarse candidate is compared with the coarse calibration of the cur
   coarse <- amiss:::as_coarse(base)
   expect_identical(coarse$log_evidence, base$coarse$log_evidence)
   expect_false(coarse$log_evidence == base$log_evidence)
-  table <- amiss:::trial_table(list(sun = upgrade$models[[2]]$fit, drift = upgrade$models[[2]]$fit), upgrade$models[[1]], full = "sun")
+  table <- amiss:::trial_table(list(sun = upgrade$models[[2]]$fit, drift = upgrade$models[[2]]$fit),
+                               upgrade$models[[1]], full = "sun")
   expect_equal(diff(table$log10_bf), (base$log_evidence - coarse$log_evidence) / log(10), tolerance = 1e-10)
 })
 
@@ -32,7 +33,8 @@ test_that("the coarse calibration follows screening, whatever is asked of the fu
   upgrade <- small_upgrade()
   settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1,
                    keep = function(name, value) value,
-                   control = modifyList(amiss:::upgrade_control, list(calibration = list(ais = list(precision = 0.01, pilot_chains = 24)))))
+                   control = modifyList(amiss:::upgrade_control,
+                                        list(calibration = list(ais = list(precision = 0.01, pilot_chains = 24)))))
   coarse <- amiss:::screen_model(upgrade$models[[1]]$fit$emulator$simulator, "base", settings)
   expect_equal(coarse$fit$control$ais$precision, amiss:::upgrade_control$screening$precision)
   expect_equal(ncol(coarse$ensemble$outputs), 20)
@@ -41,14 +43,17 @@ test_that("the coarse calibration follows screening, whatever is asked of the fu
 test_that("contenders are those within the margin, and none where nothing comes near adoption", {
   fit <- function(log10_evidence, se = 0.05, lag = 0) {
     posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
-    structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10), standard_error = se * log(10), posterior = posterior),
+    structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10),
+                   standard_error = se * log(10), posterior = posterior),
               class = "amiss_calibration")
   }
   control <- list(margin = 3, decisive = 2)
   reference <- fit(0, 0)
   expect_equal(amiss:::contenders(list(a = fit(10), b = fit(7.5), c = fit(6)), reference, control), c("a", "b"))
-  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, se = 0.5)), reference, control), c("a", "b"))  # its error reaches
-  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, lag = 2)), reference, control), c("a", "b"))  # its chains may have missed a mode
+  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, se = 0.5)), reference, control),
+               c("a", "b"))  # its error reaches
+  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, lag = 2)), reference, control),
+               c("a", "b"))  # its chains may have missed a mode
   expect_length(amiss:::contenders(list(a = fit(-2), b = fit(-5)), reference, control), 0)
   expect_equal(amiss:::contenders(list(a = fit(-0.5), b = fit(-5)), reference, control), "a")
 })
@@ -57,16 +62,20 @@ test_that("screening can be left out, and bad settings are refused before anythi
   upgrade <- small_upgrade()
   quick <- list(ais = list(pilot_chains = 24, groups = 4, chains = 8, importance_draws = 200))
   fits <- lapply(upgrade$models, `[[`, "fit")
-  arguments <- list(fits[[1]]$emulator$simulator, upgrade$measurements, upgrade$catalogue, runs = 30, seed = 1, quiet = TRUE)
+  arguments <- list(fits[[1]]$emulator$simulator, upgrade$measurements, upgrade$catalogue, runs = 30, seed = 1,
+                    quiet = TRUE)
   full <- do.call(upgrade_model, c(arguments, list(control = list(
     max_steps = 1, screening = NULL, calibration = quick, attribution = list(surrogates = 19)))))
   expect_false(any(full$candidates$screened))
   expect_equal(full$named_cause$mechanism, "sun")
   both <- full$candidates$mechanism == "sun"
   own <- upgrade$candidates$mechanism == "sun"
-  expect_equal(full$candidates$log10_bf[both], upgrade$candidates$log10_bf[own], tolerance = 1e-8)  # the same full calibration
-  expect_error(do.call(upgrade_model, c(arguments, list(control = list(screening = list(chains = -1))))), "chains", class = "amiss_error_input")
-  expect_error(do.call(upgrade_model, c(arguments, list(control = list(margin = -1)))), "margin", class = "amiss_error_input")
+  expect_equal(full$candidates$log10_bf[both], upgrade$candidates$log10_bf[own],
+               tolerance = 1e-8)  # the same full calibration
+  expect_error(do.call(upgrade_model, c(arguments, list(control = list(screening = list(chains = -1))))), "chains",
+               class = "amiss_error_input")
+  expect_error(do.call(upgrade_model, c(arguments, list(control = list(margin = -1)))), "margin",
+               class = "amiss_error_input")
   with_runs <- function(runs) do.call(upgrade_model, utils::modifyList(arguments, list(runs = runs)))
   expect_error(with_runs("many"), "runs", class = "amiss_error_input")
   expect_error(with_runs(6), "Of the 6 runs.*4", class = "amiss_error_input")

@@ -83,7 +83,8 @@ test_that("runs follow their parameters and do not depend on threads", {
   expect_true(mean(air[, 1]) > mean(air[, 2]) && mean(air[, 2]) > mean(air[, 3]))
   expect_identical(air, simulate_zone(x, values, weather(), 900, threads = 2))
   expect_identical(air[, 3], simulate_zone(zone_resolve(x, values[3, ]), NULL, weather(), 900)[, 1])
-  expect_error(simulate_zone(x, cbind(ach = c(0.1, -2, 0.3)), weather(), 900), "leaks.*ach.*-2", class = "amiss_error_input")
+  expect_error(simulate_zone(x, cbind(ach = c(0.1, -2, 0.3)), weather(), 900), "leaks.*ach.*-2",
+               class = "amiss_error_input")
 })
 
 test_that("held intervals return what they are held at", {
@@ -112,7 +113,8 @@ test_that("data that cannot be simulated are refused", {
   gap[3, "Ws"] <- NA
   expect_true(all(is.finite(simulate_zone(room(), NULL, gap, 900))))
   expect_error(simulate_zone(room(), NULL, weather(), 900, hold = 1:3), "hold", class = "amiss_error_input")
-  expect_error(simulate_zone(room(), NULL, weather(), 900, control = list(cell = 2)), "cells", class = "amiss_error_input")
+  expect_error(simulate_zone(room(), NULL, weather(), 900, control = list(cell = 2)), "cells",
+               class = "amiss_error_input")
   free_room <- room(zone_infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
   expect_error(simulate_zone(free_room, NULL, weather(), 900), "ach", class = "amiss_error_input")
 })
@@ -138,7 +140,8 @@ test_that("the paper's box has the paper's parameters and runs", {
 test_that("the paper's box loses heat as measured, and more with a crack", {
   drivers <- cbind(Te = rep(0, 2000), Gv = 0, Ws = 3, Wd = 180, RHP = 100)
   loss <- function(model, ...) {
-    values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179, heater_radiant = 0.79, ...)
+    values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179, heater_radiant = 0.79,
+                    ...)
     100 / simulate_zone(paper_box(model), values, drivers, 3600)[2000, 1]
   }
   expect_gt(loss("M2"), 3.6)
@@ -151,7 +154,8 @@ test_that("the initial offset of the walls is forgotten at the walls' own pace, 
     zone(zone_wall("facade", 10, zone_layer(0.1, 1, 2e6), outside = "Te"), volume = 50, initial_wall_offset = offset)
   }
   drivers <- cbind(Te = rep(10, 96))
-  difference <- simulate_zone(room(2), drivers = drivers, step_s = 900)[, 1] - simulate_zone(room(0), drivers = drivers, step_s = 900)[, 1]
+  difference <- simulate_zone(room(2), drivers = drivers, step_s = 900)[, 1] -
+    simulate_zone(room(0), drivers = drivers, step_s = 900)[, 1]
   expect_true(all(difference > 0) && all(diff(difference[10:96]) < 0))
   expect_lt(difference[96], 0.2 * max(difference))
 })
