@@ -33,6 +33,8 @@ amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, contro
   } else {
     record_measurements(data, noise_sd)
   }
+  if (is.data.frame(runs)) runs <- as.matrix(runs)
+  check_input(checkmate::check_matrix(runs, "numeric"), "runs")
   made <- ensemble(design, runs, parameters, m)
   calibrate_refined(made, m, rounds = 0, control = control, seed = seed, threads = threads)
 }
@@ -43,7 +45,7 @@ record_measurements <- function(data, noise_sd, call = rlang::caller_env()) {
   names <- names(data)
   if (is.null(noise_sd)) {
     require_numeric(data, names[2], call)
-    noise_sd <- difference_sd(read_time(data[[1]], names[1], call), data[[2]])
+    noise_sd <- difference_sd(time_hours(read_time(data[[1]], names[1], call = call)), data[[2]])
     cli::cli_inform(c("The noise of {.val {names[2]}} is taken as {signif(noise_sd, 3)}, from second differences.",
                       i = "Give {.arg noise_sd} where it is known."),
                     class = "amiss_message_noise")

@@ -88,6 +88,7 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
 # What a calibration is made of before it is made: list(emulator, measurements, rows, control, priors, seed).
 calibration_setting <- function(emulator, measurements, control, seed, call = rlang::caller_env()) {
   rows <- emulated_rows(emulator, measurements, call)
+  check_target_varies(measurements, rows, call)
   control <- fill_calibration_control(control, measurements, length(rows), call = call)
   priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
                  discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion,

@@ -77,10 +77,10 @@ read_calibrino <- function(words, parser) {
     unknown <- setdiff(asked[[name]], known[[name]])
     if (length(unknown)) stop("'--", name, "' does not know '", unknown[1], "'; it knows ", listed(known[[name]]))
   }
-  asked$threads <- whole_number(asked$threads, "threads", 1)
+  asked$threads <- whole_number(asked$threads, "threads", 1, 1024)
   asked$step <- positive_number(asked$step, "step")
   if (!is.null(asked$noise)) asked$noise <- positive_number(asked$noise, "noise")
-  if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0)
+  if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0, .Machine$integer.max)
   asked
 }
 

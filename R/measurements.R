@@ -126,7 +126,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                   i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
   }
   noise <- noise_level(noise_sd, coarse, raw$y)
-  check_target_values(y, target, calibrate)
+  check_target_values(y, target)
   structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise$sd,
                  noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time,
                  hours = coarse$hours,

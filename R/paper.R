@@ -54,6 +54,7 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' @export
 calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
   rows <- emulated_rows(emulator, measurements)
+  check_target_varies(measurements, rows)
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   control <- fill_paper_control(control, length(rows))

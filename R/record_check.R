@@ -19,16 +19,20 @@ check_record <- function(data, time, target, terms, name, unit, call = rlang::ca
   }
 }
 
-check_target_values <- function(y, target, used, call = rlang::caller_env()) {
+check_target_values <- function(y, target, call = rlang::caller_env()) {
   coded <- which(y %in% missing_codes)
   if (length(coded)) {
-    abort_input(c("Target {.val {target}} is {y[coded[1]]} in {length(coded)} row{?s}, the first {coded[1]}: a code for what is missing.",
+    abort_input(c(paste("Target {.val {target}} is {y[coded[1]]} in {length(coded)} row{?s}, the first {coded[1]}: a code",
+                        "for what is missing."),
                   i = "Mark a missing value as NA: it is then left out."), call = call)
   }
-  values <- y[used & !is.na(y)]
-  if (length(values) > 1 && all(values == values[1])) {
-    abort_input(
-      "Target {.val {target}} is {values[1]} in all {length(values)} rows that calibrate: there is nothing to explain.",
-                call = call)
+}
+
+# A record of one value can carry runs, but nothing can be learned of it.
+check_target_varies <- function(measurements, rows, call = rlang::caller_env()) {
+  y <- measurements$y[rows]
+  if (all(y == y[1])) {
+    abort_input(paste("Target {.val {measurements$target}} is {y[1]} in all {length(y)} rows that calibrate: there is",
+                      "nothing to explain."), call = call)
   }
 }

@@ -47,6 +47,8 @@ sobol_indices <- function(x, points = 256, replicates = 16, by_time = FALSE, see
   if (replicates < 4) abort_input("{.arg replicates} = {replicates} is too few for a standard error; give at least 4.")
   check_input(checkmate::check_flag(by_time), "by_time")
   seed <- pick_seed(seed)
+  parameters <- if (inherits(x, "amiss_fit")) x$emulator$parameters else x$parameters
+  check_size("points", points, matrix_gb(points, 2 * (length(parameters) + 2), copies = length(parameters) + 2))
   emulator <- emulator_over_priors(if (inherits(x, "amiss_fit")) x$emulator else x)
   replicated <- with_seed(seed, lapply(seq_len(replicates), function(r) pick_freeze(emulator, points)))
   expected <- index_tables(lapply(replicated, `[[`, "expected"), emulator$basis$vectors)

@@ -81,6 +81,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   given <- inherits(simulator, "amiss_ensemble")
   if (!given) check_simulator(simulator)
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_target_varies(measurements, used_rows(measurements, "calibrate"))
   check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
   check_given(c(if (given) list(base = simulator), lapply(catalogue, `[[`, "edit")), measurements)
   control <- fill_upgrade_control(control, measurements)
