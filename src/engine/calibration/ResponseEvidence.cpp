@@ -30,14 +30,16 @@ AisResult response_evidence(HistoryData data, const HistoryPriors& priors, const
   if (responses.rows() != n || data.basis.cols() != tangent.root.rows())
     throw std::invalid_argument("response: lengths differ");
   data.y -= data.basis * tangent.mean;
-  data.basis = along_axes((MatrixXd(n, tangent.root.cols() + k) << data.basis * tangent.root, responses).finished(),
-                          kLeast * priors.noise_sd);
+  data.basis =
+      along_axes((MatrixXd(n, tangent.root.cols() + k) << data.basis * tangent.root, responses).finished(),
+                 kLeast * priors.noise_sd);
   data.moves = (MatrixXd(n, data.moves.cols() + k) << data.moves, responses).finished();
   const Index d = data.basis.cols();
   const HistoryModel model(std::move(data), priors, context);
   std::vector<int> active(static_cast<std::size_t>(model.conditions()));
   std::iota(active.begin(), active.end(), 0);
-  return sample_ais(HistoryTarget(model, active, {VectorXd::Zero(d), MatrixXd::Identity(d, d)}), options, context);
+  return sample_ais(HistoryTarget(model, active, {VectorXd::Zero(d), MatrixXd::Identity(d, d)}), options,
+                    context);
 }
 
 }  // namespace amiss
