@@ -6,6 +6,17 @@
 #' [compare_models()] sets several simulators against each other, [report()] writes either down, and [run_study()] does
 #' all of it from one file.
 #'
+#' Long work shows how far it is and what time it will take: at a terminal in a line that changes, elsewhere (log files,
+#' batches) in a line now and then, in tests and knitr documents not at all. It is silent in functions called with
+#' `quiet = TRUE`. It can be interrupted: the session goes on, and [upgrade_model()], [compare_models()] and
+#' [run_study()] go on from their `checkpoint` or folder.
+#'
+#' @section Options:
+#' * `amiss.progress`: `"bar"`, `"lines"` or `"none"` for progress as at a terminal, as in a log, or none, wherever the
+#'   session runs.
+#' * `amiss.progress_interval`: least number of seconds between two such lines (30).
+#' * `amiss.allow_large`: `TRUE` lets work begin that is estimated to need more than a day or 4 GB.
+#'
 #' @useDynLib amiss, .registration = TRUE
 #' @importFrom Rcpp evalCpp
 #' @importFrom rlang %||% .data

@@ -52,8 +52,8 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   own <- seq_along(conditions)
   attributed <- function(least) {
     asked <- c(control, list(least = least * log(10)))
-    result <- call_engine(attribute_(data, fit$priors, fit$emulator$processes, draws, asked,
-                                     engine_context(seed, threads)))
+    result <- staged("attributing the discrepancy", call_engine(
+      attribute_(data, fit$priors, fit$emulator$processes, draws, asked, engine_context(seed, threads))))
     matters <- result$sets$lost / log(10) >= control$least_log10_bf
     c(result,
       list(significant = matters & result$adjusted <= control$level,

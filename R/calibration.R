@@ -69,7 +69,8 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
   set <- calibration_setting(emulator, measurements, control, seed, call)
   control <- set$control
   data <- history_data(emulator, measurements, set$rows, control)
-  result <- call_engine(calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads)))
+  result <- staged("sampling the posterior", call_engine(
+    calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads))))
   posterior <- result$posterior
   fit <- structure(list(format_version = format_version, emulator = emulator, measurements = measurements,
                         control = control,

@@ -30,8 +30,8 @@ posterior_runs <- function(fit, n, threads) {
   drawn <- even_draws(fit, n)
   draws <- unique(drawn)
   times <- tabulate(match(drawn, draws))
-  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, fit$values[draws, , drop = FALSE],
-                                                  fit$measurements, "calibrate", threads))
+  runs <- staged("check", suppress_run_warnings(simulate_measured(
+    fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate", threads)))
   failed <- colSums(!is.finite(runs)) > 0
   if (mean(failed) > largest_failed_share) {
     worst <- draws[failed][1]

@@ -70,9 +70,10 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   say <- progress(quiet)
   settings$keep <- checkpoint_keeper(checkpoint,
                                      c(settings[c("measurements", "runs", "control", "seed")], method = method))
+  turn <- turns("model", length(models))
   compared <- sapply(names(models), function(name) {
     say("Calibrating {.strong {name}}")
-    model <- compared_model(models[[name]], name, settings)
+    model <- staged(turn(name), compared_model(models[[name]], name, settings))
     say("{.strong {name}}: log10 evidence {round(model$fit$log_evidence / log(10), 1)}, RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration")
     model
   }, simplify = FALSE)
@@ -108,7 +109,7 @@ compared_model <- function(simulator, name, settings) {
     prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)
     list(name = name, fit = fit, attribution = attribution, prediction = prediction,
          scores = prediction_scores(prediction),
-         best = least_squares(fit, settings$threads), heat_loss = posterior_heat_loss(fit))
+         best = staged("least squares", least_squares(fit, settings$threads)), heat_loss = posterior_heat_loss(fit))
   })
 }
 

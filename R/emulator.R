@@ -86,8 +86,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   check_training_size(ncol(ensemble$outputs), "ensemble (runs)")
   basis <- call_engine(make_basis_(ensemble$outputs, c(control, noise_sd = noise_sd)))
   basis$discarded_sd <- discarded_sd(basis, ensemble$outputs)
-  trained <- call_engine(train_emulator_(region_inputs(ensemble$region, ensemble$unit), basis, control,
-                                         engine_context(1, threads)))
+  trained <- staged(paste("training the emulator of", ncol(ensemble$outputs), "runs"), call_engine(train_emulator_(
+    region_inputs(ensemble$region, ensemble$unit), basis, control, engine_context(1, threads))))
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   if (basis$discarded_rms > noise_sd && noise_sd > 0) {
     warn_result(c("The basis of {ncol(basis$vectors)} vectors leaves {signif(basis$discarded_rms, 3)} of the runs unexplained (RMS), more than the noise of {signif(noise_sd, 3)}.",

@@ -8,6 +8,7 @@
 #' @param runs Number of runs.
 #' @param seed Seed of the design; if `NULL`, R's generator gives one.
 #' @param threads Number of threads.
+#' @param quiet No progress messages.
 #' @return An object of class `amiss_ensemble`: parameter values, their places in the unit cube and the outputs at
 #'   the calibration rows (one column per run).
 #' @examples
@@ -17,7 +18,8 @@
 #'                              free("gain", uniform(0, 1)), boundary = "Te")
 #' simulate_design(linear, room, runs = 12, seed = 1)
 #' @export
-simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1) {
+simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1, quiet = FALSE) {
+  hush(quiet)
   check_simulator(simulator)
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
@@ -61,7 +63,8 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' near <- refine_ensemble(runs, fit, runs = 20)
 #' calibrate(train_emulator(near, room), room, quick, seed = 1)
 #' @export
-refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1) {
+refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE) {
+  hush(quiet)
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")

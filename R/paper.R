@@ -61,7 +61,8 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
   data <- paper_data(emulator, measurements, rows, control)
   priors <- list(alpha = control$alpha, t2 = control$t2, noise_sd = measurements$noise_sd,
                  noise_shape = length(rows) * control$confidence)
-  result <- call_engine(calibrate_paper_(data, priors, emulator$processes, control, engine_context(seed, threads)))
+  result <- staged("sampling the posterior", call_engine(
+    calibrate_paper_(data, priors, emulator$processes, control, engine_context(seed, threads))))
   inside <- result$inside
   outside <- result$outside
   evidence <- paper_evidence(inside, outside)

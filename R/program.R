@@ -174,8 +174,11 @@ simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, st
   shared <- rlang::hash(list(table, unname(tools::md5sum(files)), simulator$version, plain(simulator$output),
                              simulator$drivers))
   made <- future.apply::future_lapply(seq_len(nrow(values)),
-                                      function(m) program_run(simulator, values[m, ], table, shared),
-                                      future.packages = "amiss", future.seed = NULL)
+                                      function(m) {
+                                        run <- program_run(simulator, values[m, ], table, shared)
+                                        piece_done()
+                                        run
+                                      }, future.packages = "amiss", future.seed = NULL)
   failed <- which(!vapply(made, is.numeric, NA))
   tell_failed(simulator, made, failed)
   made[failed] <- list(rep(NaN, nrow(drivers)))

@@ -14,6 +14,7 @@
 #'   each parameter; each further round makes 1.3 times as many.
 #' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and [calibrate()] take them.
 #' @inheritParams calibrate
+#' @inheritParams simulate_design
 #' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how
 #'   many runs of the simulator were made here, those of the checks included.
 #' @examples
@@ -29,7 +30,8 @@
 #' c(fit$rounds, fit$runs_made)
 #' @export
 calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL,
-                              threads = 1) {
+                              threads = 1, quiet = FALSE) {
+  hush(quiet)
   check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
   check_input(checkmate::check_count(rounds), "rounds")
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
@@ -62,9 +64,13 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
     if (round > 0) runs <<- ceiling(1.3 * runs)
     round <<- round + 1L
   }
-  trained <- function(ensemble) train_emulator(ensemble, measurements, control$emulator, threads = threads)
+  in_round <- function(code) {
+    if (round > 0) staged(sprintf("round %d of at most %d", round, rounds), code) else code
+  }
+  trained <- function(ensemble) in_round(train_emulator(ensemble, measurements, control$emulator, threads = threads))
   calibrated <- function(ensemble, calibration, emulator = trained(ensemble)) {
-    own <- tryCatch(calibrate_with_runs(emulator, measurements, calibration, seed, threads),
+    force(emulator)
+    own <- tryCatch(in_round(calibrate_with_runs(emulator, measurements, calibration, seed, threads)),
                     amiss_error_numerical = function(e) {
       if (is.null(ensemble$region) || round >= rounds) rlang::cnd_signal(e)
     })
@@ -72,13 +78,14 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
       next_round()
       runs_made <<- runs_made + runs
       set <- list(emulator = emulator, measurements = measurements)
-      return(calibrated(regional_ensemble(ensemble, wider_region(ensemble$region), set, runs, threads), calibration))
+      wider <- in_round(regional_ensemble(ensemble, wider_region(ensemble$region), set, runs, threads))
+      return(calibrated(wider, calibration))
     }
     runs_made <<- runs_made + length(own$made$draws) + sum(own$made$failed)
     c(list(ensemble = ensemble), own)
   }
   searched <- function(ensemble, set, centre = NULL) {
-    own <- searched_ensemble(ensemble, set, centre, runs, threads)
+    own <- in_round(staged("search by the simulator", searched_ensemble(ensemble, set, centre, runs, threads)))
     runs_made <<- runs_made + own$runs
     calibrated(own$ensemble, coarsely(control$calibration))
   }
@@ -105,7 +112,7 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
       wider <- with_checked_runs(result)
       result <- if (check$ratio > lost) searched(wider, result$fit, posterior_centre(result$fit)) else {
         runs_made <- runs_made + runs
-        calibrated(refine_ensemble(wider, result$fit, runs, threads), coarsely(control$calibration))
+        calibrated(in_round(refine_ensemble(wider, result$fit, runs, threads)), coarsely(control$calibration))
       }
       coarse <- TRUE
     } else if (coarse) {

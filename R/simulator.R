@@ -240,6 +240,7 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
   for (m in seq_len(nrow(values))) {
     point <- stats::setNames(values[m, ], colnames(values))
     out <- tryCatch(call_run_function(simulator$f, point, drivers, info = info), error = function(e) e)
+    piece_done()
     if (inherits(out, "error")) {
       stopped[[as.character(m)]] <- conditionMessage(out)
       next
@@ -301,36 +302,47 @@ count_runs <- function(runs) ledger$runs <- ledger$runs + runs
 
 # Runs over the segments that hold rows of the wanted uses, averaged like the measurements: one row for each used row.
 simulate_measured <- function(simulator, values, measurements, uses, threads, call = rlang::caller_env()) {
-  raw <- measurements$raw
-  needed <- driver_names(simulator)
-  absent <- setdiff(needed, colnames(raw$drivers))
-  if (length(absent)) {
-    abort_input(
-      c("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the measurements do not have.",
-                  i = "Columns there: {.val {colnames(raw$drivers)}}."), call = call)
-  }
+  check_driver_columns(simulator, measurements, call)
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
   count_runs(nrow(values))
   out <- matrix(NaN, length(measurements$y), nrow(values))
   wanted <- which(measurements$block %in% rows)
-  for (segment in unique(measurements$segment[rows])) {
-    own <- which(raw$segment == segment)
-    own <- own[own <= max(intersect(own, wanted))]  # what comes later changes nothing
-    for (column in needed) {
-      bad <- own[!is.finite(raw$drivers[own, column])]
-      if (length(bad)) {
-        abort_input(c("Driver {.val {column}} has {length(bad)} missing value{?s}; the first is in row {bad[1]} ({format(raw$time[bad[1]])}).",
-                      i = "A simulator needs every value of what drives it: fill the gap, or remove these rows as a whole."),
-                      call = call)
-      }
-    }
-    hold <- ifelse(raw$use[own] == "warmup", raw$y[own], NA_real_)
-    fine <- simulate_runs(simulator, values, raw$drivers[own, needed, drop = FALSE], raw$step_h, hold, threads,
-                          time = raw$time[own], segment = segment)
-    averaged <- block_means(fine, measurements$block[own], measurements$per_step)
+  segments <- unique(measurements$segment[rows])
+  over <- if (length(segments) > 1) paste0(" (", length(segments), " segments)")
+  counted(paste0("runs of the simulator", over), length(segments) * nrow(values), for (i in seq_along(segments)) {
+    within <- which(measurements$raw$segment == segments[i])
+    within <- within[within <= max(intersect(within, wanted))]  # what comes later changes nothing
+    fine <- simulate_rows(simulator, values, measurements$raw, within, threads, call)
+    averaged <- block_means(fine, measurements$block[within], measurements$per_step)
     out[as.integer(rownames(averaged)), ] <- averaged
-  }
+    piece_done(i * nrow(values))
+  })
   out[rows, , drop = FALSE]
+}
+
+check_driver_columns <- function(simulator, measurements, call) {
+  present <- colnames(measurements$raw$drivers)
+  absent <- setdiff(driver_names(simulator), present)
+  if (!length(absent)) return(invisible())
+  abort_input(c("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the measurements do not have.",
+                i = "Columns there: {.val {present}}."), call = call)
+}
+
+# Runs over rows of the raw record, all of one segment.
+simulate_rows <- function(simulator, values, raw, rows, threads, call) {
+  needed <- driver_names(simulator)
+  for (column in needed) {
+    bad <- rows[!is.finite(raw$drivers[rows, column])]
+    if (length(bad)) {
+      abort_input(c(paste("Driver {.val {column}} has {length(bad)} missing value{?s}; the first is in row {bad[1]}",
+                          "({format(raw$time[bad[1]])})."),
+                    i = paste("A simulator needs every value of what drives it: fill the gap, or remove these rows",
+                              "as a whole.")), call = call)
+    }
+  }
+  hold <- ifelse(raw$use[rows] == "warmup", raw$y[rows], NA_real_)
+  simulate_runs(simulator, values, raw$drivers[rows, needed, drop = FALSE], raw$step_h, hold, threads,
+                time = raw$time[rows], segment = raw$segment[rows[1]])
 }
 
 # Rows of the raw record averaged like the measurements; the names of the rows are those of the blocks.

@@ -46,7 +46,8 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
 #' @export
 run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE, trust = FALSE) {
-  started <- proc.time()[["elapsed"]]
+  hush(quiet)
+  started <- elapsed()
   if (!is.null(out)) check_input(checkmate::check_string(out, min.chars = 1), "out")
   if (!is.null(seed)) pick_seed(seed)
   check_threads(threads)
@@ -60,16 +61,16 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
     on.exit(release_folder(held))
     stages <- file.path(out, "stages", study$code)
   }
-  result <- if (is.null(study$models)) {
+  result <- staged(paste("study", study$study), if (is.null(study$models)) {
     upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
                   seed = seed, threads = threads, quiet = quiet, checkpoint = stages)
   } else {
     compare_models(study$models, study$measurements, study$method, runs = study$runs, control = study$control,
                    seed = seed, threads = threads, quiet = quiet, checkpoint = stages, truth = study$truth)
-  }
+  })
   result$study <- study$study
   result$title <- study$title
-  result$wall_s <- proc.time()[["elapsed"]] - started
+  result$wall_s <- elapsed() - started
   if (!is.null(out)) {
     write_study(result, out, quiet)
     remove_stages(file.path(out, "stages"))

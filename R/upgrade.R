@@ -97,7 +97,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   warn_absent_drivers(catalogue, measurements)
   say("Calibrating the base model")
-  current <- measured_model(fit_fully(simulator, "base", settings), "base", NULL, NULL, settings)
+  current <- staged("base", measured_model(fit_fully(simulator, "base", settings), "base", NULL, NULL, settings))
   report_model(current, say)
   models <- list(current)
   candidates <- NULL
@@ -122,7 +122,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
       break
     }
     ordered <- trial_order(catalogue[left], current$attribution)
-    trials <- try_mechanisms(current, catalogue[ordered], settings, say)
+    trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
     best <- which.max(trials$table$log10_bf)
     if (!length(best) || trials$table$log10_bf[best] < control$decisive || trials$table$lower95[best] <= 0) {
@@ -244,12 +244,6 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
   })
 }
 
-progress <- function(quiet, call = rlang::caller_env()) {
-  check_input(checkmate::check_flag(quiet), "quiet", call = call)
-  if (quiet) function(...) invisible() else function(text,
-                                                     .envir = parent.frame()) cli::cli_alert_info(text, .envir = .envir)
-}
-
 measured_model <- function(fit, name, parent, mechanism,
                            settings) settings$keep(list("measured", name, plain(model_of(fit))), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
@@ -280,7 +274,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
   if (is.null(settings$control$screening)) {
     return(tried_in_full(current, trials, NULL, names(trials), settings, say))
   }
-  responses <- seen_responses(current, trials, settings)
+  responses <- staged("responses of the mechanisms", seen_responses(current, trials, settings))
   if (!is.null(responses)) say("  {sum(responses$runs)} runs show what the mechanisms could explain")
   screens <- screened_mechanisms(current, trials, responses, settings, say)
   full <- contenders(lapply(screens, `[[`, "fit"), as_coarse(current$fit), settings$control)
@@ -295,11 +289,12 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
   coarse <- as_coarse(current$fit)
   screens <- list()
   screen <- function(names) {
+    turn <- turns("mechanism", length(names))
     for (name in names) {
       fits <- lapply(screens, `[[`, "fit")
       if (length(fits) && settings$spent()) next
-      screens[[name]] <<- naming_mechanism(name, screen_model(trials[[name]], trial_name(current, name), settings,
-                                                              hopeless(fits, coarse, settings$control)))
+      screens[[name]] <<- staged(turn(name), naming_mechanism(name, screen_model(
+        trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
       report_candidate(name, screens[[name]]$fit, coarse, say)
     }
   }
@@ -313,9 +308,10 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
 # list(fits, table) of the mechanisms `full` calibrated in full, and of the others as they are.
 tried_in_full <- function(current, trials, screens, full, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
+  turn <- turns("mechanism in full", length(full))
   for (name in full) {
-    fits[[name]] <- naming_mechanism(name, fit_fully(trials[[name]], trial_name(current, name), settings,
-                                                     first = screens[[name]]))
+    fits[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
+      trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
     report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
   }
   list(fits = fits, table = trial_table(fits, current, full, responses))
