@@ -45,7 +45,8 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
     mechanism("sky exchange", boundary = c("Lw", "Te"),
               edit = function(model) change_all(model, sky = "Lw", outside_emissivity = free(
                 "sky_emissivity", uniform(0, 1), "", "emissivity towards the sky")),
-              sentence = "The outer surfaces radiate to a sky that is colder than the air, which the model leaves out."),
+              sentence = paste("The outer surfaces radiate to a sky that is colder than the air, which the model",
+                               "leaves out.")),
     mechanism("wind-dependent outside convection", boundary = c("Ws", "Wd"),
               edit = function(model) {
                 share <- free("wind_film", uniform(0, 1), "", "share of wind-dependent convection")

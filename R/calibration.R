@@ -105,7 +105,8 @@ emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
   check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements", call = call)
   rows <- used_rows(measurements, "calibrate")
   if (nrow(emulator$basis$vectors) != length(rows)) {
-    abort_input(c("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have {length(rows)} calibration rows.",
+    abort_input(c(paste("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have",
+                        "{length(rows)} calibration rows."),
                   i = "Train it on runs at exactly these rows."), call = call)
   }
   check_same_rows(emulator$hours, measurements, call = call)
@@ -174,7 +175,8 @@ fit_trust <- function(fit) {
 #' @export
 print.amiss_calibration <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Calibration} on {length(x$rows)} rows of {.val {x$measurements$name}}")
-  cli::cli_text("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)}, {round(x$interval[2] / log(10), 2)}], {x$trust$verdict}")
+  cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)},",
+                      "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
   say_parameters(x, 6)
   cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
   cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
@@ -187,7 +189,8 @@ reach_words <- function(fit) {
     return(if (free > 0) "the discrepancy is free" else paste("the discrepancy's reach is held at", names(fit$reach)))
   }
   if (free >= 0.9)
-    return(sprintf("the discrepancy reaches into what the parameters can do (probability %.2f): the model is wrong where its parameters could hide it",
+    return(sprintf(paste("the discrepancy reaches into what the parameters can do (probability %.2f): the model is",
+                         "wrong where its parameters could hide it"),
                    free))
   if (free <= 0.1)
     return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))

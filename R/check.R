@@ -34,9 +34,11 @@ posterior_runs <- function(fit, n, threads) {
     fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate", threads)))
   failed <- colSums(!is.finite(runs)) > 0
   if (mean(failed) > largest_failed_share) {
-    worst <- draws[failed][1]
-    abort_numerical(c("The simulator failed at {sum(failed)} of {length(draws)} draws of the posterior, more than {100 * largest_failed_share} %.",
-                      x = "The first is run {which(failed)[1]} at {paste(colnames(fit$values), signif(fit$values[worst, ], 4), sep = ' = ', collapse = ', ')}.",
+    worst <- fit$values[draws[failed][1], ]
+    point <- paste(colnames(fit$values), signif(worst, 4), sep = " = ", collapse = ", ")
+    abort_numerical(c(paste("The simulator failed at {sum(failed)} of {length(draws)} draws of the posterior, more",
+                            "than {100 * largest_failed_share} %."),
+                      x = "The first is run {which(failed)[1]} at {point}.",
                       i = "Find out why it fails there, or narrow the priors."))
   }
   list(draws = draws[!failed], times = times[!failed], runs = runs[, !failed, drop = FALSE], failed = sum(failed))

@@ -29,7 +29,8 @@ check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
   there <- folder
   while (!file.exists(there) && there != dirname(there)) there <- dirname(there)
   if (dir.exists(there) && file.access(there, 2) == 0) return(invisible(TRUE))
-  abort_input("{.arg {name}} = {.file {folder}} cannot be used: {.file {there}} is {if (dir.exists(there)) 'not yours to write' else 'a file, not a folder'}.",
+  abort_input(paste("{.arg {name}} = {.file {folder}} cannot be used: {.file {there}} is",
+                    "{if (dir.exists(there)) 'not yours to write' else 'a file, not a folder'}."),
               call = call)
 }
 

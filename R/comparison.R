@@ -45,8 +45,9 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' house <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1)
 #' gain <- free("gain", uniform(0, 1))
 #' blind <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain, boundary = "Te")
-#' sunny <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"] + values[["sun"]] * drivers[, "Gv"],
-#'                             gain, free("sun", uniform(0, 1)), boundary = c("Te", "Gv"))
+#' sunny <- function_simulator(function(values, drivers) {
+#'   20 + values[["gain"]] * drivers[, "Te"] + values[["sun"]] * drivers[, "Gv"]
+#' }, gain, free("sun", uniform(0, 1)), boundary = c("Te", "Gv"))
 #' compare_models(list(blind = blind, sunny = sunny), house, runs = 12, seed = 1, quiet = TRUE,
 #'                control = list(calibration = list(ais = list(pilot_chains = 48, groups = 4))))
 #' @seealso [heat_loss_coefficient()], [report()], [figures]
@@ -74,7 +75,8 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   compared <- sapply(names(models), function(name) {
     say("Calibrating {.strong {name}}")
     model <- staged(turn(name), compared_model(models[[name]], name, settings))
-    say("{.strong {name}}: log10 evidence {round(model$fit$log_evidence / log(10), 1)}, RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration")
+    say(paste("{.strong {name}}: log10 evidence {round(model$fit$log_evidence / log(10), 1)}, RMSE",
+              "{signif(model$scores$calibrate[['rmse']], 3)} in calibration"))
     model
   }, simplify = FALSE)
   tables <- list(evidence = evidence_table(compared), criteria = criteria_table(compared))
@@ -245,7 +247,8 @@ doubt_sentences <- function(comparison) {
   edge <- comparison$tables$parameters[comparison$tables$parameters$at_edge, ]
   at_edge <- vapply(split(edge$label, factor(edge$model, unique(edge$model))), listed, "")
   c(of_each, if (nrow(edge)) {
-    sprintf("At the edge of what was thought possible: %s. Widen these priors, or suspect that the parameters make up for something else.",
+    sprintf(paste("At the edge of what was thought possible: %s. Widen these priors, or suspect that the parameters",
+                  "make up for something else."),
             paste0(names(at_edge), ": ", at_edge, collapse = "; "))
   })
 }
@@ -264,7 +267,8 @@ model_doubts <- function(model) {
     if (emulator$diagnostics$series_rmse > 0.5 * noise)
       sprintf("the emulator is rough (leave-one-out error %s).", beside(emulator$diagnostics$series_rmse)),
     if (!model$best$converged)
-      "the search for the least squares did not settle; its likelihood is a lower bound, and with it AIC and BIC are upper ones.")
+      paste("the search for the least squares did not settle; its likelihood is a lower bound, and with it AIC and BIC",
+            "are upper ones."))
 }
 
 evidence_sentences <- function(comparison) {
@@ -272,7 +276,8 @@ evidence_sentences <- function(comparison) {
   best <- table[which.min(table$rank), ]
   if (nrow(table) < 2) return(sprintf("log10 evidence of %s: %s [%s, %s].", best$model, signed(best$log10_evidence),
                                       signed(best$lower95), signed(best$upper95)))
-  sprintf("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s [%s, %s]; it holds %s of the probability.",
+  sprintf(paste("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s [%s, %s]; it holds %s of the",
+                "probability."),
           best$model, best$against,
           best$word, signed(best$log10_bf), signed(best$bf_lower95), signed(best$bf_upper95), percent(best$probability))
 }

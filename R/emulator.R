@@ -90,7 +90,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
     region_inputs(ensemble$region, ensemble$unit), basis, control, engine_context(1, threads))))
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   if (basis$discarded_rms > noise_sd && noise_sd > 0) {
-    warn_result(c("The basis of {ncol(basis$vectors)} vectors leaves {signif(basis$discarded_rms, 3)} of the runs unexplained (RMS), more than the noise of {signif(noise_sd, 3)}.",
+    warn_result(c(paste("The basis of {ncol(basis$vectors)} vectors leaves {signif(basis$discarded_rms, 3)} of the",
+                        "runs unexplained (RMS), more than the noise of {signif(noise_sd, 3)}."),
                   i = "What it leaves out looks like discrepancy: raise {.code max_vectors} or narrow the priors."))
   }
   selection <- trained$selection
@@ -178,7 +179,8 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
       sprintf("the basis of %d vectors leaves %s (RMS) of the runs out, more than the noise of %s", ncol(basis$vectors),
               format(signif(basis$discarded_rms, 3)), format(signif(noise_sd, 3))),
     if (max(diagnostics$coefficients$widened) > 4)
-      sprintf("its leave-one-out errors are up to %s times as large as its hyper-parameters would have them, by which its intervals are widened",
+      sprintf(paste("its leave-one-out errors are up to %s times as large as its hyper-parameters would have them, by",
+                    "which its intervals are widened"),
               format(signif(sqrt(max(diagnostics$coefficients$widened)), 2))),
     if (beyond_chance)
       sprintf("its 95 %% intervals hold only %.0f %% of the coefficients left out", 100 * diagnostics$coverage95),
@@ -189,9 +191,12 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
 #' @export
 print.amiss_emulator <- function(x, ...) on_stdout(x, {
   d <- x$diagnostics
-  cli::cli_text("{.strong Emulator} of {nrow(x$processes$inputs)} runs: {ncol(x$basis$vectors)} basis vectors explain {round(100 * x$basis$explained, 3)} %; {x$trust$verdict}")
+  cli::cli_text(paste("{.strong Emulator} of {nrow(x$processes$inputs)} runs: {ncol(x$basis$vectors)} basis vectors",
+                      "explain {round(100 * x$basis$explained, 3)} %; {x$trust$verdict}"))
   cli::cli_bullets(c("*" = "left out: {signif(x$basis$discarded_rms, 2)} RMS beside a noise of {signif(x$noise_sd, 2)}",
-                     "*" = "leave-one-out: series R2 {round(d$series_r2, 5)}, RMSE {signif(d$series_rmse, 2)}; 95 % intervals hold {round(100 * d$coverage95, 1)} % of the coefficients, {round(100 * d$series_coverage95, 1)} % of the series"))
+                     "*" = paste("leave-one-out: series R2 {round(d$series_r2, 5)}, RMSE {signif(d$series_rmse, 2)};",
+                                 "95 % intervals hold {round(100 * d$coverage95, 1)} % of the coefficients,",
+                                 "{round(100 * d$series_coverage95, 1)} % of the series")))
   if (x$control$selection == "forward") {
     own <- vapply(seq_len(ncol(x$basis$vectors)),
                   function(q) paste(x$selection$parameter[x$selection$vector == q], collapse = ", "), "")
@@ -242,7 +247,8 @@ predict.amiss_emulator <- function(object, newdata, ...) {
     prior <- object$parameters[[name]]$prior
     outside <- which(newdata[, name] < prior$lower | newdata[, name] > prior$upper)
     if (length(outside)) {
-      abort_input(c("{name} = {newdata[outside[1], name]} in row {outside[1]} of {.arg newdata} lies outside its prior, {format(prior)}.",
+      abort_input(c(paste("{name} = {newdata[outside[1], name]} in row {outside[1]} of {.arg newdata} lies outside its",
+                          "prior, {format(prior)}."),
                     i = "The emulator knows nothing there; run the simulator."))
     }
   }

@@ -30,7 +30,8 @@ figure_attribution <- function(attributions) {
     ggplot2::scale_y_continuous(NULL, breaks = seq_along(levels(table$boundary)), labels = levels(table$boundary)) +
     axis + stage_scales() +
     figure_titles(attribution_title(attributions),
-                  "Each boundary condition, present and past: how much worse the remaining error is explained without it. Per cent: its part of that error.",
+                  paste("Each boundary condition, present and past: how much worse the remaining error is explained",
+                        "without it. Per cent: its part of that error."),
                   x = "evidence lost when it is ignored (log10 Bayes factor)") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), table$label)

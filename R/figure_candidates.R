@@ -13,7 +13,8 @@ candidate_table <- function(upgrade) {
 candidates_title <- function(table, decisive) {
   if (!any(table$adopted)) {
     best <- table[which.max(table$log10_bf), ]
-    return(if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero" else "No mechanism explains the measurements decisively better than no change")
+    return(if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero"
+           else "No mechanism explains the measurements decisively better than no change")
   }
   paste0("The measurements call for ", listed(table$mechanism[table$adopted]))
 }
@@ -46,7 +47,9 @@ figure_candidates <- function(upgrade) {
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y", labeller = wrap_strips()) +
     axis +
     figure_titles(candidates_title(table, decisive),
-                  sprintf("Right of the dashed line (odds of %s to 1) a mechanism may be adopted, the best one first. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals; numbers: estimates.",
+                  sprintf(paste("Right of the dashed line (odds of %s to 1) a mechanism may be adopted, the best one",
+                                "first. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals; numbers:",
+                                "estimates."),
                           format(10^decisive, big.mark = ",")),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()

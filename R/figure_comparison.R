@@ -57,7 +57,8 @@ figure_evidence <- function(comparison) {
     ggplot2::scale_y_discrete(limits = rev, labels = function(x) wrap_labels(0.36)(told[x])) +
     model_scales() +
     figure_titles(sub(":.*", "", evidence_sentences(comparison)[1]),
-                  "How well each model predicts the record before it is seen, with the price of its freedom. Lines: 95 % intervals. 2 more: 100 times more probable.",
+                  paste("How well each model predicts the record before it is seen, with the price of its freedom.",
+                        "Lines: 95 % intervals. 2 more: 100 times more probable."),
                   x = "log10 evidence") +
     figure_theme()
   with_height(figure, 2.2 + 0.6 * nrow(table))
@@ -115,7 +116,8 @@ figure_index <- function(comparison) {
                             show.legend = FALSE) +
     ggplot2::geom_point(size = 3.2, fill = "white", stroke = 1.1) +
     figure_titles(attribution_words(comparison),
-                  "Share of the discrepancy's variance that one condition explains alone, less that of white noise; lines: 95 % highest-density intervals.",
+                  paste("Share of the discrepancy's variance that one condition explains alone, less that of white",
+                        "noise; lines: 95 % highest-density intervals."),
                   x = "variance index", y = NULL)
   with_height(figure, panel_height(comparison))
 }
@@ -155,7 +157,8 @@ figure_models_in_time <- function(comparison, use) {
                         labeller = function(strip) lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
     model_scales() +
     figure_titles(title,
-                  "Black: measured. Coloured: simulated, with the band that should hold 95 % of the measurements. At the right: root mean squared error.",
+                  paste("Black: measured. Coloured: simulated, with the band that should hold 95 % of the",
+                        "measurements. At the right: root mean squared error."),
                   x = time_label(table$time), y = axis_label(m$target, level_unit(m$unit, table$observed))) +
     time_axis(table$time) + figure_theme() + ggplot2::theme(strip.text.y = ggplot2::element_text(angle = 0))
   with_height(figure, 2 + 1.15 * length(comparison$models))
@@ -180,7 +183,8 @@ figure_discrepancies <- function(comparison) {
                         labeller = function(strip) lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
     model_scales() +
     figure_titles(title,
-                  "Grey: measured - simulated. Coloured: the discrepancy that answers to boundary conditions, with its 95 % band; at the right its root mean square.",
+                  paste("Grey: measured - simulated. Coloured: the discrepancy that answers to boundary conditions,",
+                        "with its 95 % band; at the right its root mean square."),
                   x = time_label(table$time), y = axis_label("error", m$unit)) +
     time_axis(table$time) + figure_theme() + ggplot2::theme(strip.text.y = ggplot2::element_text(angle = 0))
   with_height(figure, 2 + 1.15 * length(comparison$models))
@@ -251,7 +255,8 @@ figure_heat_loss <- function(comparison) {
     ggplot2::scale_y_discrete(NULL, limits = rev, labels = wrap_labels(0.25)) +
     model_scales() +
     figure_titles(title,
-                  paste("Shapes: the posterior, from the simulator at its draws, in the steady state and the mean wind of the calibration.",
+                  paste("Shapes: the posterior, from the simulator at its draws, in the steady state and the mean wind",
+                        "of the calibration.",
                                "Points: means.", if (!is.na(true)) "Dashed: the truth."),
                   x = "heat loss coefficient [W/K]") +
     figure_theme()

@@ -93,7 +93,8 @@ figure_missing <- function(discrepancy, most = 4) {
     figure_titles(sprintf("What the model lacks is mostly a response to %s, typically %s %s", shown[1],
                           short(size[[shown[1]]]),
                           pretty_unit(discrepancy$unit)),
-                  "How the target answers to each boundary condition, present and past, beyond what the model says. Above zero the model is too low, below it too high.",
+                  paste("How the target answers to each boundary condition, present and past, beyond what the model",
+                        "says. Above zero the model is too low, below it too high."),
                   x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +
     time_axis(table$time) + figure_theme()
   with_height(figure, 2 + 1.2 * length(shown))

@@ -37,7 +37,8 @@ figure_fit <- function(upgrade) {
                         labeller = ggplot2::labeller(panel = wrap_turned(2))) +
     stage_scales() +
     figure_titles(fit_title(upgrade),
-                  "Above, black: measured; coloured: simulated, with the band that should hold 95 % of the measurements. Below: error = measured - simulated.",
+                  paste("Above, black: measured; coloured: simulated, with the band that should hold 95 % of the",
+                        "measurements. Below: error = measured - simulated."),
                   x = time_label(table$time)) +
     time_axis(table$time) + figure_theme() + ggplot2::theme(panel.spacing.x = ggplot2::unit(30, "pt"))
   with_height(figure, 6.4)

@@ -37,7 +37,8 @@ figure_parameters <- function(fits) {
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free", labeller = wrap_strips(2)) +
     stage_scales() +
     figure_titles(parameters_title(table),
-                  "Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95 % intervals.") +
+                  paste("Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95",
+                        "% intervals.")) +
     figure_theme() +
     ggplot2::theme(panel.grid.major.y = ggplot2::element_blank(), axis.text.y = ggplot2::element_blank(),
                    strip.text = ggplot2::element_text(size = ggplot2::rel(0.87)))

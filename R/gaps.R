@@ -28,7 +28,9 @@ regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
 
 refuse_unequal <- function(steps, step, ends, name, call) {
   off <- which(!ends & abs(steps - 1) > 0.01)[1]
-  abort_input(c("Time column {.val {name}} has unequal steps: {signif(steps[off] * step, 4)} h after row {off}, while the usual step is {signif(step, 4)} h; more than {100 * stray_share} % of the rows are at no step.",
+  abort_input(c(paste("Time column {.val {name}} has unequal steps: {signif(steps[off] * step, 4)} h after row {off},",
+                      "while the usual step is {signif(step, 4)} h; more than {100 * stray_share} % of the rows are at",
+                      "no step."),
                 i = "Interpolate or average the record to equal steps; gaps and stamps that stray a little may stay."),
                 call = call)
 }
@@ -69,7 +71,8 @@ insert_lost <- function(row, hours, segment, step) {
   grid$hours[at] <- hours
   if (sum(lost)) {
     first <- row[which(lost > 0)[1]]
-    cli::cli_inform(c("{sum(lost)} lost row{?s} in {sum(lost > 0)} gap{?s} {cli::qty(sum(lost))}{?is/are} bridged, the first after row {first}.",
+    cli::cli_inform(c(paste("{sum(lost)} lost row{?s} in {sum(lost > 0)} gap{?s} {cli::qty(sum(lost))}{?is/are}",
+                            "bridged, the first after row {first}."),
                       i = "There the target is left out of the comparison; drivers are interpolated linearly."),
                     class = "amiss_message_gap")
   }
@@ -79,8 +82,10 @@ insert_lost <- function(row, hours, segment, step) {
 tell_stray <- function(hours, snapped, name) {
   far <- max(abs(hours - snapped$hours)[snapped$keep])
   left_out <- which(!snapped$keep)
-  cli::cli_inform(c("Time column {.val {name}} has unequal steps; each row is taken at the nearest of equal steps of {signif(snapped$step, 4)} h, {signif(3600 * far, 3)} s away at most.",
-                    i = if (length(left_out)) "{length(left_out)} row{?s} between two steps {?is/are} left out; the first is row {left_out[1]}."),
+  cli::cli_inform(c(paste("Time column {.val {name}} has unequal steps; each row is taken at the nearest of equal",
+                          "steps of {signif(snapped$step, 4)} h, {signif(3600 * far, 3)} s away at most."),
+                    i = if (length(left_out)) paste("{length(left_out)} row{?s} between two steps {?is/are} left out;",
+                                                    "the first is row {left_out[1]}.")),
                   class = "amiss_message_gap")
 }
 
@@ -121,6 +126,7 @@ interpolated <- function(v, gap, fill, hours, turning) {
 tell_filled <- function(name, filled, run, lasts) {
   if (!any(filled)) return(invisible())
   gaps <- length(unique(run[filled]))
-  cli::cli_inform("{sum(filled)} value{?s} of {.val {name}} in {gaps} gap{?s} of at most {signif(max(lasts[filled]), 3)} h {cli::qty(sum(filled))}{?is/are} filled by straight lines.",
+  cli::cli_inform(paste("{sum(filled)} value{?s} of {.val {name}} in {gaps} gap{?s} of at most",
+                        "{signif(max(lasts[filled]), 3)} h {cli::qty(sum(filled))}{?is/are} filled by straight lines."),
                   class = "amiss_message_gap")
 }

@@ -85,7 +85,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   drivers <- as.matrix(data[numeric_columns])
   y <- as.numeric(data[[target]])
   if (any(is.infinite(y))) {
-    abort_input(c("Target {.val {target}} has {sum(is.infinite(y))} infinite value{?s}; the first is in row {which(is.infinite(y))[1]}.",
+    abort_input(c(paste("Target {.val {target}} has {sum(is.infinite(y))} infinite value{?s}; the first is in row",
+                        "{which(is.infinite(y))[1]}."),
                   i = "Mark a missing value as NA: it is then left out."))
   }
   if (is.character(calibrate)) calibrate <- eval_rows(calibrate, data, "calibrate")
@@ -94,7 +95,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   if (is.null(calibrate)) calibrate <- !validate
   validate <- rows_flag(validate, nrow(data), "validate", default = FALSE)
   if (any(calibrate & validate)) {
-    abort_input(c("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and validate{?s/}; the first is row {which(calibrate & validate)[1]}.",
+    abort_input(c(paste("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and validate{?s/}; the first is row",
+                        "{which(calibrate & validate)[1]}."),
                   i = "Validation rows must not be seen by the calibration."))
   }
   used_for <- ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none"))
@@ -117,12 +119,14 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   x <- c(list(values = coarse$boundary), columns[c("names", "condition")])
   constant <- constant_conditions(x, coarse$use == "calibrate")
   if (length(constant)) {
-    warn_input(c("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do} not vary over the calibration rows and {?is/are} left out of the analysis.",
+    warn_input(c(paste("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do} not vary over the",
+                       "calibration rows and {?is/are} left out of the analysis."),
                  i = "A condition that is constant cannot be told from the mean."))
     x <- x_keep(x, setdiff(x$names, constant))
   }
   if (sum(coarse$use == "calibrate" & !is.na(coarse$y)) < 20) {
-    abort_input(c("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after averaging and warm-up; at least 20 are needed.",
+    abort_input(c(paste("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after",
+                        "averaging and warm-up; at least 20 are needed."),
                   i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
   }
   noise <- noise_level(noise_sd, coarse, raw$y)
@@ -177,7 +181,8 @@ tell_gaps <- function(hours, segment, used_for, row) {
   inside <- gaps[used_for[gaps] == used_for[gaps + 1]]
   tell <- function(rows, say) {
     if (!length(rows)) return(invisible())
-    say(c("The record has {length(rows)} gap{?s} {where}: the first is of {round(diff(hours)[rows[1]], 1)} h after row {row[rows[1]]}.",
+    say(c(paste("The record has {length(rows)} gap{?s} {where}: the first is of {round(diff(hours)[rows[1]], 1)} h",
+                "after row {row[rows[1]]}."),
           i = "Each part is simulated on its own, with its own warm-up."))
   }
   where <- "within the rows of one use"
@@ -192,8 +197,10 @@ require_complete <- function(drivers, analysed, time, row = seq_along(time), cal
   for (column in analysed) {
     bad <- which(!is.finite(drivers[, column]) & !is.na(row))
     if (length(bad)) {
-      abort_input(c("Boundary condition {.val {column}} has {length(bad)} missing or infinite value{?s}; the first is in row {row[bad[1]]} ({format(time[bad[1]])}).",
-                    i = "A simulator needs every value of what drives it: fill short gaps by {.arg fill_gaps} of {.fun measurements}, or remove these rows as a whole."),
+      abort_input(c(paste("Boundary condition {.val {column}} has {length(bad)} missing or infinite value{?s}; the",
+                          "first is in row {row[bad[1]]} ({format(time[bad[1]])})."),
+                    i = paste("A simulator needs every value of what drives it: fill short gaps by {.arg fill_gaps} of",
+                              "{.fun measurements}, or remove these rows as a whole.")),
                     call = call)
     }
   }
@@ -205,7 +212,8 @@ eval_rows <- function(text, data, what, call = rlang::caller_env()) {
   rows <- tryCatch(eval(str2lang(text), data, baseenv()),
                    error = function(e) abort_input(
                      c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
-                                                     i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."),
+                                                     i = paste("Write an expression in the columns, for example",
+                                                               "{.code phase == \"rolbs\"}.")),
                                                      call = call))
   rows
 }
@@ -284,20 +292,27 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
     return(list(sd = as.numeric(noise_sd), method = "given"))
   }
   if (!is.null(noise_sd) && !inherits(noise_sd, "amiss_bootstrap_noise")) {
-    abort_input(c("{.arg noise_sd} is neither a number nor a way to estimate one; got {.cls {class(noise_sd)}}{if (is.character(noise_sd)) paste0(' ', dQuote(noise_sd[1], FALSE))}.",
+    quoted <- if (is.character(noise_sd)) paste0(" ", dQuote(noise_sd[1], FALSE))
+    abort_input(c(paste("{.arg noise_sd} is neither a number nor a way to estimate one; got",
+                        "{.cls {class(noise_sd)}}{quoted}."),
                   i = "Give a number, {.val bootstrap} or {.fun bootstrap_noise}."), call = call)
   }
   needed <- if (is.null(noise_sd) || noise_sd$detrend) 3 else 2
   if (coarse$per_step < needed) {
-    abort_input(c("{.arg noise_sd} is needed as a number: {if (coarse$per_step == 1) 'the data are not averaged' else paste('an average is of', coarse$per_step, 'readings only')}, so that their scatter within a step is unknown.",
-                  i = "Give the standard deviation of the measurement error in the target's unit, or an {.arg average} over at least {needed} readings."),
+    few <- if (coarse$per_step == 1) "the data are not averaged"
+           else paste("an average is of", coarse$per_step, "readings only")
+    abort_input(c(paste("{.arg noise_sd} is needed as a number: {few}, so that their scatter within a step is",
+                        "unknown."),
+                  i = paste("Give the standard deviation of the measurement error in the target's unit, or an",
+                            "{.arg average} over at least {needed} readings.")),
                   call = call)
   }
   noise <- if (is.null(noise_sd)) list(method = "standard error",
                                        per_step = coarse$standard_error) else bootstrap_averages(y, coarse, noise_sd)
   sd <- sqrt(mean(noise$per_step[coarse$use == "calibrate"]^2, na.rm = TRUE))
   if (!is.finite(sd) || sd <= 0) {
-    abort_input(c("The readings do not scatter within the averages ({noise$method}: {signif(sd, 3)}), so that {.arg noise_sd} cannot be estimated from them.",
+    abort_input(c(paste("The readings do not scatter within the averages ({noise$method}: {signif(sd, 3)}), so that",
+                        "{.arg noise_sd} cannot be estimated from them."),
                   i = "Give the standard deviation of the measurement error."), call = call)
   }
   c(list(sd = sd), noise)
@@ -321,8 +336,10 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 #' @param seed Seed of the draws.
 #' @return An object of class `amiss_bootstrap_noise`.
 #' @examples
-#' table <- data.frame(hour = seq(0.1, 24, 0.1), Te = 5 + sin(1:240 / 20), Ti = 20 + sin(1:240 / 20) + 0.1 * sin(61 * (1:240)^2))
-#' measurements(table, time = "hour", target = "Ti", boundary = ~Te, average = 1, noise_sd = bootstrap_noise(detrend = TRUE))
+#' table <- data.frame(hour = seq(0.1, 24, 0.1), Te = 5 + sin(1:240 / 20))
+#' table$Ti <- 20 + sin(1:240 / 20) + 0.1 * sin(61 * (1:240)^2)
+#' measurements(table, time = "hour", target = "Ti", boundary = ~Te, average = 1,
+#'              noise_sd = bootstrap_noise(detrend = TRUE))
 #' @source Efron (1979), Bootstrap methods: another look at the jackknife, Annals of Statistics 7, 1-26; for averages of
 #'   raw data in this method: Monari (2022). Residuals: Davison and Hinkley (1997), Bootstrap methods and their
 #'   application.
@@ -365,7 +382,8 @@ segment_starts <- function(measurements, rows) {
 #' @export
 print.amiss_measurements <- function(x, ...) on_stdout(x, {
   n <- table(factor(x$use, c("calibrate", "validate", "warmup")))
-  cli::cli_text("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in {length(unique(x$segment))} segment{?s}")
+  cli::cli_text(paste("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in",
+                      "{length(unique(x$segment))} segment{?s}"))
   origin <- switch(x$noise$method, given = "",
                    `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
                    sprintf(" (%s, %d an average, %d times)", x$noise$method, x$noise$readings, x$noise$replicates))

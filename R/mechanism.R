@@ -80,7 +80,8 @@ extend <- function(simulator, mechanism, adopted = character(), call = rlang::ca
   }
   lost <- setdiff(adopted, names(free_parameters(extended)))
   if (length(lost)) {
-    abort_input(c("Mechanism {.val {mechanism$name}} drops {cli::qty(lost)}the parameter{?s} {.val {lost}} of a mechanism that was adopted before.",
+    abort_input(c(paste("Mechanism {.val {mechanism$name}} drops {cli::qty(lost)}the parameter{?s} {.val {lost}} of a",
+                        "mechanism that was adopted before."),
                   i = "Let its {.code edit} extend the model that it is given, instead of making it anew."),
                   call = call)
   }
@@ -97,7 +98,8 @@ warn_absent_drivers <- function(catalogue, measurements) {
   for (entry in catalogue) {
     absent <- setdiff(entry$boundary, measurements$conditions)
     if (!length(absent)) next
-    warn_input(c("Mechanism {.val {entry$name}} is driven by {.val {absent}}, which {?is/are} not among the boundary conditions analysed ({.val {measurements$conditions}}).",
+    warn_input(c(paste("Mechanism {.val {entry$name}} is driven by {.val {absent}}, which {?is/are} not among the",
+                       "boundary conditions analysed ({.val {measurements$conditions}})."),
                  i = paste("{cli::qty(absent)}Name {?it/them} in {.arg boundary} of {.fun measurements},",
                            "so that the discrepancy can answer to {?it/them}.")))
   }

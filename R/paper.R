@@ -139,7 +139,9 @@ index_table <- function(index, conditions) {
 print.amiss_paper_calibration <- function(x, ...) on_stdout(x, {
   ten <- log(10)
   cli::cli_text("{.strong Calibration as in the paper} on {length(x$rows)} rows of {.val {x$measurements$name}}")
-  cli::cli_text("log10 evidence {round(x$log_evidence / ten, 2)} [{round(x$interval[1] / ten, 2)}, {round(x$interval[2] / ten, 2)}] = {round(x$evidence$log_evidence[1] / ten, 2)} (5) + {round(x$evidence$log_evidence[2] / ten, 2)} (6), {x$trust$verdict}")
+  cli::cli_text(paste("log10 evidence {round(x$log_evidence / ten, 2)} [{round(x$interval[1] / ten, 2)},",
+                      "{round(x$interval[2] / ten, 2)}] = {round(x$evidence$log_evidence[1] / ten, 2)} (5) +",
+                      "{round(x$evidence$log_evidence[2] / ten, 2)} (6), {x$trust$verdict}"))
   say_parameters(x, 3)
   cli::cli_text("variance index of the boundary conditions over that of white noise")
   say_table(utils::head(x$index, 4))

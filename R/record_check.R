@@ -22,8 +22,8 @@ check_record <- function(data, time, target, terms, name, unit, call = rlang::ca
 check_target_values <- function(y, target, call = rlang::caller_env()) {
   coded <- which(y %in% missing_codes)
   if (length(coded)) {
-    abort_input(c(paste("Target {.val {target}} is {y[coded[1]]} in {length(coded)} row{?s}, the first {coded[1]}: a code",
-                        "for what is missing."),
+    abort_input(c(paste("Target {.val {target}} is {y[coded[1]]} in {length(coded)} row{?s}, the first {coded[1]}: a",
+                        "code for what is missing."),
                   i = "Mark a missing value as NA: it is then left out."), call = call)
   }
 }

@@ -34,7 +34,8 @@ remainder_pattern <- function(r, rows, measurements) {
                       round(60 * (hour %% 1)),
                       measurements$target, short(abs(profile[[peak]])), unit,
                       if (profile[[peak]] > 0) "higher" else "lower"),
-       where = "Look for something that follows the clock and is not among the inputs: a heat gain, a schedule, a door.")
+       where = paste("Look for something that follows the clock and is not among the inputs: a heat gain, a schedule,",
+                     "a door."))
 }
 
 # Hour of the day as the record's own clock shows it.

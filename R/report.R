@@ -27,8 +27,10 @@
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
 #' gain <- free("gain", uniform(0, 1))
-#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain, boundary = "Te")
-#' bent <- function_simulator(function(values, drivers) 20 + values[["gain"]]^2 * drivers[, "Te"], gain, boundary = "Te")
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain,
+#'                              boundary = "Te")
+#' bent <- function_simulator(function(values, drivers) 20 + values[["gain"]]^2 * drivers[, "Te"], gain,
+#'                            boundary = "Te")
 #' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # a coarse sampler, for speed
 #' comparison <- compare_models(list(linear = linear, bent = bent), room, runs = 20, control = quick, seed = 1,
 #'                              quiet = TRUE)

@@ -26,7 +26,8 @@
 #' @export
 summary.amiss_comparison <- function(object, ...) {
   no_doubt <-
-    "The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no parameter is at the edge of its range."
+    paste("The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no",
+          "parameter is at the edge of its range.")
   structure(list(title = object$title %||% object$study %||% object$measurements$name,
                  headline = comparison_headline(object),
                  evidence = c(evidence_sentences(object), probability_sentences(object)),
@@ -87,8 +88,8 @@ practice_sentences <- function(comparison) {
   noted <- criteria[nzchar(criteria$lr_note) & !is.na(criteria$nested), ]
   c(if (!length(disagreements(comparison))) "Every criterion chooses the model that the evidence chooses.", disagree,
     if (nrow(correlated)) {
-      sprintf(paste("Likelihood, AIC, BIC and the likelihood ratio count errors as independent; those of %s are correlated from one",
-                    "step to the next (%s), so that these criteria overstate every difference."),
+      sprintf(paste("Likelihood, AIC, BIC and the likelihood ratio count errors as independent; those of %s are",
+                    "correlated from one step to the next (%s), so that these criteria overstate every difference."),
               listed(correlated$model), listed(sprintf("%.2f", correlated$autocorrelation)))
     },
     if (nrow(noted)) sprintf("Likelihood ratio of %s against %s: %s.", noted$model, noted$nested, noted$lr_note))

@@ -89,7 +89,8 @@ open_verdict <- function(upgrade) {
   }
   remainder <- remaining_error(base, upgrade$measurements)
   if (remainder$large) {
-    return(unexplained(sprintf("Something is missing from the model that no mechanism of the catalogue explains: its error is %s times the stated noise; %s.",
+    return(unexplained(sprintf(paste("Something is missing from the model that no mechanism of the catalogue explains:",
+                                     "its error is %s times the stated noise; %s."),
                                short(remainder$ratio),
                                remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
   }
@@ -99,7 +100,8 @@ open_verdict <- function(upgrade) {
                                   base$fit$trust$verdict, ".")))
   }
   list(verdict = "nothing", tag = "Nothing decisive",
-       headline = "Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no boundary condition.")
+       headline = paste("Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no",
+                        "boundary condition."))
 }
 
 # The sentences of all mechanisms adopted, each as firmly as its verdict allows.
@@ -154,7 +156,8 @@ sure_sentences <- function(upgrade) {
   trials <- first_trials(upgrade)
   best <- trials[1, ]
   needed <-
-    sprintf("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no doubt who gains.",
+    sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no",
+                  "doubt who gains."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted_models(upgrade))) {
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
@@ -207,7 +210,8 @@ size_note <- function(upgrade) {
   if (length(seen) < 2) return(sprintf("The model's typical error is %s %s; %s.", short(seen), unit, noise))
   change <- if (length(upgrade$models) > 2) "changes" else "change"
   if (!improves_held_out(upgrade)) {
-    return(sprintf("The %s not improve predictions of data the model has not seen (typical error %s %s before, %s after; %s). Take it as a hint, not as a repair.",
+    return(sprintf(paste("The %s not improve predictions of data the model has not seen (typical error %s %s before,",
+                         "%s after; %s). Take it as a hint, not as a repair."),
                    if (length(upgrade$models) > 2) "changes do" else "change does", short(held[1]), unit,
                    short(held[2]), noise))
   }
@@ -336,7 +340,8 @@ remaining_sentences <- function(upgrade) {
     reach_sentence(upgrade$models[[length(upgrade$models)]]$fit),
     vapply(group_words(upgrade$models[[length(upgrade$models)]]$attribution), paste0, "", "."),
     if (length(edge))
-      sprintf("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these parameters make up for something else.",
+      sprintf(paste("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these",
+                    "parameters make up for something else."),
               listed(edge))
     else "No parameter is at the edge of its range.",
     sprintf("The search stopped because %s%s.",
@@ -348,7 +353,8 @@ remaining_sentences <- function(upgrade) {
 reach_sentence <- function(fit) {
   free <- sum(fit$reach[is.infinite(fit$control$reach)])
   if (length(fit$reach) > 1 && free > 0.9)
-    "What remains reaches into what the parameters can do: they may hide a part of it, so do not read their values as physical."
+    paste("What remains reaches into what the parameters can do: they may hide a part of it, so do not read their",
+          "values as physical.")
 }
 
 scores_table <- function(upgrade) {

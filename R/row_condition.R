@@ -19,7 +19,8 @@ row_condition <- function(text, data, what, call = rlang::caller_env()) {
   refuse <- function(part, why) {
     part <- paste(deparse(part), collapse = " ")
     abort_input(c("{.arg {what}} = {.val {text}} cannot be used: {.code {part}} {why}.",
-                  i = "A condition may hold columns, numbers, texts in quotes, {.code c()} after {.code %in%} and {.code {names(row_operators)}}."),
+                  i = paste("A condition may hold columns, numbers, texts in quotes, {.code c()} after {.code %in%}",
+                            "and {.code {names(row_operators)}}.")),
                 call = call)
   }
   rows <- tryCatch(suppressWarnings(row_value(parsed[[1]], data, refuse)), error = function(e) {

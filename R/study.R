@@ -123,7 +123,8 @@ check_study_fields <- function(study, path, call = rlang::caller_env()) {
   foreign <- intersect(names(study), if (compares) study_fields$upgrade else study_fields$comparison)
   if (length(foreign)) {
     partner <- if (compares) "catalogue" else "models"
-    abort_input(c("The study file {.file {path}} has {cli::qty(foreign)}field{?s} {.field {foreign}}, which {?goes/go} with {.field {partner}} only.",
+    abort_input(c(paste("The study file {.file {path}} has {cli::qty(foreign)}field{?s} {.field {foreign}}, which",
+                        "{?goes/go} with {.field {partner}} only."),
                   i = "Name either {.field model} and {.field catalogue}, or {.field models}."), call = call)
   }
   absent <- setdiff(c(study_fields$needed, if (!compares) study_fields$upgrade), names(study))

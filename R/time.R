@@ -25,7 +25,8 @@ check_time_options <- function(format, zone, call) {
   check_input(checkmate::check_string(zone, null.ok = TRUE), "time_zone", call = call)
   if (!is.null(zone) && !zone %in% OlsonNames()) {
     abort_input(c("{.arg time_zone} = {.val {zone}} is not known.",
-                  i = "Give {.val UTC} or a name such as {.val Europe/Berlin} ({.fun OlsonNames} lists them); for one hour ahead of UTC all year {.val Etc/GMT-1}, with that sign."),
+                  i = paste("Give {.val UTC} or a name such as {.val Europe/Berlin} ({.fun OlsonNames} lists them);",
+                            "for one hour ahead of UTC all year {.val Etc/GMT-1}, with that sign.")),
                   call = call)
   }
 }
@@ -59,7 +60,8 @@ parse_numbers <- function(numbers, name, format, zone, call) {
   if (!is.null(format) && !format %in% c(names(time_units), "unix")) {
     abort_input(
       c("Time column {.val {name}} holds numbers, which {.arg time_format} = {.val {format}} does not go with.",
-                  i = "For numbers it is one of {.val {c(names(time_units), 'unix')}}, or a format of {.fun strptime} such as {.val %Y%m%d%H}."),
+                  i = paste("For numbers it is one of {.val {c(names(time_units), 'unix')}}, or a format of",
+                            "{.fun strptime} such as {.val %Y%m%d%H}.")),
                 call = call)
   }
   if (is.null(format)) format <- number_format(numbers, name, zone, call)
@@ -71,13 +73,15 @@ number_format <- function(numbers, name, zone, call) {
   if (size < 1e8) return("hours")
   first <- numbers[is.finite(numbers)][1]
   if (!(size < 1e10 || size >= 1e12 && size < 1e13)) {
-    abort_input(c("Time column {.val {name}} holds numbers that are neither hours nor Unix time, such as {format(first, scientific = FALSE)}.",
+    abort_input(c(paste("Time column {.val {name}} holds numbers that are neither hours nor Unix time, such as",
+                        "{format(first, scientific = FALSE)}."),
                   i = "Say by {.arg time_format} what they are, for example {.val %Y%m%d%H%M}."), call = call)
   }
   shown <- format(on_clock(unix_time(first), zone %||% "UTC"), "%Y-%m-%d %H:%M:%S %Z")
   cli::cli_inform(
     c("Time column {.val {name}} is read as Unix time, from {shown}: its numbers are too large for hours.",
-                    i = "{.code time_format = \"unix\"} settles it; digits of a date need a format such as {.val %Y%m%d%H}."),
+                    i = paste("{.code time_format = \"unix\"} settles it; digits of a date need a format such as",
+                              "{.val %Y%m%d%H}.")),
                   class = "amiss_message_time")
   "unix"
 }
@@ -97,7 +101,8 @@ require_read <- function(unread, text, name, call) {
   bad <- which(unread & !is.na(text))
   if (!length(bad)) return(invisible())
   abort_input(c("Time column {.val {name}} cannot be read: row {bad[1]} holds {.val {text[bad[1]]}}.",
-                i = "Use ISO 8601, for example 2013-08-30T00:10:00, or say by {.arg time_format} what it is, for example {.val %d.%m.%Y %H:%M}."),
+                i = paste("Use ISO 8601, for example 2013-08-30T00:10:00, or say by {.arg time_format} what it is, for",
+                          "example {.val %d.%m.%Y %H:%M}.")),
               call = call)
 }
 
@@ -135,7 +140,8 @@ stamps_time <- function(text, name, format, zone, call) {
   without <- is.na(offset) & !is.na(text)
   if (!any(without)) return(on_clock(utc(seconds - offset), zone %||% "UTC"))
   if (!all(is.na(offset))) {
-    abort_input(c("Time column {.val {name}}: some rows state their offset from UTC and others do not; the first without is row {which(without)[1]}, {.val {text[without][1]}}.",
+    abort_input(c(paste("Time column {.val {name}}: some rows state their offset from UTC and others do not; the first",
+                        "without is row {which(without)[1]}, {.val {text[without][1]}}."),
                   i = "State it in all rows or in none."), call = call)
   }
   local_time(seconds, text, name, zone, call)
@@ -186,7 +192,9 @@ ordered_date <- function(parts, name, format, call) {
   if (all(possible)) possible <- vapply(days, function(d) all(diff(d[given]) %in% 0:1), NA)
   if (sum(possible) == 1) return(if (possible[1]) as_dmy else as_mdy)
   first <- which(given)[1]
-  abort_input(c("Time column {.val {name}}: whether the day or the month comes first in {.val {paste0(parts[first, 1], parts[first, 2], parts[first, 3], parts[first, 2], parts[first, 4])}} (row {first}) cannot be told from the column.",
+  date <- paste(parts[first, c(1, 2, 3, 2, 4)], collapse = "")
+  abort_input(c(paste("Time column {.val {name}}: whether the day or the month comes first in {.val {date}}",
+                      "(row {first}) cannot be told from the column."),
                 i = "Say {.code time_format = \"dmy\"} (day first) or {.code time_format = \"mdy\"}."), call = call)
 }
 
@@ -210,8 +218,10 @@ local_time <- function(local, text, name, zone, call) {
   if (length(absent)) {
     hours <- both$offset[absent[1]] / 3600
     winter <- if (hours == round(hours)) sprintf("Etc/GMT%+d", -as.integer(hours)) else "UTC"
-    abort_input(c("Time column {.val {name}}: row {absent[1]} holds {.val {text[absent[1]]}}, which the clocks of {.val {zone}} leave out when daylight saving begins.",
-                  i = "If the record's clock was not changed, give the zone that it stayed in, such as {.code time_zone = \"{winter}\"}."),
+    abort_input(c(paste("Time column {.val {name}}: row {absent[1]} holds {.val {text[absent[1]]}}, which the clocks",
+                        "of {.val {zone}} leave out when daylight saving begins."),
+                  i = paste("If the record's clock was not changed, give the zone that it stayed in, such as",
+                            "{.code time_zone = \"{winter}\"}.")),
                   call = call)
   }
   on_clock(utc(repeated_hours(local, both, text, name, zone, call)), zone)
@@ -237,7 +247,9 @@ repeated_hours <- function(local, both, text, name, zone, call) {
   for (part in split(rows, cumsum(c(TRUE, diff(rows) > 1 | diff(local[rows]) > 86400))[seq_along(rows)])) {
     back <- which(diff(local[part]) <= 0)
     if (length(back) > 1) {
-      abort_input(c("Time column {.val {name}} goes back more than once in the hour that {.val {zone}} has twice when daylight saving ends; again in row {part[back[2] + 1]}, {.val {text[part[back[2] + 1]]}}.",
+      abort_input(c(paste("Time column {.val {name}} goes back more than once in the hour that {.val {zone}} has twice",
+                          "when daylight saving ends; again in row {part[back[2] + 1]},",
+                          "{.val {text[part[back[2] + 1]]}}."),
                     i = "Sort the rows as they were measured, or give time in UTC."), call = call)
     }
     second <- if (length(back)) part[seq_along(part) > back] else {
@@ -270,8 +282,12 @@ require_even_clock <- function(local, text, name, call) {
   if (!any(explained)) return(invisible())
   row <- jumps[rowSums(explained) > 0][1]
   likely <- colnames(explained)[colSums(explained) == max(colSums(explained))]
-  abort_input(c("Time column {.val {name}} states no zone, and from row {row} to {row + 1} ({.val {text[row]}} to {.val {text[row + 1]}}) it steps as clocks do where daylight saving {if (steps[row] > step) 'begins' else 'ends'}.",
-                i = "If it is local, give its zone, such as {.code time_zone = \"{likely[1]}\"}{if (length(likely) > 1) paste0(' (or that of ', paste(likely[-1], collapse = ', '), ')')}; if it is not, {.code time_zone = \"UTC\"}."),
+  others <- if (length(likely) > 1) paste0(" (or that of ", paste(likely[-1], collapse = ", "), ")")
+  abort_input(c(paste("Time column {.val {name}} states no zone, and from row {row} to {row + 1} ({.val {text[row]}}",
+                      "to {.val {text[row + 1]}}) it steps as clocks do where daylight saving",
+                      "{if (steps[row] > step) 'begins' else 'ends'}."),
+                i = paste("If it is local, give its zone, such as {.code time_zone = \"{likely[1]}\"}{others}; if it",
+                          "is not, {.code time_zone = \"UTC\"}.")),
               call = call)
 }
 
@@ -280,18 +296,22 @@ check_time <- function(time, values, name, call) {
   if (any(is.infinite(hours)))
     abort_input("Time column {.val {name}} has an infinite value in row {which(is.infinite(hours))[1]}.", call = call)
   if (anyNA(hours)) {
-    abort_input(c("Time column {.val {name}} has {sum(is.na(hours))} missing value{?s}; the first is in row {which(is.na(hours))[1]}.",
+    abort_input(c(paste("Time column {.val {name}} has {sum(is.na(hours))} missing value{?s}; the first is in row",
+                        "{which(is.na(hours))[1]}."),
                   i = "Every row needs its time; delete rows without one."), call = call)
   }
   twice <- which(duplicated(hours))
   if (length(twice)) {
-    abort_input(c("Time column {.val {name}} has {length(twice)} duplicated time stamp{?s}; the first is {.val {format(values[twice[1]])}} in row {twice[1]}.",
-                  i = "Keep one row for each time. The end of daylight saving does this to local time: give its text and {.arg time_zone}, or UTC."),
+    abort_input(c(paste("Time column {.val {name}} has {length(twice)} duplicated time stamp{?s}; the first is",
+                        "{.val {format(values[twice[1]])}} in row {twice[1]}."),
+                  i = paste("Keep one row for each time. The end of daylight saving does this to local time: give its",
+                            "text and {.arg time_zone}, or UTC.")),
                 call = call)
   }
   back <- which(diff(hours) < 0)
   if (length(back)) {
-    abort_input(c("Time column {.val {name}} goes back in row {back[1] + 1}: {.val {format(values[back[1] + 1])}} after {.val {format(values[back[1]])}}.",
+    abort_input(c(paste("Time column {.val {name}} goes back in row {back[1] + 1}:",
+                        "{.val {format(values[back[1] + 1])}} after {.val {format(values[back[1]])}}."),
                   i = "Sort the rows by time."), call = call)
   }
 }

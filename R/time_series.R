@@ -37,6 +37,7 @@ ts_unit <- function(data, call) {
   values <- stats::frequency(data)
   if (values %% 24 == 0 && values <= 1440) return("days")
   abort_input(c("{.arg data} is a {.cls ts} of frequency {values}, which does not say what its time counts.",
-                i = "Say it by {.arg time_format}, one of {.val {names(time_units)}}, or make it a data frame with a time column."),
+                i = paste("Say it by {.arg time_format}, one of {.val {names(time_units)}}, or make it a data frame",
+                          "with a time column.")),
               call = call)
 }

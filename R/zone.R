@@ -46,8 +46,8 @@
 #' @details One opening alone exchanges nothing: use two at different heights or facades.
 #' @examples
 #' zone(
-#'   zone_wall("facade", area = 12, zone_layer(0.02, 0.8, 1.4e6), zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5),
-#'        outside = "Te", sun = "Gv"),
+#'   zone_wall("facade", area = 12, zone_layer(0.02, 0.8, 1.4e6),
+#'             zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5), outside = "Te", sun = "Gv"),
 #'   zone_window("window", area = 2, outside = "Te", sun = "Gv"),
 #'   zone_heater("heater", power = "P"),
 #'   volume = 40)
