@@ -20,7 +20,8 @@ rank_figure <- function(parts, rows, file) {
     ggplot2::scale_y_continuous(expand = ggplot2::expansion(c(0, 0.18))) +
     ggplot2::labs(x = sprintf("rank of the true value among %d draws from its posterior", sbc_draws), y = "records",
                   title = sprintf("Simulation-based calibration: %d records from the prior", n),
-                  subtitle = "Uniform ranks: the posterior is right. The grey band holds 95 % of the counts of uniform ranks; p-values before Holm's adjustment.") +
+                  subtitle = paste("Uniform ranks: the posterior is right. The grey band holds 95 % of the counts of",
+                                   "uniform ranks; p-values before Holm's adjustment.")) +
     ggplot2::theme_minimal(base_size = 9) +
     ggplot2::theme(panel.grid.minor = ggplot2::element_blank(), plot.title.position = "plot")
   ggplot2::ggsave(file, plot, width = 11, height = 1.4 * ceiling(length(panel) / 6) + 1.2, dpi = 110, bg = "white")

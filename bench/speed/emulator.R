@@ -58,7 +58,8 @@ figure <- ggplot2::ggplot(drawn, ggplot2::aes(.data$seconds, .data$error, colour
   ggplot2::scale_y_log10("error at held-out points over the standard deviation", labels = plain) +
   ggplot2::scale_colour_manual(values = c("FALSE" = "grey35", "TRUE" = "#08519C"), guide = "none") +
   ggplot2::labs(title = "Emulators of the borehole function",
-                subtitle = "Medians of ten designs of 200 runs and three of 500; down and to the left is better. Nugget: gauss with an estimated one.") +
+                subtitle = paste("Medians of ten designs of 200 runs and three of 500; down and to the left is better.",
+                                 "Nugget: gauss with an estimated one.")) +
   ggplot2::theme_minimal(base_size = 13) +
   ggplot2::theme(plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(),
                  panel.spacing = ggplot2::unit(2, "lines"))

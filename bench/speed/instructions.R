@@ -10,7 +10,8 @@ installed <- function(variant) {
 whole <- 'suppressPackageStartupMessages(library(amiss))
   study <- read_study(system.file("studies", "paper_synthetic.yml", package = "amiss"))
   cat(system.time({
-    emulator <- train_emulator(simulate_design(study$models[["M3"]], study$measurements, 300, seed = 1), study$measurements)
+    runs <- simulate_design(study$models[["M3"]], study$measurements, 300, seed = 1)
+    emulator <- train_emulator(runs, study$measurements)
     fit <- calibrate(emulator, study$measurements, seed = 1)
   })[["elapsed"]])'
 seconds <- function(library, simd = "", preload = "") {
