@@ -11,6 +11,8 @@
 #' `quiet = TRUE`. It can be interrupted: the session goes on, and [upgrade_model()], [compare_models()] and
 #' [run_study()] go on from their `checkpoint` or folder.
 #'
+#' Words that choose something (`method = "history"`) and names of options and columns are case-sensitive.
+#'
 #' @section Options:
 #' * `amiss.progress`: `"bar"`, `"lines"` or `"none"` for progress as at a terminal, as in a log, or none, wherever the
 #'   session runs.
