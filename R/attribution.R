@@ -10,8 +10,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' (1993), whose least p-value does not grow with the number of conditions.
 #'
 #' *What the p-value assumes.* A shifted record stands for another one of the same weather, so the conditions are taken
-#' as stationary over the record, in mean, variance and autocorrelation. Of a condition that only rises or falls no shift
-#' is alike; nothing checks that.
+#' as stationary over the record, in mean, variance and autocorrelation. Of a condition that only rises or falls no
+#' shift is alike; nothing checks that.
 #'
 #' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those
 #' that can be dropped alone the smallest set is sought that cannot be dropped together. Such a group is tested like a

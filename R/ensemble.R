@@ -75,7 +75,8 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
                   i = "Run the simulator at draws of {.code fit$values} and give all runs to {.fun ensemble}."))
   }
   if (!identical(names(ensemble$parameters), names(fit$emulator$parameters))) {
-    abort_input("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the ensemble {.val {names(ensemble$parameters)}}.")
+    abort_input(paste("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the ensemble",
+                      "{.val {names(ensemble$parameters)}}."))
   }
   if (nrow(ensemble$outputs) != length(fit$rows)) {
     abort_input(
@@ -191,7 +192,8 @@ check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
 check_all_finite <- function(x, name, call = rlang::caller_env()) {
   bad <- which(!is.finite(x), arr.ind = TRUE)
   if (!nrow(bad)) return(invisible())
-  abort_input("{.arg {name}} is {x[bad[1, 1], bad[1, 2]]} in row {bad[1, 1]} of column {.val {colnames(x)[bad[1, 2]]}}; finite numbers are needed.",
+  abort_input(paste("{.arg {name}} is {x[bad[1, 1], bad[1, 2]]} in row {bad[1, 1]} of column",
+                    "{.val {colnames(x)[bad[1, 2]]}}; finite numbers are needed."),
               call = call)
 }
 
@@ -213,7 +215,8 @@ places_in_priors <- function(values, parameters, call = rlang::caller_env()) {
     prior <- parameters[[name]]$prior
     outside <- which(values[, name] < prior$lower | values[, name] > prior$upper)
     if (length(outside) == nrow(values)) {
-      abort_input(c("No run lies where the prior of {.val {name}} has mass: {format(prior)}, while the runs span {signif(min(values[, name]), 4)} to {signif(max(values[, name]), 4)}.",
+      abort_input(c(paste("No run lies where the prior of {.val {name}} has mass: {format(prior)}, while the runs span",
+                          "{signif(min(values[, name]), 4)} to {signif(max(values[, name]), 4)}."),
                     i = "Correct the prior or make runs inside it."), call = call)
     }
     if (length(outside)) {
@@ -278,9 +281,10 @@ runs_by_count <- function(outputs, validation, measurements, call) {
   kinds <- list(rows$calibration, sort(c(rows$calibration, rows$validation)), rows$record)
   kind <- match(nrow(outputs), lengths(kinds))
   if (is.na(kind)) {
+    readings <- if (m$per_step > 1) paste0(", and ", length(m$raw$hours), " before they were averaged") else ""
     abort_input(c(paste("The runs have {nrow(outputs)} rows; the measurements have {length(rows$calibration)}",
                         "calibration and {length(rows$validation)} validation rows, of {length(m$y)} in",
-                        "all{if (m$per_step > 1) paste0(', and ', length(m$raw$hours), ' before they were averaged') else ''}."),
+                        "all{readings}."),
                   i = paste("Give the runs at the calibration rows, at both, or at all; or the {.arg time} of each",
                             "row.")), call = call)
   }
@@ -336,7 +340,9 @@ check_covered <- function(name, prior, values, unit, call = rlang::caller_env())
   check_varies(name, values, call)
   share <- diff(range(unit))
   if (share < 0.05) {
-    abort_input(c("The runs lie where the prior of {.val {name}} has next to no mass: {format(prior)} has {signif(100 * share, 2)} % of it between {signif(min(values), 4)} and {signif(max(values), 4)}.",
+    abort_input(c(paste("The runs lie where the prior of {.val {name}} has next to no mass: {format(prior)} has",
+                        "{signif(100 * share, 2)} % of it between {signif(min(values), 4)} and",
+                        "{signif(max(values), 4)}."),
                   i = "Correct the prior or make runs where its mass is."), call = call)
   }
 }
@@ -363,7 +369,8 @@ check_enough_runs <- function(runs, parameters, of = runs, call = rlang::caller_
       "{runs} run{?s} {?is/are} too few for {parameters} parameter{?s}; at least {max(5, parameters + 2)} are needed.",
                   i = "Ten times the number of parameters is a good start.",
                   if (of != runs)
-                    c(i = "Of the {of} runs asked for, {runs} fill the space of the parameters; the others lie where the posterior does ({.code control$refine}).")),
+                    c(i = paste("Of the {of} runs asked for, {runs} fill the space of the parameters; the others lie",
+                                "where the posterior does ({.code control$refine})."))),
                     call = call)
   }
 }
@@ -386,7 +393,8 @@ new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, reg
     first <- paste("The first is run {failed[1]} at {point_words(values[failed[1], , drop = FALSE])}: its row {row}",
                    "is {everything[row, failed[1]]}.")
     if (left < max(5, length(parameters) + 2)) {
-      abort_input(c("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable run{?s} {?is/are} too few.",
+      abort_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable",
+                          "run{?s} {?is/are} too few."),
                     x = first, i = "Find out why the simulator fails there, or narrow the priors."), call = call)
     }
     warn_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left",
@@ -404,7 +412,8 @@ new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, reg
 
 #' @export
 print.amiss_ensemble <- function(x, ...) on_stdout(x, {
-  cli::cli_text("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over {length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}")
+  cli::cli_text(paste("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over",
+                      "{length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}"))
   cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}",
                      if (!is.null(x$region)) c("*" = "in the region where a posterior lies"),
                      if (!is.null(x$held_out)) c("*" = "and at {nrow(x$held_out$outputs)} validation steps"),

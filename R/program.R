@@ -74,9 +74,10 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
 #' @param boundary Driver columns to add.
 #' @return The edited simulator.
 #' @examples
+#' rule <- c("BEGIN { FS = \",\"; print \"Ti\" }", "NR > 1 { print {{gain}} * $3 }")
 #' base <- program_simulator(c("awk", "-f", "model.awk", "drivers.csv"), free("gain", uniform(0, 2)),
-#'                           output = c(file = "stdout.txt", column = "Ti"), boundary = "Te", cache = tempfile("runs"),
-#'                           templates = list(model.awk = I("BEGIN { FS = \",\"; print \"Ti\" } NR > 1 { print {{gain}} * $3 }")))
+#'                           output = c(file = "stdout.txt", column = "Ti"), templates = list(model.awk = I(rule)),
+#'                           boundary = "Te", cache = tempfile("runs"))
 #' mechanism("sun", boundary = "Gv", sentence = "Sun enters.", edit = function(model) {
 #'   with_template(model, list(model.awk = function(lines) sub("* $3", "* $3 + {{sun}} * $4", lines, fixed = TRUE)),
 #'                 free("sun", uniform(0, 0.1)), boundary = "Gv")
@@ -104,7 +105,9 @@ read_templates <- function(templates, present = list(), call = rlang::caller_env
     if (is.function(x) && !is.null(present[[file]])) return(as.character(x(present[[file]])))
     if (inherits(x, "AsIs")) return(as.character(x))
     if (checkmate::test_string(x) && file.exists(x)) return(readLines(x, warn = FALSE))
-    abort_input(c("Template {.val {file}} cannot be read: {if (is.function(x)) 'there is none that its function could change' else paste('there is no file', if (checkmate::test_string(x)) x else seen(x))}.",
+    why <- if (is.function(x)) "there is none that its function could change"
+           else paste("there is no file", if (checkmate::test_string(x)) x else seen(x))
+    abort_input(c("Template {.val {file}} cannot be read: {why}.",
                   i = "Give the path of a file, or text in {.fun I}."), call = call)
   }, simplify = FALSE)
 }
@@ -130,7 +133,8 @@ check_placeholders <- function(simulator, call = rlang::caller_env()) {
   idle <- setdiff(known, unlist(lapply(places, placeholders)))
   if (length(idle)) {
     abort_input(c("Parameter {.val {idle[1]}} stands in no template and in no argument of the command.",
-                  i = "Write {.code {paste0('{{', idle[1], '}}')}} where its value belongs. Templates: {.val {names(simulator$templates)}}."),
+                  i = paste("Write {.code {paste0('{{', idle[1], '}}')}} where its value belongs. Templates:",
+                            "{.val {names(simulator$templates)}}.")),
                   call = call)
   }
   simulator
@@ -145,7 +149,8 @@ render <- function(text, values) {
 
 #' @export
 print.amiss_program_simulator <- function(x, ...) on_stdout(x, {
-  cli::cli_text("{.strong Simulator} {.val {x$name}} (the program {.file {x$command[1]}}) with {length(x$parameters)} free parameter{?s}")
+  cli::cli_text(paste("{.strong Simulator} {.val {x$name}} (the program {.file {x$command[1]}}) with",
+                      "{length(x$parameters)} free parameter{?s}"))
   cli::cli_bullets(stats::setNames(vapply(x$parameters, format, ""), rep("*", length(x$parameters))))
   cli::cli_bullets(c("*" = "finished runs in {.file {x$cache}}"))
 })

@@ -255,7 +255,9 @@ measured_model <- function(fit, name, parent, mechanism,
 
 report_model <- function(model, say) {
   first <- model$attribution$table[1, ]
-  say("{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration, {signif(model$scores$validate[['rmse']], 3)} held out; discrepancy answers most to {.field {first$boundary}} (log10 Bayes factor {round(first$log10_bf_dropped, 1)})")
+  say(paste("{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
+            "{signif(model$scores$validate[['rmse']], 3)} held out; discrepancy answers most to",
+            "{.field {first$boundary}} (log10 Bayes factor {round(first$log10_bf_dropped, 1)})"))
 }
 
 # Mechanisms driven by what the attribution names come first.
@@ -442,12 +444,16 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   listed_alone <- if (length(adopted) > 8) 7 else length(adopted)
   for (model in adopted[seq_len(listed_alone)]) {
     row <- x$candidates[x$candidates$from == model$parent & x$candidates$mechanism == model$mechanism, ]
-    cli::cli_bullets(c("*" = "{model$verdict}: {.strong {model$mechanism}} ({x$catalogue[[model$mechanism]]$boundary}), log10 Bayes factor {round(row$log10_bf, 1)}"))
+    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}",
+                                   "({x$catalogue[[model$mechanism]]$boundary}), log10 Bayes factor",
+                                   "{round(row$log10_bf, 1)}")))
   }
   others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")
   if (length(others)) cli::cli_bullets(c("*" = "{others}"))
   g <- x$gain
-  cli::cli_bullets(c("*" = "RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)} held out",
+  cli::cli_bullets(c("*" = paste("RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in",
+                                 "calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)}",
+                                 "held out"),
                      "*" = "stopped because {x$stopped_because}",
                      ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
 })
