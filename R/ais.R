@@ -33,6 +33,10 @@ ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision 
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95
 #'   %), `annealed` and `second` (estimate and standard error of each estimator), `ladder`, `evaluations`, `trusted`,
 #'   `verdict`.
+#' @source Neal (2001), Annealed importance sampling, Statistics and Computing 11, 125-139. Del Moral, Doucet and Jasra
+#'   (2006), Sequential Monte Carlo samplers, Journal of the Royal Statistical Society B 68, 411-436 (the pilot).
+#'   Hesterberg (1995), Weighted average importance sampling and defensive mixture distributions, Technometrics 37,
+#'   185-194. In full: `vignette("algorithm", "amiss")`, *Annealed importance sampling*.
 #' @examples
 #' y <- c(1.2, 0.7, 1.9)
 #' ais(function(z) vapply(z[, "mean"], function(m) sum(dnorm(y, m, 1, log = TRUE)), 0),

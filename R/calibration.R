@@ -45,6 +45,10 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   (share of the posterior in the outer tenth of the emulator's region), `z2` (mean square in units of the emulator's
 #'   own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and
 #'   `verdict`.
+#' @source Kennedy and O'Hagan (2001), Bayesian calibration of computer models, Journal of the Royal Statistical Society
+#'   B 63, 425-464, for simulation plus discrepancy plus error. The covariance, its priors and the check are in
+#'   `vignette("algorithm", "amiss")`, *One covariance*, *The simulator has the last word* and *History of the boundary
+#'   conditions*.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)

@@ -39,6 +39,7 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #'     `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`;
 #'   * `"ranking"`: the rank of each model by each criterion;
 #'   * `"attribution"` and `"parameters"`, with the column `model`.
+#' @source Monari (2022), table 1 for the words. The likelihood criteria are those of [logLik()], [AIC()] and [BIC()].
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)

@@ -227,6 +227,7 @@ tidy.amiss_emulator <- function(x, ...) {
 #' @param ... Not used.
 #' @return A list of `mean` and `sd`, one column per point. `sd` is that of a run there: the emulator's uncertainty and
 #'   what the basis leaves out.
+#' @source `vignette("algorithm", "amiss")`, *Emulator*.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)

@@ -11,6 +11,8 @@
 #' @param quiet No progress messages.
 #' @return An object of class `amiss_ensemble`: parameter values, their places in the unit cube and the outputs at
 #'   the calibration rows (one column per run).
+#' @source McKay, Beckman and Conover (1979), A comparison of three methods for selecting values of input variables in
+#'   the analysis of output from a computer code, Technometrics 21, 239-245; drawn by package lhs.
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
@@ -50,6 +52,7 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' @param runs Number of runs to add.
 #' @inheritParams simulate_design
 #' @return An ensemble with a `region`. Train and calibrate anew.
+#' @source `vignette("algorithm", "amiss")`, *The simulator has the last word* (regions).
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)

@@ -23,6 +23,8 @@
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the number is `level`),
 #'   and `crps`, the continuous ranked probability score of each row.
+#' @source Gneiting and Raftery (2007), Strictly proper scoring rules, prediction, and estimation, Journal of the
+#'   American Statistical Association 102, 359-378, for the CRPS.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -208,6 +210,7 @@ prediction_scores <- function(prediction) {
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ..., whose attribute
 #'   `seed` makes them again.
+#' @source `vignette("algorithm", "amiss")`, *One covariance*.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)

@@ -17,6 +17,7 @@
 #' @inheritParams simulate_design
 #' @return A calibration as [calibrate()] gives; its `rounds` says how often the ensemble was refined, `runs_made` how
 #'   many runs of the simulator were made here, those of the checks included.
+#' @source `vignette("algorithm", "amiss")`, *The simulator has the last word*.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)

@@ -18,6 +18,8 @@
 #' @return `synthetic_weather()`: a data frame, one row a step (means over the step that ends at `hour`), with `hour`,
 #'   `Te` (degC), `Gh`, `Gv` (W/m2: horizontal, vertical surface), `Ws` (m/s), `Wd` (degrees from north, clockwise),
 #'   `Lw` (W/m2). `rolbs()`: a vector of heating powers.
+#' @source Declination by Cooper (1969), The absorption of radiation in solar stills, Solar Energy 12, 333-346; the
+#'   clear sky's beam by Meinel and Meinel (1976), Applied solar energy, Addison-Wesley.
 #' @examples
 #' weather <- synthetic_weather(4, seed = 1)
 #' weather$RHP <- rolbs(nrow(weather), step_h = 0.25, power = 100, seed = 1)
