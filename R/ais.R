@@ -1,7 +1,3 @@
-ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision = 0.1, chains = NULL, sweeps = NULL,
-                    max_sweeps = 30,
-                    ess_drop = 0.7, gradient = FALSE, resample = TRUE, importance_draws = 1000, max_components = 3)
-
 #' Annealed importance sampling of any posterior
 #'
 #' The sampler behind [calibrate()], for a likelihood written in R: draws from the posterior and its normalising
@@ -22,12 +18,11 @@ ais_control <- list(pilot_chains = NULL, groups = 8, max_groups = 64, precision 
 #' @param control List of options:
 #'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at least 32);
 #'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below `precision` (0.1);
-#' * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned
+#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned
 #'     records of [calibrate_paper()] 1; 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
-#' * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE` in [calibrate()], along the parameters,
-#'     where they follow a posterior that is curved at up to twice the cost; `FALSE` elsewhere). [ais()] makes them if
-#'     it is given a gradient;
+#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()] along the parameters,
+#'     where they follow a posterior that is curved at up to twice the cost). [ais()] makes them if it is given one;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
 #'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95
@@ -121,10 +116,8 @@ tell_undefined <- function(tally) {
 # The numbers of chains and moves stay 0 where they follow from the target, which the engine knows. Limits that were not
 # given follow those that were: more groups than `max_groups` raise it.
 fill_ais_control <- function(control, what = "control", call = rlang::caller_env()) {
-  filled <- merge_control(ais_control, control, what, call = call)
-  filled$pilot_chains <- filled$pilot_chains %||% 0
-  filled$chains <- filled$chains %||% 0
-  filled$sweeps <- filled$sweeps %||% 0
+  filled <- merge_control(ais_defaults_(), control, what, call = call)
+  for (name in c("pilot_chains", "chains", "sweeps")) filled[[name]] <- filled[[name]] %||% 0
   check <- function(name, value, lower, hint = NULL) {
     check_input(checkmate::check_int(value, lower = lower, upper = 1e7), paste0(what, "$", name), hint, call = call)
   }

@@ -120,7 +120,7 @@ emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
 fill_calibration_control <- function(control, measurements, n, what = "control", call = rlang::caller_env()) {
   control <- merge_control(calibration_control, control, what, call = call)
   named <- function(option) paste0(what, "$", option)
-  ais <- merge_control(calibration_control$ais, control$ais, named("ais"), names(ais_control), call)
+  ais <- merge_control(calibration_control$ais, control$ais, named("ais"), names(ais_defaults_()), call)
   control$ais <- fill_ais_control(ais, named("ais"), call = call)
   step <- measurements$step_h
   if (is.null(control$confidence)) control["confidence"] <- 2 / n

@@ -52,3 +52,16 @@ Rcpp::List ais_(const Rcpp::Function& log_likelihood, const Rcpp::Nullable<Rcpp:
   out["unit"] = Eigen::MatrixXd(result.draws.transpose().unaryExpr(&normal_cdf));
   return out;
 }
+
+// What AisOptions says if nothing is given: the one place where the options of `control$ais` have their defaults.
+// [[Rcpp::export]]
+Rcpp::List ais_defaults_() {
+  const AisOptions o;
+  using Rcpp::Named;
+  return Rcpp::List::create(
+      Named("pilot_chains") = o.pilot_chains, Named("groups") = o.groups, Named("max_groups") = o.max_groups,
+      Named("precision") = o.precision, Named("chains") = o.chains, Named("sweeps") = o.sweeps,
+      Named("max_sweeps") = o.max_sweeps, Named("ess_drop") = o.ess_drop, Named("gradient") = o.gradient,
+      Named("resample") = o.resample, Named("importance_draws") = o.importance_draws,
+      Named("max_components") = o.max_components);
+}

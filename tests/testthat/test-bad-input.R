@@ -106,17 +106,17 @@ rows_of_controls <- function() {
     rows_of_control(f, own),
     rows_of_control(f, emulator_control, "emulator"),
     rows_of_control(f, calibration_control, "calibration"),
-    rows_of_control(f, ais_control, c("calibration", "ais")))
-  c(rows_of_control("ais", ais_control, wrong = every),
+    rows_of_control(f, ais_defaults_(), c("calibration", "ais")))
+  c(rows_of_control("ais", ais_defaults_(), wrong = every),
     rows_of_control("train_emulator", emulator_control, wrong = every),
     rows_of_control("calibrate", calibration_control, wrong = list("nonsense", NaN, -1)),
-    rows_of_control("calibrate", ais_control, "ais"),
+    rows_of_control("calibrate", ais_defaults_(), "ais"),
     rows_of_control("calibrate_paper", paper_control, wrong = list("nonsense", NaN, c(1, -1))),
-    rows_of_control("calibrate_paper", ais_control, "ais"),
+    rows_of_control("calibrate_paper", ais_defaults_(), "ais"),
     rows_of_control("attribute_discrepancy", attribution_control, wrong = every),
-    rows_of_control("attribute_discrepancy", ais_control, "ais"),
+    rows_of_control("attribute_discrepancy", ais_defaults_(), "ais"),
     rows_of_control("simulate_zone", zone_control, wrong = every),
-    loop("upgrade_model", upgrade_control), rows_of_control("upgrade_model", ais_control, "screening"),
+    loop("upgrade_model", upgrade_control), rows_of_control("upgrade_model", ais_defaults_(), "screening"),
     loop("compare_models", comparison_control), rows_of_control("compare_models", attribution_control, "attribution"),
     rows_of_control("calibrate_refined", emulator_control, "emulator"),
     rows_of_control("calibrate_refined", calibration_control, "calibration"))

@@ -61,10 +61,10 @@ test_that("any object is told in a few words, and refused in the package's own",
 
 test_that("options that are not given stay as they were", {
   each_of(20, function(i) {
-    given <- ais_control[sample(length(ais_control), sample(0:5, 1))]
-    merged <- merge_control(ais_control, given)
-    expect_identical(merged, ais_control)
-    expect_identical(merge_control(ais_control, merged), merged)
+    given <- ais_defaults_()[sample(length(ais_defaults_()), sample(0:5, 1))]
+    merged <- merge_control(ais_defaults_(), given)
+    expect_identical(merged, ais_defaults_())
+    expect_identical(merge_control(ais_defaults_(), merged), merged)
   })
 })
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "engine/ais/purposes.hpp"
+#include "engine/random/purposes.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/parallel_for.hpp"
 

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "engine/ais/purposes.hpp"
+#include "engine/random/purposes.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 
 namespace amiss {

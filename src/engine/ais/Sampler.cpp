@@ -10,7 +10,7 @@
 #include "engine/ais/AnnealedRun.hpp"
 #include "engine/ais/ImportanceSample.hpp"
 #include "engine/ais/StandardNormal.hpp"
-#include "engine/ais/purposes.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/parallel/parallel_for.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 
@@ -14,7 +15,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-enum Purpose : std::uint64_t { kWithout = 100 };
 
 constexpr Index kLeastGroup = 2;
 constexpr int kFewSurrogates = 39;

@@ -7,6 +7,7 @@
 
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/Stream.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 namespace {
@@ -16,7 +17,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Coalition = std::uint64_t;
 
-constexpr std::uint64_t kOrders = 31;
 
 Coalition bit(int player) { return Coalition{1} << player; }
 

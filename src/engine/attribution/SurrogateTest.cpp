@@ -9,6 +9,7 @@
 #include "engine/optimise/maximise.hpp"
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/Stream.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 namespace {
@@ -17,7 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::uint64_t kShifts = 11;
 constexpr double kTolerance = 1e-5;   // of a fit, relative: a few thousandths of a nat
 constexpr double kNegligible = 0.02;  // nats: a condition that matters less need not be fitted again without
 

@@ -10,6 +10,7 @@
 #include "engine/ais/StandardNormal.hpp"
 #include "engine/calibration/ParameterModes.hpp"
 #include "engine/parallel/parallel_for.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 
@@ -19,8 +20,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-enum Purpose : std::uint64_t { kFirstHistory, kSecondHistory, kPopulation, kPosterior, kAgain };
-enum StreamPurpose : std::uint64_t { kModes = 62, kMixture, kCloser };
 
 // How error and discrepancy are sampled under a Gaussian simulator, and at how many of the draws the modes of
 // the parameters are sought.

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "engine/random/Stream.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 
@@ -13,7 +14,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr Index kPoints = 512;
-constexpr std::uint64_t kSeed = 20, kPurpose = 61;
+constexpr std::uint64_t kSeed = 20;
 constexpr double kDifference = 3e-3;  // in standard deviations of the prior
 
 // A square root R R' = covariance. The coefficients differ by orders of magnitude: that of the correlation is
@@ -30,7 +31,7 @@ MatrixXd root_of(const MatrixXd& covariance) {
 }  // namespace
 
 GaussianSimulator over_region(const Emulator& emulator) {
-  Stream stream(kSeed, kPurpose, 0);
+  Stream stream(kSeed, kTangentPoints, 0);
   MatrixXd mean, variance;
   emulator.predict_at(emulator.region().place(stream.normals(emulator.n_inputs(), kPoints)), mean, variance);
   GaussianSimulator simulator;

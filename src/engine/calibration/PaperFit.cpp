@@ -1,5 +1,7 @@
 #include "engine/calibration/PaperFit.hpp"
 
+#include "engine/random/purposes.hpp"
+
 namespace amiss {
 
 PaperFit calibrate_paper(const KernelModel& model, const PaperCalibration& coefficients,
@@ -18,7 +20,7 @@ PaperFit calibrate_paper(const KernelModel& model, const PaperCalibration& coeff
   for (Eigen::Index i = 0; i < draws.cols(); ++i) fit.draws.push_back(outside.parameters(draws.col(i)));
 
   const PaperCalibrationTarget inside(coefficients, emulator, model.priors().noise, options.shared_lambda);
-  fit.inside = sample_ais(inside, options.ais, Context{context.seed + 1, context.threads, context.poll});
+  fit.inside = sample_ais(inside, options.ais, context.fork(kParameters));
   fit.unit = inside.unit(fit.inside.draws);
   fit.lambda = inside.lambda(fit.inside.draws);
   fit.log_jacobian = coefficients.log_jacobian();

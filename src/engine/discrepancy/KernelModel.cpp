@@ -12,6 +12,7 @@
 #include "engine/linalg/double_policy.hpp"
 #include "engine/linalg/precedes.hpp"
 #include "engine/random/Stream.hpp"
+#include "engine/random/purposes.hpp"
 #include "engine/random/transform.hpp"
 
 namespace amiss {
@@ -23,7 +24,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kSmallestTail = 1e-15;  // of Phi; keeps logarithms finite
-constexpr std::uint64_t kFictitious = 64;
 constexpr Index kBlock = 96;  // columns of the covariance built at once
 
 double tail(double x) { return std::max(normal_cdf(x), kSmallestTail); }

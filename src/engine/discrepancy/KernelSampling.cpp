@@ -14,6 +14,7 @@
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/MemoryPool.hpp"
 #include "engine/parallel/parallel_for.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 
@@ -34,7 +35,6 @@ constexpr int kPilotChains = 64, kChains = 16;  // unless asked otherwise
 constexpr int kRefitDraws = 300, kEffectiveDraws = 400;  // likewise
 constexpr int kRoughSweeps = 1;                          // likewise, while only draws are needed
 constexpr double kRoughDrop = 0.4;     // conditional effective size while only draws are needed
-constexpr std::uint64_t kStage = 128;  // purposes of the random streams
 
 // Skeletons from small to large that together serve nearly all draws of a distribution: one for its bulk, one
 // for draws that are rough in one direction only, and the largest that is still worth it for the others.
@@ -155,8 +155,7 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
 // Where the posterior of this record lies, found by way of thinned ones.
 SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
                            const KernelSamplingOptions& sampling, const Context& context, long& evaluations) {
-  Context own = context;
-  own.seed = context.seed + kStage;
+  const Context own = context.fork(kThinned);
   Stream stream(own.seed, kStage, 0);
   const KernelTarget target(model);
   if (model.size() <= sampling.coarsest)

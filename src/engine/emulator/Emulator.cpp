@@ -8,6 +8,7 @@
 
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/Stream.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 
@@ -18,7 +19,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr Index kPoints = 512;  // that stand for a region
-constexpr std::uint64_t kRegionSeed = 20, kRegionPoints = 63;
+constexpr std::uint64_t kRegionSeed = 20;
 
 }  // namespace
 
