@@ -128,16 +128,6 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
   control
 }
 
-# Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).
-condition_responses <- function(fit, data) {
-  phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
-  b <- rowMeans(fit$coefficients)
-  vapply(seq_along(fit$measurements$conditions), function(s) {
-    own <- data$condition == s - 1L
-    as.numeric(phi[, own, drop = FALSE] %*% b[own])
-  }, numeric(nrow(phi)))
-}
-
 # What is told as the answer: conditions, and groups that cannot be told apart as one.
 significant_conditions <- function(table) {
   told <- ifelse(is.na(table$group), table$boundary, table$group)

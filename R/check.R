@@ -3,7 +3,6 @@
 
 largest_error_ratio <- 1 / 3  # of the noise: above it the emulator is not good enough
 least_effective <- 0.1        # share of the runs under their own likelihoods
-largest_failed_share <- 0.2   # of the runs at posterior draws
 largest_border_share <- 0.05  # of the posterior in the outer tenth of the emulator's region
 
 # list(fit, made): the fit with its check, and the runs (NULL where none were made).

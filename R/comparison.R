@@ -370,3 +370,17 @@ check_truth <- function(truth, call = rlang::caller_env()) {
                 call = call)
   }
 }
+
+# The true values of the parameters, where they are known, by name.
+true_values <- function(comparison, names) {
+  values <- comparison$truth$values[names]
+  if (is.null(values)) rep(NA_real_, length(names)) else unname(values)
+}
+
+validates <- function(comparison) !all(is.na(comparison$tables$criteria$rmse_validation))
+
+true_heat_loss <- function(comparison) {
+  truth <- comparison$truth
+  if (is.null(truth) || !inherits(truth$simulator, "amiss_zone")) return(NA_real_)
+  heat_loss_coefficient(truth$simulator, truth$values, mean_drivers(truth$simulator, comparison$measurements))
+}

@@ -100,3 +100,13 @@ print.amiss_discrepancy <- function(x, ...) on_stdout(x, {
                       "{signif(sqrt(mean(x$series$discrepancy^2)), 3)} answers to boundary conditions"))
   cli::cli_bullets(c(">" = "next: {.fun plot} or {.fun attribute_discrepancy}"))
 })
+
+# Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).
+condition_responses <- function(fit, data) {
+  phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
+  b <- rowMeans(fit$coefficients)
+  vapply(seq_along(fit$measurements$conditions), function(s) {
+    own <- data$condition == s - 1L
+    as.numeric(phi[, own, drop = FALSE] %*% b[own])
+  }, numeric(nrow(phi)))
+}

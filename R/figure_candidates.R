@@ -1,15 +1,5 @@
 # The mechanisms tried.
 
-# Every trial, with its step and whether it was adopted there.
-candidate_table <- function(upgrade) {
-  table <- upgrade$candidates
-  steps <- unique(table$from)
-  adopted <- as.character(unlist(lapply(upgrade$models, `[[`, "mechanism")))
-  table$step <- match(table$from, steps)
-  table$adopted <- table$mechanism == adopted[table$step] & !is.na(adopted[table$step])
-  table
-}
-
 candidates_title <- function(table, decisive) {
   if (!any(table$adopted)) {
     best <- table[which.max(table$log10_bf), ]

@@ -4,6 +4,8 @@
 canvas_width <- 9  # inches: here letters have their full size
 letter_points <- 15
 margin_points <- 14
+title_size <- 1.13  # of the letters
+subtitle_size <- 0.9
 
 # ggplot2 builds a figure when it is drawn, on the device that it is drawn on.
 #' @importFrom ggplot2 ggplot_build

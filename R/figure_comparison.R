@@ -9,8 +9,6 @@ figures_of.amiss_comparison <- function(x) {
   setdiff(comparison_figures, missing)
 }
 
-validates <- function(comparison) !all(is.na(comparison$tables$criteria$rmse_validation))
-
 #' @rdname figures
 #' @export
 plot.amiss_comparison <- function(x, which = "evidence", ...) draw(comparison_figure(x, which))
@@ -190,12 +188,6 @@ figure_discrepancies <- function(comparison) {
   with_height(figure, 2 + 1.15 * length(comparison$models))
 }
 
-# The true values of the parameters, where they are known, by name.
-true_values <- function(comparison, names) {
-  values <- comparison$truth$values[names]
-  if (is.null(values)) rep(NA_real_, length(names)) else unname(values)
-}
-
 figure_models_parameters <- function(comparison) {
   table <- mark_models(comparison$tables$parameters, comparison)
   table$panel <- axis_label(table$label, table$unit)
@@ -225,12 +217,6 @@ figure_models_parameters <- function(comparison) {
     figure_theme() + ggplot2::theme(strip.text = ggplot2::element_text(size = ggplot2::rel(0.83)))
   rows <- tapply(as.character(table$model), table$panel, function(x) length(unique(x)))
   with_height(figure, 1.9 + ceiling(nlevels(table$panel) / 3) * (0.7 + 0.23 * max(rows)))
-}
-
-true_heat_loss <- function(comparison) {
-  truth <- comparison$truth
-  if (is.null(truth) || !inherits(truth$simulator, "amiss_zone")) return(NA_real_)
-  heat_loss_coefficient(truth$simulator, truth$values, mean_drivers(truth$simulator, comparison$measurements))
 }
 
 heat_loss_table <- function(comparison) {

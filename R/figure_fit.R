@@ -55,24 +55,6 @@ gain_title <- function(upgrade) {
   sprintf("%s the error %s by %s %%; %s", where, if (change >= 0) "falls" else "rises", round(100 * abs(change)), band)
 }
 
-gain_table <- function(upgrade) {
-  unit <- pretty_unit(upgrade$measurements$unit)
-  panels <- c(rmse = axis_label("typical error, RMSE", unit),
-              crps = axis_label("error of the prediction with its band, CRPS", unit),
-              coverage95 = "measurements inside the 95 % band [%]")
-  table <- stage_table(upgrade_stages(upgrade), function(s) {
-    rows <- expand.grid(score = names(panels), use = names(use_names), stringsAsFactors = FALSE)
-    rows$value <- mapply(function(score, use) s$scores[[use]][[score]], rows$score, rows$use)
-    rows
-  })
-  percent_rows <- table$score == "coverage95"
-  table$value[percent_rows] <- 100 * table$value[percent_rows]
-  table$label <- ifelse(percent_rows, round(table$value), short(table$value))
-  table$panel <- factor(panels[table$score], panels)
-  table$use <- factor(use_names[table$use], use_names)
-  table[!is.na(table$value), ]
-}
-
 figure_gain <- function(upgrade) {
   table <- gain_table(upgrade)
   target <- data.frame(panel = factor(levels(table$panel)[3], levels(table$panel)), value = 95)

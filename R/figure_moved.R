@@ -24,13 +24,6 @@ density_table <- function(fit) {
   do.call(rbind, tables)
 }
 
-# Share of the prior's 95 % interval that the posterior's takes.
-narrowing <- function(fit) {
-  rows <- parameter_rows(fit)
-  width <- vapply(fit$emulator$parameters[rows$name], function(p) diff(prior_quantile(p$prior, c(0.025, 0.975))), 0)
-  stats::setNames((rows$upper95 - rows$lower95) / width, rows$label)
-}
-
 figure_priors <- function(fits) {
   table <- stage_table(fits, density_table)
   table$panel <- factor(table$panel, unique(table$panel))
@@ -52,8 +45,6 @@ figure_priors <- function(fits) {
                    strip.text = ggplot2::element_text(size = ggplot2::rel(0.83)))
   with_height(figure, 1.9 + 1.5 * ceiling(nlevels(table$panel) / 3))
 }
-
-posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, cor = TRUE)$cor
 
 # Shift of the medians as a share of the prior's range, and the strongest correlation with a parameter that is new.
 moved_table <- function(upgrade) {

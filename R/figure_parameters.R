@@ -1,17 +1,5 @@
 # Parameters, before and after the measurements and from model to model.
 
-# Parameters of a calibration with their priors; `at_edge` where the median lies in the outer 5 % of the prior.
-parameter_rows <- function(fit) {
-  table <- parameter_table(fit)
-  declared <- fit$emulator$parameters[table$name]
-  side <- function(u, fallback) vapply(declared, function(p) {
-    limit <- prior_quantile(p$prior, u)
-    if (is.finite(limit)) limit else prior_quantile(p$prior, fallback)
-  }, 0)
-  cbind(table, label = vapply(declared, `[[`, "", "label"), prior_lower = side(0, 0.001), prior_upper = side(1, 0.999),
-        at_edge = unname(edge_of_prior(fit)[table$name]))
-}
-
 parameters_title <- function(table) {
   count <- vapply(split(table$at_edge, table$stage), function(e) sprintf("%d of %d", sum(e), length(e)), "")
   if (length(count) < 2) paste("At the edge of what was thought possible:", count, "parameters")

@@ -28,3 +28,11 @@ figure_sobol <- function(indices) {
 
 sobol_orders <- c(first = "alone (first order)", total = "with interactions (total)")
 sobol_colours <- c(first = "#0072B2", total = "#E69F00")
+
+#' @rdname figures
+#' @export
+plot.amiss_sobol <- function(x, ...) draw(figure_sobol(x))
+
+#' @rdname figures
+#' @export
+autoplot.amiss_sobol <- function(object, ...) figure_sobol(object)

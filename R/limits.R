@@ -3,6 +3,7 @@
 
 largest_gb <- 4
 longest_h <- 24
+largest_failed_share <- 0.2  # of the runs at posterior draws, or of the values of a likelihood
 
 # `option`: what asks for so much.
 check_size <- function(option, value, gb = 0, hours = 0, call = rlang::caller_env()) {
@@ -58,4 +59,12 @@ check_zone_size <- function(zone, runs, rows, step_s, control, call = rlang::cal
   check_size(c("control$max_substep_s", "control$cells", "values (rows)")[largest],
              c(control$max_substep_s, control$cells, runs)[largest], matrix_gb(40 * control$cells, components), hours,
              call)
+}
+
+# Runs at the rows of the measurements, and an emulator of them; each round of refinement makes 1.3 times as many.
+check_runs_asked <- function(runs, measurements, rounds = 0, refine = 0, call = rlang::caller_env()) {
+  check_input(checkmate::check_count(runs, positive = TRUE), "runs", call = call)
+  check_run_number(runs, length(measurements$raw$hours), call = call)
+  check_training_size(runs, call = call)
+  check_training_size(max(40, refine * runs) * 1.3^rounds, "control$rounds", rounds, call)
 }

@@ -393,3 +393,8 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
                      "*" = "boundary conditions {.field {x$conditions}}",
                      ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
+
+condition_values <- function(measurements, name) {
+  own <- measurements$boundary[, measurements$condition == match(name, measurements$conditions), drop = FALSE]
+  if (ncol(own) == 1) own[, 1] else (atan2(own[, 1], own[, 2]) * 180 / pi) %% 360
+}

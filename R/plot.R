@@ -2,9 +2,6 @@ figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy
                   "priors",
                   "moved", "steps", "missing", "emulator", "sampler")
 
-# Okabe and Ito's colours: told apart by colour-blind readers and, one light and one dark, in grey.
-stage_colours <- c("before" = "#E69F00", "after" = "#0072B2", "the model" = "#0072B2")
-
 #' Figures
 #'
 #' `plot()` draws a figure and returns it invisibly; `autoplot()` of ggplot2 returns it undrawn, to be changed or saved.

@@ -169,3 +169,43 @@ equal_draws <- function(fit, n, call = rlang::caller_env()) {
   check_run_number(n, ncol(fit$values), "draws", call)
   fit$values[even_draws(fit, n)[with_seed(fit$seed, sample.int(n))], , drop = FALSE]
 }
+
+# Parameters of a calibration with their priors; `at_edge` where the median lies in the outer 5 % of the prior.
+parameter_rows <- function(fit) {
+  table <- parameter_table(fit)
+  declared <- fit$emulator$parameters[table$name]
+  side <- function(u, fallback) vapply(declared, function(p) {
+    limit <- prior_quantile(p$prior, u)
+    if (is.finite(limit)) limit else prior_quantile(p$prior, fallback)
+  }, 0)
+  cbind(table, label = vapply(declared, `[[`, "", "label"), prior_lower = side(0, 0.001), prior_upper = side(1, 0.999),
+        at_edge = unname(edge_of_prior(fit)[table$name]))
+}
+
+# TRUE for each parameter whose 95 % interval touches an end of its prior (in probability, within 1 %), where the prior
+# ends abruptly.
+edge_of_prior <- function(fit) {
+  unit <- posterior_unit(fit)
+  stats::setNames(vapply(seq_len(ncol(unit)), function(p) {
+    q <- weighted_quantile(unit[, p], fit$weights, c(0.025, 0.5, 0.975))
+    (q[3] > 0.99 && q[2] > 0.9) || (q[1] < 0.01 && q[2] < 0.1)
+  }, NA), colnames(fit$values))
+}
+
+posterior_centre <- function(fit) colSums(fit$weights * to_normal(posterior_unit(fit)))
+
+# The first parameters of a fit, and how many there are besides.
+say_parameters <- function(fit, most) {
+  table <- parameter_table(fit)
+  say_table(utils::head(table, most))
+  if (nrow(table) > most) cli::cli_text("{nrow(table) - most} more parameter{?s}: see {.fun tidy}")
+}
+
+posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, cor = TRUE)$cor
+
+# Share of the prior's 95 % interval that the posterior's takes.
+narrowing <- function(fit) {
+  rows <- parameter_rows(fit)
+  width <- vapply(fit$emulator$parameters[rows$name], function(p) diff(prior_quantile(p$prior, c(0.025, 0.975))), 0)
+  stats::setNames((rows$upper95 - rows$lower95) / width, rows$label)
+}

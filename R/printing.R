@@ -8,10 +8,3 @@ on_stdout <- function(x, said) {
 say_table <- function(table) {
   cli::cli_verbatim(utils::capture.output(print(table, digits = 3, row.names = FALSE)))
 }
-
-# The first parameters of a fit, and how many there are besides.
-say_parameters <- function(fit, most) {
-  table <- parameter_table(fit)
-  say_table(utils::head(table, most))
-  if (nrow(table) > most) cli::cli_text("{nrow(table) - most} more parameter{?s}: see {.fun tidy}")
-}

@@ -195,3 +195,5 @@ print.amiss_free <- function(x, ...) {
   cat(format(x), "\n", sep = "")
   invisible(x)
 }
+
+to_normal <- function(unit) stats::qnorm(pmin(pmax(unit, 1e-15), 1 - 1e-15))

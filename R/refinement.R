@@ -160,8 +160,6 @@ searched_ensemble <- function(ensemble, set, centre, runs, threads) {
        runs = runs + sum(vapply(modes, `[[`, 0, "runs")))
 }
 
-posterior_centre <- function(fit) colSums(fit$weights * to_normal(posterior_unit(fit)))
-
 # The ensemble with as many of the runs at posterior draws as the check asks for.
 with_checked_runs <- function(result) {
   fit <- result$fit
@@ -172,4 +170,83 @@ with_checked_runs <- function(result) {
   draws <- made$draws[kept]
   join_runs(result$ensemble, posterior_unit(fit)[draws, , drop = FALSE], fit$values[draws, , drop = FALSE],
             made$runs[, kept, drop = FALSE])
+}
+
+#' More runs where they matter
+#'
+#' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an
+#' emulator of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior
+#' lies: the ellipsoid that holds it, in the coordinates in which the priors are standard normal. Its runs follow the
+#' axes of the ellipsoid and fill it evenly; runs of `ensemble` that lie inside join them, the last 40. An emulator of
+#' them holds in the region alone, and there a few dozen runs do what hundreds spread over the priors cannot. Parameters
+#' outside count as impossible; if the posterior comes near the end of the region, the check of [calibrate()] says so.
+#'
+#' @param ensemble An ensemble made by [simulate_design()], or by this.
+#' @param fit A calibration with the emulator trained on it ([calibrate()]).
+#' @param runs Number of runs to add.
+#' @inheritParams simulate_design
+#' @return An ensemble with a `region`. Train and calibrate anew.
+#' @source `vignette("algorithm", "amiss")`, *The simulator has the last word* (regions).
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' near <- refine_ensemble(runs, fit, runs = 20)
+#' calibrate(train_emulator(near, room), room, quick, seed = 1)
+#' @export
+refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE) {
+  hush(quiet)
+  check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
+  check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
+  check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  check_run_number(runs, length(fit$measurements$raw$hours))
+  threads <- check_threads(threads)
+  if (is.null(ensemble$simulator)) {
+    abort_input(c("The runs of this ensemble were made elsewhere, and so must more of them be.",
+                  i = "Run the simulator at draws of {.code fit$values} and give all runs to {.fun ensemble}."))
+  }
+  if (!identical(names(ensemble$parameters), names(fit$emulator$parameters))) {
+    abort_input(paste("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the ensemble",
+                      "{.val {names(ensemble$parameters)}}."))
+  }
+  if (nrow(ensemble$outputs) != length(fit$rows)) {
+    abort_input(
+      c("{.arg fit} was made on {length(fit$rows)} rows, the runs of {.arg ensemble} have {nrow(ensemble$outputs)}.",
+                  i = "Give the ensemble and the calibration of the same measurements."))
+  }
+  check_same_rows(ensemble$hours, fit$measurements)
+  regional_ensemble(ensemble, posterior_region(fit, if (isTRUE(fit$check$border > largest_border_share)) 1.5 else 1),
+                    fit, runs, threads)
+}
+
+# The ensemble of a region of the parameters' space; `fit` knows the emulator over the priors.
+regional_ensemble <- function(ensemble, region, fit, runs, threads) {
+  unit <- region_design(region, runs, ensemble$seed)
+  values <- unit_to_values(unit, ensemble$parameters)
+  outputs <- simulate_measured(ensemble$simulator, values, fit$measurements, "calibrate", threads)
+  # The last of the runs that lie inside: those of checks, where the posterior was seen last.
+  own <- utils::tail(which(in_region(region, ensemble$unit)), 40)
+  new_ensemble(ensemble$parameters, rbind(ensemble$unit[own, , drop = FALSE], unit),
+               rbind(ensemble$values[own, , drop = FALSE], values),
+               cbind(ensemble$outputs[, own, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
+               without_simulator(emulator_over_priors(fit$emulator)), hours = ensemble$hours)
+}
+
+# The ensemble with more runs, of its own region.
+join_runs <- function(ensemble, unit, values, outputs) {
+  new_ensemble(ensemble$parameters, rbind(ensemble$unit, unit), rbind(ensemble$values, values),
+               cbind(ensemble$outputs, outputs),
+               ensemble$simulator, ensemble$seed, ensemble$region, ensemble$over_priors, hours = ensemble$hours)
+}
+
+# The simulator is kept once.
+without_simulator <- function(emulator) {
+  emulator["simulator"] <- list(NULL)
+  emulator
 }

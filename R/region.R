@@ -1,8 +1,6 @@
 # Regions of the parameters' space: where the posterior lies, in the coordinates in which the priors are N(0, I). An
 # emulator of runs in such a region, along its axes, needs few of them; NULL stands for everywhere.
 
-to_normal <- function(unit) stats::qnorm(pmin(pmax(unit, 1e-15), 1 - 1e-15))
-
 # The ellipsoid that holds a posterior: list(centre, root, radius). Tails that the draws do not show are allowed for by
 # their number, by the radius, and by `growth` where the posterior reached the end of the region it was sought in.
 posterior_region <- function(fit, growth = 1) {

@@ -116,8 +116,6 @@ check_report_tools <- function(call = rlang::caller_env()) {
   }
 }
 
-report_path <- function(...) system.file("rmarkdown", ..., package = "amiss", mustWork = TRUE)
-
 # The parts of a template, each from its mark to the next.
 template_parts <- function(x) {
   kind <- if (inherits(x, "amiss_upgrade")) "diagnosis"

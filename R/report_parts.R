@@ -100,3 +100,5 @@ fragment_style <- function() {
   if (!knitr::is_html_output()) return(NULL)
   c("```{=html}", "<style>", readLines(report_path("fragment.css")), "</style>", "```", "")
 }
+
+report_path <- function(...) system.file("rmarkdown", ..., package = "amiss", mustWork = TRUE)

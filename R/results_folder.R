@@ -74,3 +74,42 @@ move_files <- function(names, from, to, call = rlang::caller_env()) {
     }
   }
 }
+
+# The result as plain lists, with the fields of result.json.
+result_list <- function(x) UseMethod("result_list")
+
+table_rows <- function(table) lapply(seq_len(NROW(table)), function(i) as.list(table[i, , drop = FALSE]))
+
+#' @export
+result_list.amiss_upgrade <- function(x) {
+  model_list <- function(model) {
+    fit <- model$fit
+    list(name = model$name, parent = model$parent, mechanism = model$mechanism, Q = ncol(fit$emulator$basis$vectors),
+         N = length(fit$rows), M = nrow(fit$emulator$processes$inputs), noise_sd = fit$measurements$noise_sd,
+         discarded_rms = fit$emulator$basis$discarded_rms, log10_evidence = fit$log_evidence / log(10),
+         log10_evidence_interval = fit$interval / log(10), trusted = fit$trust$trusted, trust = fit$trust$verdict,
+         verdict = model$verdict, doubts = as.list(model$doubts), confounded_with = as.list(model$confounded_with),
+         held_out_gain = model$held_out_gain[c("mean", "standard_error")], emulator_error = fit$check$error,
+         emulator_ratio = fit$check$ratio,
+         emulator_checked = fit$check$passed, refinements = fit$rounds, reach = as.list(fit$reach),
+         rmse_calibration = model$scores$calibrate[["rmse"]], rmse_validation = model$scores$validate[["rmse"]],
+         coverage95_validation = model$scores$validate[["coverage95"]],
+         crps_calibration = model$scores$calibrate[["crps"]],
+         crps_validation = model$scores$validate[["crps"]], parameters = table_rows(parameter_table(fit)),
+         attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value",
+                                                            "significant", "group")]))
+  }
+  candidate_list <- function(i) {
+    row <- x$candidates[i, ]
+    list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
+         probability = row$probability, trusted = row$trusted, screened = row$screened, judged_by = row$judged_by,
+         parameters = table_rows(row$parameters[[1]]))
+  }
+  cause <- x$named_cause
+  if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
+  list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s,
+       runs_total = x$runs_total,
+       diagnosis = diagnosis_verdict(x), models = lapply(x$models, model_list),
+       candidates = lapply(seq_len(NROW(x$candidates)), candidate_list),
+       named_cause = cause, gain = x$gain, stopped_because = x$stopped_because)
+}

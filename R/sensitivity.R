@@ -180,11 +180,3 @@ as.data.frame.amiss_sobol <- function(x, row.names = NULL, optional = FALSE, ...
   rlang::check_dots_empty()
   as.data.frame(x$table, row.names = row.names)
 }
-
-#' @rdname figures
-#' @export
-plot.amiss_sobol <- function(x, ...) draw(figure_sobol(x))
-
-#' @rdname figures
-#' @export
-autoplot.amiss_sobol <- function(object, ...) figure_sobol(object)

@@ -265,24 +265,6 @@ check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()
                 i = "Let the simulator return its output at every row."), call = call)
 }
 
-# A point of the parameters' space, for messages.
-point_words <- function(point) {
-  names <- colnames(point) %||% names(point)
-  paste(names, signif(point, 4), sep = " = ", collapse = ", ")
-}
-
-#' @export
-free_parameters.amiss_zone <- function(simulator) zone_parameters(simulator)
-
-#' @export
-driver_names.amiss_zone <- function(simulator) zone_boundary(simulator)
-
-#' @export
-simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
-  check_run_dots(...)
-  simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
-}
-
 check_simulator <- function(simulator, call = rlang::caller_env()) {
   known <- any(paste0("simulate_runs.", class(simulator)) %in% utils::methods("simulate_runs"))
   if (!known) {

@@ -1,7 +1,6 @@
-upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine = 1 / 3, rounds = 8, emulator = list(),
-                        calibration = list(), attribution = list(), margin = 1.5,
-                        screening = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12,
-                                         precision = 0.5, gradient = FALSE, importance_draws = 0))
+upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine = refining_control$refine,
+                        rounds = refining_control$rounds, emulator = list(), calibration = list(),
+                        attribution = list(), margin = 1.5, screening = refining_control$screening)
 
 #' The loop: show, name the cause, extend, measure
 #'
@@ -158,92 +157,6 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   if (!is.null(control$screening)) fill_ais_control(control$screening, "control$screening", call)
   check_stage_controls(control, measurements, call = call)
   control
-}
-
-# The options of the stages, as these will take them.
-check_stage_controls <- function(control, measurements, method = "history", call = rlang::caller_env()) {
-  fill_emulator_control(control$emulator, "control$emulator", call)
-  n <- length(used_rows(measurements, "calibrate"))
-  if (method == "paper") return(fill_paper_control(control$calibration, n, "control$calibration", call))
-  calibration <- fill_calibration_control(control$calibration, measurements, n, "control$calibration", call)
-  fill_attribution_control(control$attribution, calibration$ais, length(measurements$conditions), "control$attribution",
-                           call)
-}
-
-# Runs at the rows of the measurements, and an emulator of them; each round of refinement makes 1.3 times as many.
-check_runs_asked <- function(runs, measurements, rounds = 0, refine = 0, call = rlang::caller_env()) {
-  check_input(checkmate::check_count(runs, positive = TRUE), "runs", call = call)
-  check_run_number(runs, length(measurements$raw$hours), call = call)
-  check_training_size(runs, call = call)
-  check_training_size(max(40, refine * runs) * 1.3^rounds, "control$rounds", rounds, call)
-}
-
-# A model simulated, trained and calibrated by `settings$calibrate`. Every model of a study is drawn on the same design
-# seed: differences between models are not the design's.
-fit_model <- function(simulator, name, settings) {
-  settings$keep(list("fit", name, plain(simulator)), fit_runs(first_runs(simulator, settings$runs, settings), settings))
-}
-
-first_runs <- function(simulator, runs, settings) {
-  if (inherits(simulator, "amiss_ensemble")) return(simulator)
-  simulate_design(simulator, settings$measurements, runs, seed = settings$seed, threads = settings$threads)
-}
-
-# By calibrate() with refinements where its check by runs fails; calibrate_paper() has none.
-fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, rounds = settings$control$rounds) {
-  if (identical(settings$calibrate, calibrate)) {
-    more <- refined_runs(settings)
-    return(calibrate_refined(ensemble, settings$measurements, rounds %||% upgrade_control$rounds,
-                             regional_runs(ensemble$parameters, more),
-                             list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration)),
-                             seed = settings$seed, threads = settings$threads))
-  }
-  emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
-  settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
-}
-
-# The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
-# draws tell how far its evidence is off, correct it, and join them where it is too far.
-screen_model <- function(simulator, name, settings, hopeless = function(fit) FALSE) {
-  calibration <- as.list(settings$control$calibration)
-  calibration$ais <- utils::modifyList(as.list(calibration$ais),
-                                       as.list(settings$control$screening %||% upgrade_control$screening))
-  if (is.null(calibration$check) || calibration$check > screening_runs)
-    calibration$check <- calibration$exact <- screening_runs
-  settings$keep(list("coarse", name, plain(simulator)), {
-    ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
-    control <- list(emulator = settings$control$emulator, calibration = calibration)
-    refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
-                         settings$threads,
-                         runs = regional_runs(ensemble$parameters, refined_runs(settings)), hopeless = hopeless)
-  })
-}
-
-screening_runs <- 20
-
-refined_runs <- function(settings) round((settings$control$refine %||% upgrade_control$refine) * settings$runs)
-
-# The full calibration, with the remaining runs made where the coarse posterior lies. It keeps the coarse one's
-# evidence.
-fit_fully <- function(simulator, name, settings, first = NULL) {
-  more <- refined_runs(settings)
-  if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
-  settings$keep(list("full", name, plain(simulator)), {
-    first <- first %||% screen_model(simulator, name, settings)
-    fit <- if (is.null(first$ensemble$simulator)) {
-      fit_runs(first$ensemble, settings)
-    } else if (isFALSE(first$fit$check$passed)) {
-      control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
-      refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
-                           settings$threads,
-                           runs = regional_runs(first$ensemble$parameters, more), first = first)$fit
-    } else {
-      fit_runs(if (more > 0) refine_ensemble(with_checked_runs(first), first$fit, more,
-                                             threads = settings$threads) else first$ensemble, settings)
-    }
-    fit$coarse <- first$fit[c("log_evidence", "standard_error")]
-    fit
-  })
 }
 
 measured_model <- function(fit, name, parent, mechanism,
@@ -438,24 +351,4 @@ upgrade_gain <- function(models) {
        crps_calibration = both("calibrate", "crps"), crps_validation = both("validate", "crps"))
 }
 
-#' @export
-print.amiss_upgrade <- function(x, ...) on_stdout(x, {
-  adopted <- adopted_models(x)
-  cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(adopted)} mechanism{?s} adopted")
-  cli::cli_bullets(c("*" = "{diagnosis_verdict(x)$tag}"))
-  listed_alone <- if (length(adopted) > 8) 7 else length(adopted)
-  for (model in adopted[seq_len(listed_alone)]) {
-    row <- x$candidates[x$candidates$from == model$parent & x$candidates$mechanism == model$mechanism, ]
-    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}",
-                                   "({x$catalogue[[model$mechanism]]$boundary}), log10 Bayes factor",
-                                   "{round(row$log10_bf, 1)}")))
-  }
-  others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")
-  if (length(others)) cli::cli_bullets(c("*" = "{others}"))
-  g <- x$gain
-  cli::cli_bullets(c("*" = paste("RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in",
-                                 "calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)}",
-                                 "held out"),
-                     "*" = "stopped because {x$stopped_because}",
-                     ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
-})
+adopted_models <- function(upgrade) upgrade$models[-1]

@@ -69,16 +69,6 @@ confounded_parameters <- function(fit, new) {
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > 0.4]
 }
 
-# TRUE for each parameter whose 95 % interval touches an end of its prior (in probability, within 1 %), where the prior
-# ends abruptly.
-edge_of_prior <- function(fit) {
-  unit <- posterior_unit(fit)
-  stats::setNames(vapply(seq_len(ncol(unit)), function(p) {
-    q <- weighted_quantile(unit[, p], fit$weights, c(0.025, 0.5, 0.975))
-    (q[3] > 0.99 && q[2] > 0.9) || (q[1] < 0.01 && q[2] < 0.1)
-  }, NA), colnames(fit$values))
-}
-
 # TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The
 # mechanism that made the error leaves nothing; one that imitates it does.
 much_remains <- function(models, measurements) {

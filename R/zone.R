@@ -586,3 +586,15 @@ print.amiss_zone <- function(x, ...) {
   cat("Needs columns: ", paste(zone_boundary(x), collapse = ", "), "\n", sep = "")
   invisible(x)
 }
+
+#' @export
+free_parameters.amiss_zone <- function(simulator) zone_parameters(simulator)
+
+#' @export
+driver_names.amiss_zone <- function(simulator) zone_boundary(simulator)
+
+#' @export
+simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+  check_run_dots(...)
+  simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
+}

@@ -12,8 +12,8 @@ Rcpp::Rostream<false>& Rcpp::Rcerr = Rcpp::Rcpp_cerr_get();
 #endif
 
 // ais_
-Rcpp::List ais_(const Rcpp::Function& log_likelihood, const Rcpp::Nullable<Rcpp::Function>& gradient, int dimension, const Rcpp::List& control, const Rcpp::List& context);
-RcppExport SEXP _amiss_ais_(SEXP log_likelihoodSEXP, SEXP gradientSEXP, SEXP dimensionSEXP, SEXP controlSEXP, SEXP contextSEXP) {
+Rcpp::List ais_(const Rcpp::Function& log_likelihood, const Rcpp::Nullable<Rcpp::Function>& gradient, int dimension, const Rcpp::List& control, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_ais_(SEXP log_likelihoodSEXP, SEXP gradientSEXP, SEXP dimensionSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
@@ -21,8 +21,18 @@ BEGIN_RCPP
     Rcpp::traits::input_parameter< const Rcpp::Nullable<Rcpp::Function>& >::type gradient(gradientSEXP);
     Rcpp::traits::input_parameter< int >::type dimension(dimensionSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
-    rcpp_result_gen = Rcpp::wrap(ais_(log_likelihood, gradient, dimension, control, context));
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
+    rcpp_result_gen = Rcpp::wrap(ais_(log_likelihood, gradient, dimension, control, context_list));
+    return rcpp_result_gen;
+END_RCPP
+}
+// ais_defaults_
+Rcpp::List ais_defaults_();
+RcppExport SEXP _amiss_ais_defaults_() {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    rcpp_result_gen = Rcpp::wrap(ais_defaults_());
     return rcpp_result_gen;
 END_RCPP
 }
@@ -244,6 +254,7 @@ END_RCPP
 
 static const R_CallMethodDef CallEntries[] = {
     {"_amiss_ais_", (DL_FUNC) &_amiss_ais_, 5},
+    {"_amiss_ais_defaults_", (DL_FUNC) &_amiss_ais_defaults_, 0},
     {"_amiss_cpu_has_avx2_", (DL_FUNC) &_amiss_cpu_has_avx2_, 0},
     {"_amiss_make_basis_", (DL_FUNC) &_amiss_make_basis_, 2},
     {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 4},

@@ -1,0 +1,350 @@
+#' Diagnosis in words
+#'
+#' What is wrong, how sure that is, what would change, what it brings and what remains, as plain sentences and tables;
+#' [report()] sets it out.
+#'
+#' @param object An upgrade ([upgrade_model()]).
+#' @param x The summary.
+#' @param ... Not used.
+#' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`), `tag`, `headline`; the
+#'   sentences `note`, `sure`, `change`, `gain`, `remains` and `inspect` (what to inspect next, to settle what is open);
+#'   `mechanisms`, for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits
+#'   `also` and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`, `attribution` and
+#'   `method`.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      validate = table$hour > 72)
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
+#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' })
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 19))
+#' upgrade <- upgrade_model(linear, room, catalogue(sun), runs = 20, control = quick, seed = 1, quiet = TRUE)
+#' summary(upgrade)
+#' @export
+summary.amiss_upgrade <- function(object, ...) {
+  verdict <- diagnosis_verdict(object)
+  last <- object$models[[length(object$models)]]
+  structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
+              list(note = size_note(object), sure = sure_sentences(object), change = change_sentences(object),
+                   gain = gain_sentences(object), remains = remaining_sentences(object),
+                   inspect = upgrade_inspections(object),
+                   mechanisms = lapply(adopted_models(object), mechanism_words, object), scores = scores_table(object),
+                   changes = changes_table(object), candidates = candidates_words(object),
+                   parameters = parameters_words(last$fit), attribution = last$attribution$table,
+                   method = method_table(object),
+                   stopped_because = object$stopped_because, seed = object$seed)), class = "summary.amiss_upgrade")
+}
+
+#' @rdname summary.amiss_upgrade
+#' @export
+print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
+  cli::cli_text("{.strong {x$title}}: {x$tag}")
+  cli::cli_text("{x$headline}")
+  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain,
+                "What remains" = x$remains,
+                "What to inspect next" = x$inspect)
+  for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
+  cli::cli_bullets(c(">" = "next: {.fun report}"))
+})
+
+# The first step's trials, best first, and the probability that is left to no change.
+first_trials <- function(upgrade) {
+  table <- upgrade$candidates[upgrade$candidates$from == upgrade$models[[1]]$name, ]
+  table[order(-table$log10_bf), ]
+}
+
+last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$attribution$table
+
+# The verdict on the whole: what of the mechanisms adopted is named, or what stays open.
+diagnosis_verdict <- function(upgrade) {
+  adopted <- adopted_models(upgrade)
+  if (!length(adopted)) return(open_verdict(upgrade))
+  of <- function(verdict) Filter(function(m) m$verdict == verdict, adopted)
+  headline <- cause_headline(upgrade)
+  if (length(of("named"))) {
+    return(list(verdict = "named", tag = if (length(of("named")) > 1) "Causes named" else "Cause named",
+                headline = headline))
+  }
+  likely <- of("likely")
+  if (length(likely)) {
+    return(list(verdict = "likely", tag = paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; ")),
+                headline = headline))
+  }
+  list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
+}
+
+open_verdict <- function(upgrade) {
+  unexplained <- function(headline) list(verdict = "unexplained", tag = "Unexplained", headline = headline)
+  base <- upgrade$models[[1]]
+  answers <- significant_conditions(base$attribution$table)
+  if (length(answers)) {
+    return(unexplained(
+      sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.",
+                               listed(answers))))
+  }
+  remainder <- remaining_error(base, upgrade$measurements)
+  if (remainder$large) {
+    return(unexplained(sprintf(paste("Something is missing from the model that no mechanism of the catalogue explains:",
+                                     "its error is %s times the stated noise; %s."),
+                               short(remainder$ratio),
+                               remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
+  }
+  if (!base$fit$trust$trusted) {
+    return(list(verdict = "nothing", tag = "Nothing decisive, but the numbers are not trusted",
+                headline = paste0("No mechanism is called for, but the numbers behind this are not to be trusted: ",
+                                  base$fit$trust$verdict, ".")))
+  }
+  list(verdict = "nothing", tag = "Nothing decisive",
+       headline = paste("Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no",
+                        "boundary condition."))
+}
+
+# The sentences of all mechanisms adopted, each as firmly as its verdict allows.
+cause_headline <- function(upgrade) {
+  adopted <- adopted_models(upgrade)
+  sentence <- function(m) upgrade$catalogue[[m$mechanism]]$sentence
+  adopted <- adopted[order(match(vapply(adopted, `[[`, "", "verdict"), c("named", "likely", "stand-in")))]
+  told <- vapply(seq_along(adopted), function(k) {
+    m <- adopted[[k]]
+    switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
+           likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
+           paste0("\"", m$mechanism,
+                  "\" fits too, but data held out do not gain by it: take it as a stand-in for something else."))
+  }, "")
+  paste(told, collapse = " ")
+}
+
+# TRUE where no data were held out, or the changes as a whole lower their error by more than its own error.
+improves_held_out <- function(upgrade) {
+  last <- upgrade$models[[length(upgrade$models)]]
+  !isFALSE(held_out_gain(upgrade$models[[1]], last)$improves)
+}
+
+evidence_sentence <- function(row) {
+  sprintf("The evidence for %s is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf),
+          odds_interval(c(row$lower95, row$upper95)))
+}
+
+# Left out where both ends read the same.
+odds_interval <- function(interval) {
+  ends <- power_of_ten(abs(interval))
+  if (ends[1] == ends[2]) return("")
+  told <- if (interval[1] >= 0) paste(ends, collapse = " to ")
+  else if (interval[2] <= 0) paste(paste(rev(ends), collapse = " to "), "to 1 against")
+  else paste(ends[1], "to 1 against, to", ends[2], "to 1 in favour")
+  sprintf(" (95 %% interval: %s)", told)
+}
+
+sure_sentences <- function(upgrade) {
+  if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
+  trials <- first_trials(upgrade)
+  best <- trials[1, ]
+  needed <-
+    sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no",
+                  "doubt who gains."),
+            sub(" in favour", "", odds(upgrade$control$decisive)))
+  if (!length(adopted_models(upgrade))) {
+    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
+             trust_sentence(upgrade, best)))
+  }
+  later <- vapply(adopted_models(upgrade)[-1], function(m) {
+    evidence_sentence(upgrade$candidates[upgrade$candidates$from == m$parent &
+                                         upgrade$candidates$mechanism == m$mechanism, ])
+  }, "")
+  c(evidence_sentence(best), later, probability_sentence(trials), trust_sentence(upgrade, best))
+}
+
+# Only where the size of the error itself says that something is missing.
+missing_sentence <- function(upgrade) {
+  left <- remaining_error(upgrade$models[[1]], upgrade$measurements)
+  if (left$large)
+    sprintf("That something is missing is plain: the error is %s times the stated noise. What it is stays open.",
+            short(left$ratio))
+}
+
+probability_sentence <- function(trials) {
+  all <- stats::setNames(c(trials$probability, max(0, 1 - sum(trials$probability))), c(trials$mechanism, "no change"))
+  all <- sort(all, decreasing = TRUE)
+  near <- all[-1][all[-1] >= 0.01]
+  told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
+  paste0("Of ", nrow(trials), if (nrow(trials) == 1) " mechanism" else " mechanisms",
+         " tried and \"no change\", all equally likely beforehand, ",
+         names(all)[1], " holds ", percent(unname(all[1])), " of the probability",
+         if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
+}
+
+# Whether the numbers behind the first decision can be trusted, in words; if not, whether the decision hangs on it.
+trust_sentence <- function(upgrade, best) {
+  base <- upgrade$models[[1]]$fit$trust
+  if (base$trusted && best$trusted) return("The numbers behind this can be trusted: the sampler passed its own checks.")
+  who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
+  why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
+  sprintf("The numbers are rough for %s%s: read the odds as an order of size. %s", listed(who), why,
+          if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
+          else "The decision may hang on it: more runs or chains would settle it.")
+}
+
+# How large the matter is, beside the noise and on data held out.
+size_note <- function(upgrade) {
+  m <- upgrade$measurements
+  seen <- score_of(upgrade, "calibrate", "rmse")
+  held <- score_of(upgrade, "validate", "rmse")
+  unit <- pretty_unit(m$unit)
+  noise <- sprintf("the stated measurement noise is %s %s", short(m$noise_sd), unit)
+  if (length(seen) < 2) return(sprintf("The model's typical error is %s %s; %s.", short(seen), unit, noise))
+  change <- if (length(upgrade$models) > 2) "changes" else "change"
+  if (!improves_held_out(upgrade)) {
+    return(sprintf(paste("The %s not improve predictions of data the model has not seen (typical error %s %s before,",
+                         "%s after; %s). Take it as a hint, not as a repair."),
+                   if (length(upgrade$models) > 2) "changes do" else "change does", short(held[1]), unit,
+                   short(held[2]), noise))
+  }
+  if (anyNA(held))
+    sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit), noise)
+  else sprintf("With the %s the typical error on data the model has not seen %s; %s.", change,
+               change_words(held[1], held[2], m$unit), noise)
+}
+
+change_sentences <- function(upgrade) {
+  adopted <- adopted_models(upgrade)
+  if (!length(adopted)) return("Nothing: the base model stays as it is.")
+  trials <- upgrade$candidates
+  unlist(lapply(adopted, function(model) {
+    row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
+    entry <- upgrade$catalogue[[model$mechanism]]
+    c(sprintf("%s (%s), driven by %s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict,
+              listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf)),
+      step_sentence(upgrade, model), doubt_sentence(model), confounded_sentence(model))
+  }))
+}
+
+# All that is told of one mechanism.
+mechanism_words <- function(model, upgrade) {
+  row <- upgrade$candidates[upgrade$candidates$from == model$parent & upgrade$candidates$mechanism == model$mechanism, ]
+  entry <- upgrade$catalogue[[model$mechanism]]
+  changes <- changes_table(upgrade)
+  list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary, sentence = entry$sentence,
+       evidence = evidence_sentence(row), brought = step_sentence(upgrade, model), against = doubt_sentence(model),
+       also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
+       inspect = mechanism_inspections(upgrade, model),
+       changes = changes[changes$mechanism == model$mechanism, ])
+}
+
+# What else could have been adopted at the same step.
+rival_sentence <- function(upgrade, model) {
+  trials <- upgrade$candidates[upgrade$candidates$from == model$parent, ]
+  others <- trials[trials$mechanism != model$mechanism, ]
+  kept <- stats::setNames(c(others$probability, max(0, 1 - sum(trials$probability))), c(others$mechanism, "no change"))
+  kept <- sort(kept[kept >= 0.01], decreasing = TRUE)
+  if (!length(kept))
+    return("Neither another mechanism tried at this step nor \"no change\" keeps one per cent of the probability.")
+  sprintf("At this step %s too: %s.", if (length(kept) > 1) "others are possible" else "another is possible",
+          listed(paste0(names(kept), " (", percent(unname(kept)), ")")))
+}
+
+# What one step brought.
+step_sentence <- function(upgrade, model) {
+  parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
+  unit <- upgrade$measurements$unit
+  told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
+  gain <- model$held_out_gain
+  sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
+          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s the uncertainty of that change",
+                                                    told("validate"),
+                                                    if (gain$improves) "more than" else "not more than"))
+}
+
+doubt_sentence <- function(model) {
+  if (length(model$doubts)) sprintf("Against %s speaks that %s.", model$mechanism, listed(model$doubts))
+}
+
+confounded_sentence <- function(model) {
+  if (length(model$confounded_with)) {
+    sprintf("What %s does, %s could do in part as well (correlated beyond 0.4).", model$mechanism,
+            listed(parameter_labels(model$fit, model$confounded_with)))
+  }
+}
+
+gain_sentences <- function(upgrade) {
+  unit <- upgrade$measurements$unit
+  seen <- score_of(upgrade, "calibrate", "rmse")
+  held <- score_of(upgrade, "validate", "rmse")
+  inside <- score_of(upgrade, if (anyNA(held)) "calibrate" else "validate", "coverage95")
+  inside <- round(100 * inside[length(inside)])
+  told <- function(v) if (length(v) < 2) paste("is", short(v), pretty_unit(unit)) else change_words(v[1], v[2], unit)
+  c(paste0("The typical error (RMSE) ", told(seen), " in calibration",
+           if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
+    if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
+    sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside,
+            if (anyNA(held)) "calibration" else "held-out",
+            if (inside < 88) paste0(": ",
+                                    narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
+}
+
+# Too few measurements in the band: because the simulation lies to one side of them, or all round.
+narrow_words <- function(upgrade) {
+  p <- upgrade$models[[length(upgrade$models)]]$prediction
+  p <- p[p$use == if (has_validation(upgrade)) "validate" else "calibrate", ]
+  bias <- mean(p$observed - p$mean)
+  if (abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
+  sprintf("the simulation is on average %s %s too %s there", short(abs(bias)), pretty_unit(upgrade$measurements$unit),
+          if (bias > 0) "low" else "high")
+}
+
+remaining_sentences <- function(upgrade) {
+  answers <- significant_conditions(last_attribution(upgrade))
+  rows <- parameter_rows(upgrade$models[[length(upgrade$models)]]$fit)
+  edge <- rows$label[rows$at_edge]
+  last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
+  c(if (length(answers)) sprintf("The remaining error answers to %s.",
+                                 listed(answers)) else "The remaining error answers to no boundary condition.",
+    if (last$large) sprintf("In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
+                            if (is.null(last$pattern))
+                              ": either the stated noise is too small, or something else is missing."
+                            else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
+    reach_sentence(upgrade$models[[length(upgrade$models)]]$fit),
+    vapply(group_words(upgrade$models[[length(upgrade$models)]]$attribution), paste0, "", "."),
+    if (length(edge))
+      sprintf(paste("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these",
+                    "parameters make up for something else."),
+              listed(edge))
+    else "No parameter is at the edge of its range.",
+    sprintf("The search stopped because %s%s.",
+            sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
+            if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))
+}
+
+# What the reach of the discrepancy says of the last model.
+reach_sentence <- function(fit) {
+  free <- sum(fit$reach[is.infinite(fit$control$reach)])
+  if (length(fit$reach) > 1 && free > 0.9)
+    paste("What remains reaches into what the parameters can do: they may hide a part of it, so do not read their",
+          "values as physical.")
+}
+
+#' @export
+print.amiss_upgrade <- function(x, ...) on_stdout(x, {
+  adopted <- adopted_models(x)
+  cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(adopted)} mechanism{?s} adopted")
+  cli::cli_bullets(c("*" = "{diagnosis_verdict(x)$tag}"))
+  listed_alone <- if (length(adopted) > 8) 7 else length(adopted)
+  for (model in adopted[seq_len(listed_alone)]) {
+    row <- x$candidates[x$candidates$from == model$parent & x$candidates$mechanism == model$mechanism, ]
+    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}",
+                                   "({x$catalogue[[model$mechanism]]$boundary}), log10 Bayes factor",
+                                   "{round(row$log10_bf, 1)}")))
+  }
+  others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")
+  if (length(others)) cli::cli_bullets(c("*" = "{others}"))
+  g <- x$gain
+  cli::cli_bullets(c("*" = paste("RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in",
+                                 "calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)}",
+                                 "held out"),
+                     "*" = "stopped because {x$stopped_because}",
+                     ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
+})

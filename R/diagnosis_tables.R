@@ -1,0 +1,66 @@
+# Tables of the diagnosis, as the report and the inspections show them.
+
+parameter_labels <- function(fit, names) {
+  rows <- parameter_rows(fit)
+  rows$label[match(names, rows$name)]
+}
+
+# The parameters that each adopted mechanism brought, as the last model sees them.
+changes_table <- function(upgrade) {
+  models <- upgrade$models
+  last <- parameters_words(models[[length(models)]]$fit)
+  rows <- lapply(seq_along(models)[-1], function(k) {
+    new <- setdiff(names(models[[k]]$fit$emulator$parameters), names(models[[k - 1]]$fit$emulator$parameters))
+    own <- last[last$name %in% new, ]
+    if (nrow(own)) cbind(mechanism = models[[k]]$mechanism, own)
+  })
+  do.call(rbind, rows)
+}
+
+parameters_words <- function(fit) {
+  rows <- parameter_rows(fit)
+  data.frame(name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit), median = short(rows$median, 3),
+             "95 % interval" = paste(short(rows$lower95, 3), "to", short(rows$upper95, 3)),
+             "range thought possible" = paste(short(rows$prior_lower, 3), "to", short(rows$prior_upper, 3)),
+             note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
+}
+
+scores_table <- function(upgrade) {
+  table <- gain_table(upgrade)
+  values <- stats::xtabs(seq_len(nrow(table)) ~ paste(table$panel, table$use, sep = ", ") + table$stage)
+  keys <- unique(paste(table$panel, table$use, sep = ", "))
+  columns <- lapply(levels(table$stage), function(s) as.character(table$label[values[keys, s]]))
+  cbind(score = keys, as.data.frame(stats::setNames(columns, levels(table$stage)), optional = TRUE))
+}
+
+candidates_words <- function(upgrade) {
+  if (is.null(upgrade$candidates)) return(NULL)
+  table <- candidate_table(upgrade)
+  table <- table[order(table$step, -table$log10_bf), ]
+  drives <- vapply(table$mechanism, function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
+  data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
+             "log10 Bayes factor" = signed(table$log10_bf),
+             "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)), evidence = table$word,
+             probability = percent(table$probability), estimate = ifelse(table$trusted, "sound", "rough"),
+             decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
+}
+
+# What each adopted model was computed with.
+method_table <- function(upgrade) {
+  value <- function(model) {
+    fit <- model$fit
+    unit <- pretty_unit(fit$measurements$unit)
+    c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
+      paste(short(fit$measurements$noise_sd), unit), paste(short(fit$emulator$basis$discarded_rms), unit),
+      paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ",
+             signed(fit$interval[2] / log(10)), ")"),
+      fit$check$verdict %||% "not checked", fit$trust$verdict)
+  }
+  columns <- lapply(upgrade$models, value)
+  names(columns) <- vapply(upgrade$models, `[[`, "", "name")
+  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M",
+                     "stated measurement noise",
+                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)",
+                     "emulator", "trust"),
+        as.data.frame(columns, optional = TRUE))
+}

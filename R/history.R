@@ -1,0 +1,15 @@
+# The discrepancy as a response to the history of the boundary conditions, as the engine takes it.
+
+# Filter responses over the whole averaged record, so that each calibration row knows its history.
+filter_responses <- function(measurements, time_constants) {
+  all <- seq_along(measurements$y)
+  filter_bank_(measurements$boundary, time_constants, measurements$hours, segment_starts(measurements, all))
+}
+
+history_data <- function(emulator, measurements, rows, control) {
+  responses <- filter_responses(measurements, control$time_constants)
+  list(y = measurements$y[rows], basis = emulator$basis$vectors, moves = simulator_moves(emulator),
+       responses = responses[rows, , drop = FALSE],
+       condition = rep(measurements$condition - 1L, each = length(control$time_constants)),
+       time = measurements$hours[rows], new_segment = segment_starts(measurements, rows))
+}
