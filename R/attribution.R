@@ -158,3 +158,8 @@ tidy.amiss_attribution <- function(x, ...) {
   rlang::check_dots_empty()
   x$table
 }
+
+#' @export
+condition_table.amiss_calibration <- function(fit, settings) {
+  attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)$table
+}

@@ -76,15 +76,10 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
   result <- staged("sampling the posterior", call_engine(
     calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads))))
   posterior <- result$posterior
-  fit <- structure(list(format_version = format_version, emulator = emulator, measurements = measurements,
-                        control = control,
-                        seed = set$seed, rows = set$rows, values = unit_to_values(posterior$unit, emulator$parameters),
-                        weights = posterior$weights, posterior = posterior, kept = result$kept, priors = set$priors,
-                        coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
-                        centre = result$centre, scale = result$scale,
-                        reach = stats::setNames(result$reach, format(control$reach, trim = TRUE)),
-                        log_evidence = posterior$log_evidence, standard_error = posterior$standard_error,
-                        interval = posterior$interval), class = c("amiss_calibration", "amiss_fit"))
+  fit <- new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept,
+                 coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
+                 centre = result$centre, scale = result$scale,
+                 reach = stats::setNames(result$reach, format(control$reach, trim = TRUE)))
   checked <- checked_by_runs(fit, threads)
   checked$fit$trust <- fit_trust(checked$fit)
   checked
@@ -185,4 +180,12 @@ reach_words <- function(fit) {
   if (free <= 0.1)
     return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))
   sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)
+}
+
+#' @export
+calibrator.amiss_calibration <- function(fit) calibrate
+
+#' @export
+default_control.amiss_calibration <- function(fit) {
+  fill_calibration_control(NULL, fit$measurements, length(fit$rows))
 }

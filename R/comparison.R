@@ -106,9 +106,7 @@ compared_model <- function(simulator, name, settings) {
                  class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
   })
   settings$keep(list("compared", name, plain(simulator)), {
-    attribution <- if (inherits(fit, "amiss_paper_calibration")) fit$index
-                   else attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
-                                              threads = settings$threads)$table
+    attribution <- condition_table(fit, settings)
     prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)
     list(name = name, fit = fit, attribution = attribution, prediction = prediction,
          scores = prediction_scores(prediction),

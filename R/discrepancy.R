@@ -24,8 +24,8 @@
 #' plot(discrepancy(fit))
 #' @export
 discrepancy <- function(fit) {
-  check_input(checkmate::check_multi_class(fit, c("amiss_calibration", "amiss_paper_calibration")), "fit")
-  if (inherits(fit, "amiss_paper_calibration")) return(paper_discrepancy(fit))
+  check_input(checkmate::check_class(fit, "amiss_fit"), "fit")
+  if (!knows_history(fit)) return(paper_discrepancy(fit))
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   draws <- lacking_response(fit, data$responses, data$moves)
   responses <- condition_responses(fit, data)

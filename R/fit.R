@@ -75,16 +75,13 @@ update.amiss_fit <- function(object, emulator = object$emulator, measurements = 
                              seed = object$seed, threads = 1, ...) {
   rlang::check_dots_empty()
   check_input(checkmate::check_list(control, null.ok = TRUE), "control", "Give a list of named options.")
-  again <- if (inherits(object, "amiss_paper_calibration")) calibrate_paper else calibrate
-  again(emulator, measurements, utils::modifyList(given_control(object), as.list(control)),
-        seed = seed, threads = threads)
+  control <- utils::modifyList(given_control(object), as.list(control))
+  calibrator(object)(emulator, measurements, control, seed = seed, threads = threads)
 }
 
 # The options that differ from what they would be if none were given. The others may follow from the measurements.
 given_control <- function(fit) {
-  n <- length(fit$rows)
-  paper <- inherits(fit, "amiss_paper_calibration")
-  defaults <- if (paper) fill_paper_control(NULL, n) else fill_calibration_control(NULL, fit$measurements, n)
+  defaults <- default_control(fit)
   given <- changed(fit$control, defaults)
   if (!is.null(given$ais)) given$ais <- changed(given$ais, defaults$ais)
   given

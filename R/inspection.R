@@ -51,7 +51,7 @@ comparison_inspections <- function(comparison) {
 
 trust_inspections <- function(fit, name) {
   runs <- nrow(fit$emulator$processes$inputs)
-  sampler <- fit$posterior %||% fit$trust  # of the paper's calibration
+  sampler <- sampler_said(fit)  # of the paper's calibration
   more <- if (is.null(fit$emulator$simulator)) "give more runs where the posterior lies"
           else sprintf("make more runs (%d now)", runs)
   c(if (isFALSE(fit$check$passed)) {

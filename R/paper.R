@@ -36,8 +36,8 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of the parameters),
 #'   `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of equations 5 and 6 and the total),
 #'   `hyperparameters` (draws of `alpha`, the fictitious condition last, `t2`, `lambda` and their weights), `lambda`
-#'   (draws of the precisions of equation 5), `index` (ranked table), `share` (draws of `R2`), `trust`, and `inside` and
-#'   `outside`, all that the sampler said of (5) and (6); `outside$approximation` tells the largest error among the
+#'   (draws of the precisions of equation 5), `index` (ranked table), `share` (draws of `R2`), `trust`, and `posterior`
+#'   and `outside`, all that the sampler said of (5) and (6); `outside$approximation` tells the largest error among the
 #'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the
 #'   last, and in the last by skeletons and directly. [tidy()][posterior] gives the table of the parameters.
 #' @examples
@@ -70,15 +70,13 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
   hyperparameters <- c(outside$hyperparameters, list(weights = outside$weights))
   colnames(hyperparameters$alpha) <- c(conditions, "(fictitious)")
   colnames(result$index$share) <- c(conditions, "(fictitious)")
-  structure(list(format_version = format_version, emulator = emulator, measurements = measurements, control = control,
-                 seed = seed, rows = rows, priors = priors, values = unit_to_values(inside$unit, emulator$parameters),
-                 weights = inside$weights, lambda = inside$lambda, hyperparameters = hyperparameters,
-                 evidence = evidence, log_evidence = evidence$log_evidence[3],
-                 standard_error = evidence$standard_error[3],
-                 interval = c(evidence$lower95[3], evidence$upper95[3]), log_jacobian = result$log_jacobian,
-                 trust = paper_trust(outside, inside), index = index_table(result$index, conditions),
-                 share = result$index$share,
-                 inside = inside, outside = outside), class = c("amiss_paper_calibration", "amiss_fit"))
+  total <- list(log_evidence = evidence$log_evidence[3], standard_error = evidence$standard_error[3],
+                interval = c(evidence$lower95[3], evidence$upper95[3]))
+  set <- list(emulator = emulator, measurements = measurements, control = control, seed = seed, rows = rows,
+              priors = priors)
+  new_fit("amiss_paper_calibration", set, inside, total, lambda = inside$lambda, hyperparameters = hyperparameters,
+          evidence = evidence, log_jacobian = result$log_jacobian, trust = paper_trust(outside, inside),
+          index = index_table(result$index, conditions), share = result$index$share, outside = outside)
 }
 
 # What a person should know before using it.
@@ -148,3 +146,12 @@ print.amiss_paper_calibration <- function(x, ...) on_stdout(x, {
   cli::cli_bullets(
     c(">" = "next: {.fun calibrate} and {.fun attribute_discrepancy}, which know the history of the conditions"))
 })
+
+#' @export
+calibrator.amiss_paper_calibration <- function(fit) calibrate_paper
+
+#' @export
+default_control.amiss_paper_calibration <- function(fit) fill_paper_control(NULL, length(fit$rows))
+
+#' @export
+condition_table.amiss_paper_calibration <- function(fit, settings) fit$index

@@ -1,7 +1,7 @@
 # Weighted draws of the parameters: their quantiles, equal ones from them, and their tables.
 
 # Posterior draws of the parameters in the unit cube.
-posterior_unit <- function(fit) (fit$posterior %||% fit$inside)$unit
+posterior_unit <- function(fit) fit$posterior$unit
 
 # n draws, each with equal weight, from weighted ones; deterministic.
 systematic_draws <- function(weights, n) {

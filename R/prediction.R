@@ -54,7 +54,7 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
   threads <- check_threads(threads)
   seed <- pick_seed(seed)
   check_input(checkmate::check_flag(discrepancy), "discrepancy")
-  if (discrepancy && !inherits(object, "amiss_calibration")) {
+  if (discrepancy && !knows_history(object)) {
     abort_input(paste("{.arg discrepancy} needs a fit of {.fun calibrate}:",
                       "that of the paper does not carry over to other rows."))
   }
@@ -230,7 +230,7 @@ simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) 
   require_simulator(object)
   threads <- check_threads(threads)
   seed <- pick_seed(seed)
-  history <- inherits(object, "amiss_calibration")
+  history <- knows_history(object)
   pool <- if (history) object$kept + 1L else even_draws(object, max(nsim, 32))
   records <- with_seed(seed, {
     member <- rep_len(sample.int(length(pool)), nsim)

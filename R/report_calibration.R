@@ -22,7 +22,7 @@ calibration_words <- function(fit, only) {
        headline = sprintf("The calibrated model's typical error is %s %s, %s times the stated noise.",
                           short(model$scores$calibrate[["rmse"]]), pretty_unit(fit$measurements$unit),
                           short(left$ratio)),
-       sure = c(sprintf("Sampler: %s.", (fit$posterior %||% fit$trust)$verdict),
+       sure = c(sprintf("Sampler: %s.", sampler_said(fit)$verdict),
                 if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
        gain = gain_sentences(only),
        remains = c(if (!is.null(left$pattern)) sprintf("In the error that remains, %s.", left$pattern$what),
@@ -36,5 +36,5 @@ calibration_words <- function(fit, only) {
 #' @export
 report_content.amiss_fit <- function(x) {
   only <- as_only_model(x)
-  list(fit = x, only = only, told = calibration_words(x, only), history = inherits(x, "amiss_calibration"))
+  list(fit = x, only = only, told = calibration_words(x, only), history = knows_history(x))
 }

@@ -29,12 +29,12 @@ sbc_one <- list(
     drawn <- draw_paper(world, full, amiss:::fictitious_condition_(sbc_steps, full$fictitious_seed))
     fit <- amiss::calibrate_paper(world$emulator, observed(world$measurements, drawn$y), control, seed = seed)
     h <- fit$hyperparameters
-    inside <- cbind(fit$inside$unit, fit$lambda)
+    inside <- cbind(fit$posterior$unit, fit$lambda)
     colnames(inside) <- names(drawn$inside)
     outside <- cbind(h$alpha, h$t2, h$lambda)
     colnames(outside) <- names(drawn$outside)
     list(inside = ranks(drawn$inside, inside, fit$weights), outside = ranks(drawn$outside, outside, h$weights),
-         trusted = c(inside = fit$inside$trusted, outside = fit$outside$trusted))
+         trusted = c(inside = fit$posterior$trusted, outside = fit$outside$trusted))
   },
   # The record is the emulator's: the simulator is not asked.
   history = function(world, control, seed) {

@@ -1,0 +1,25 @@
+# What every calibration has, by whatever method it was made.
+
+# A calibration by whatever method: what went into it (`set`: emulator, measurements, control, seed, rows, priors), what
+# the sampler said of the parameters, the evidence, and what its method alone knows.
+new_fit <- function(class, set, posterior, evidence, ...) {
+  common <- c("emulator", "measurements", "control", "seed", "rows", "priors")
+  structure(c(list(format_version = format_version), set[common],
+              list(values = unit_to_values(posterior$unit, set$emulator$parameters), weights = posterior$weights,
+                   posterior = posterior),
+              evidence[c("log_evidence", "standard_error", "interval")], list(...)),
+            class = c(class, "amiss_fit"))
+}
+
+# The function that made a fit, and its options if none are given.
+calibrator <- function(fit) UseMethod("calibrator")
+default_control <- function(fit) UseMethod("default_control")
+
+# What a comparison shows of the conditions.
+condition_table <- function(fit, settings) UseMethod("condition_table")
+
+# What the sampler said: of the paper's calibration, which samples twice, of both.
+sampler_said <- function(fit) if (knows_history(fit)) fit$posterior else fit$trust
+
+# Whether the discrepancy answers to the history of the conditions: then it carries over to other rows.
+knows_history <- function(fit) !is.null(fit$coefficients)
