@@ -10,10 +10,10 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
 #' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
-#' these responses, in amounts that are free, tells which mechanisms promise what adoption asks for: their full Bayes
-#' factor is taken to be at most twice as large (in decades), and the margin. Those are calibrated, the best first; the
-#' others only if one of those could be adopted, as it must be compared with every rival. `candidates$judged_by` is
-#' `"response"` for those that were not.
+#' these responses, in amounts that are free, says in which order mechanisms are calibrated, and is all that is known of
+#' those that a budget (`runs_total`) leaves no runs for: `candidates$judged_by` is `"response"` for them. It is no
+#' verdict: where a simulator is far from linear, a mechanism may do elsewhere in the parameters' space what it does not
+#' do there.
 #'
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the
 #' parameters, two thirds of all, and compared with the present model calibrated in the same way; then in full, with the
@@ -192,7 +192,7 @@ try_mechanisms <- function(current, catalogue, settings, say) {
     return(tried_in_full(current, trials, NULL, names(trials), settings, say))
   }
   responses <- staged("responses of the mechanisms", seen_responses(current, trials, settings))
-  if (!is.null(responses)) say("  {sum(responses$runs)} runs show what the mechanisms could explain")
+  if (!is.null(responses)) say("  {sum(responses$runs)} runs show in which order mechanisms are tried")
   screens <- screened_mechanisms(current, trials, responses, settings, say)
   full <- contenders(lapply(screens, `[[`, "fit"), as_coarse(current$fit), settings$control)
   tried_in_full(current, trials, screens, full, settings, say, responses)
@@ -200,25 +200,20 @@ try_mechanisms <- function(current, catalogue, settings, say) {
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
 
-# Coarse calibrations (screen_model()): of the mechanisms whose responses promise enough, the best first; if one of them
-# could be adopted, of all others too, since what is adopted must have been compared with every rival.
+# Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined no
+# further. A budget leaves out the last.
 screened_mechanisms <- function(current, trials, responses, settings, say) {
   coarse <- as_coarse(current$fit)
   screens <- list()
-  screen <- function(names) {
-    turn <- turns("mechanism", length(names))
-    for (name in names) {
-      fits <- lapply(screens, `[[`, "fit")
-      if (length(fits) && settings$spent()) next
-      screens[[name]] <<- staged(turn(name), naming_mechanism(name, screen_model(
-        trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
-      report_candidate(name, screens[[name]]$fit, coarse, say)
-    }
-  }
   ordered <- if (is.null(responses)) names(trials) else names(trials)[order(-responses$log10_bf, na.last = FALSE)]
-  behind <- vapply(ordered, function(name) out_of_reach(responses[name, ], settings$control), NA)
-  screen(ordered[!behind])
-  if (length(contenders(lapply(screens, `[[`, "fit"), coarse, settings$control))) screen(ordered[behind])
+  turn <- turns("mechanism", length(ordered))
+  for (name in ordered) {
+    fits <- lapply(screens, `[[`, "fit")
+    if (length(fits) && settings$spent()) break
+    screens[[name]] <- staged(turn(name), naming_mechanism(name, screen_model(
+      trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
+    report_candidate(name, screens[[name]]$fit, coarse, say)
+  }
   screens
 }
 
@@ -246,14 +241,6 @@ naming_mechanism <- function(name, code) {
 seen_responses <- function(current, trials, settings) {
   if (inherits(trials[[1]], "amiss_ensemble")) return(NULL)
   settings$keep(list("responses", current$name, lapply(trials, plain)), response_factors(current$fit, trials, settings))
-}
-
-# Whether the full evidence of a mechanism, of which its response is a part, is unlikely to come to what adoption asks
-# for. A response at one place of the parameters' space shows a good half of what the mechanism earns with the
-# parameters free to follow: it may be twice as large, and more by the margin.
-out_of_reach <- function(response, control) {
-  if (is.null(response) || is.na(response$log10_bf)) return(FALSE)
-  2 * max(0, response$log10_bf) + 3 * (response$upper95 - response$log10_bf) / 1.96 + control$margin < control$decisive
 }
 
 # Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by

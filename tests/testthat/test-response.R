@@ -56,22 +56,9 @@ test_that("the runs that show responses spread a mechanism's parameters and keep
   expect_equal(nrow(amiss:::response_design(base_fit()$emulator$simulator, centre)), 1)
 })
 
-test_that("a mechanism is out of reach where twice its response and the margin do not come to adoption", {
-  out <- function(log10_bf, error = 0) {
-    amiss:::out_of_reach(data.frame(log10_bf = log10_bf, upper95 = log10_bf + 1.96 * error),
-                         list(decisive = 2, margin = 1.5))
-  }
-  expect_true(out(0.2))
-  expect_false(out(0.3))
-  expect_false(out(0.2, error = 0.1))
-  expect_true(out(-50))
-  expect_false(out(NA_real_))
-  expect_false(amiss:::out_of_reach(NULL, list(decisive = 2, margin = 1.5)))
-})
-
-tried <- function(...) {
+tried <- function(..., spent = function() FALSE) {
   upgrade <- small_upgrade()
-  own <- settings(calibrate = calibrate, measurements = upgrade$measurements, runs = 30)
+  own <- settings(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, spent = spent)
   own$control$calibration <- quick_ais
   amiss:::try_mechanisms(upgrade$models[[1]], catalogue(...), own, say = function(...) NULL)
 }
@@ -81,18 +68,20 @@ drift <- adding("drift", function(values, drivers) values[["d"]] * seq_len(nrow(
 sun <- adding("sun", function(values, drivers) values[["s"]] * lagged(drivers[, "Gv"], 3), free("s", uniform(0, 0.02)),
               boundary = "Gv")
 
-test_that("where no mechanism promises anything none is calibrated, and the table says so", {
-  trials <- tried(drift)
-  expect_length(trials$fits, 0)
-  expect_equal(trials$table$judged_by, "response")
-  expect_false(trials$table$trusted)
-  expect_lt(trials$table$upper95, 2)
-  expect_equal(nrow(trials$table$parameters[[1]]), 0)
+test_that("mechanisms are tried in the order of their responses, all of them", {
+  table <- tried(drift, sun)$table
+  expect_equal(table$mechanism, c("sun", "drift"))
+  expect_equal(table$judged_by, c("calibration", "screening"))
+  expect_equal(tried(drift)$table$judged_by, "screening")
 })
 
-test_that("a mechanism that could be adopted is compared with every other", {
-  table <- tried(drift, sun)$table
-  expect_equal(table$judged_by[match(c("sun", "drift"), table$mechanism)], c("calibration", "screening"))
+test_that("what a budget leaves no runs for is judged by its responses alone, and the table says so", {
+  table <- tried(drift, sun, spent = function() TRUE)$table
+  expect_equal(table$mechanism, c("sun", "drift"))
+  expect_equal(table$judged_by, c("calibration", "response"))
+  expect_false(table$trusted[2])
+  expect_lt(table$upper95[2], 2)
+  expect_equal(nrow(table$parameters[[2]]), 0)
   expect_equal(names(table$parameters[[1]]), names(table$parameters[[2]]))
 })
 
