@@ -53,7 +53,7 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   draws <- list(posterior = fit$posterior, kept = fit$kept, tangent = fit$tangent)
   conditions <- fit$measurements$conditions
-  own <- seq_along(conditions)
+  alone <- seq_along(conditions)
   attributed <- function(least) {
     asked <- c(control, list(least = least * log(10)))
     result <- staged("attributing the discrepancy", call_engine(
@@ -61,17 +61,17 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
     matters <- result$sets$lost / log(10) >= control$least_log10_bf
     c(result,
       list(significant = matters & result$adjusted <= control$level,
-           hidden = (matters & result$adjusted > control$level)[own]))
+           hidden = (matters & result$adjusted > control$level)[alone]))
   }
-  result <- with_hidden_groups(attributed(control$least_log10_bf), attributed, own)
+  result <- with_hidden_groups(attributed(control$least_log10_bf), attributed, alone)
   log10_bf <- result$sets$lost / log(10)
   significant <- result$significant
-  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf[own],
-                      standard_error = result$sets$standard_error[own] / log(10),
-                      share = colMeans(result$shares), p_value = result$adjusted[own],
-                      p_value_single = result$p_value[own],
-                      significant = significant[own], trusted = result$sets$trusted[own], group = NA_character_)
-  groups <- lapply(setdiff(seq_along(log10_bf), own), function(k) {
+  table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf[alone],
+                      standard_error = result$sets$standard_error[alone] / log(10),
+                      share = colMeans(result$shares), p_value = result$adjusted[alone],
+                      p_value_single = result$p_value[alone],
+                      significant = significant[alone], trusted = result$sets$trusted[alone], group = NA_character_)
+  groups <- lapply(setdiff(seq_along(log10_bf), alone), function(k) {
     members <- result$sets$conditions[[k]] + 1L
     list(conditions = conditions[members], log10_bf_dropped = log10_bf[k], p_value = result$adjusted[k],
          significant = significant[k],
@@ -95,10 +95,10 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
 # Of two conditions that say the same, one may earn just enough to stay out of the search for groups, and yet no
 # surrogate misses it, as the other takes its place. Where a condition earns its evidence but no p-value, groups are
 # sought once more with it.
-with_hidden_groups <- function(first, attributed, own) {
+with_hidden_groups <- function(first, attributed, alone) {
   if (!any(first$hidden)) return(first)
-  again <- attributed((max(first$sets$lost[own][first$hidden]) + 1e-6) / log(10))
-  grouped <- unlist(again$sets$conditions[-own]) + 1L
+  again <- attributed((max(first$sets$lost[alone][first$hidden]) + 1e-6) / log(10))
+  grouped <- unlist(again$sets$conditions[-alone]) + 1L
   # What was significant by itself keeps its own name.
   if (length(grouped) && !any(first$significant[grouped])) again else first
 }

@@ -121,13 +121,13 @@ error_ratios_of <- function(fit, draws) {
 # Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior; with the simulator itself nothing is
 # discarded.
 exact_evidence <- function(fit, made, threads) {
-  own <- made$draws
+  drawn <- made$draws
   posterior <- fit$posterior
-  points <- list(setting = posterior$setting[own], variance = posterior$variance[own] - fit$priors$discarded_variance,
-                 t = posterior$t[own, , drop = FALSE])
+  points <- list(setting = posterior$setting[drawn], variance = posterior$variance[drawn] - fit$priors$discarded_variance,
+                 t = posterior$t[drawn, , drop = FALSE])
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   exact <- call_engine(run_likelihood_(data, fit$priors, points, made$runs, engine_context(fit$seed, threads)))
-  log_ratio <- rep(exact - posterior$log_likelihood[own], made$times)
+  log_ratio <- rep(exact - posterior$log_likelihood[drawn], made$times)
   ratio <- exp(log_ratio - max(log_ratio))
   weights <- ratio / sum(ratio)
   n <- length(ratio)

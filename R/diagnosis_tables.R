@@ -11,8 +11,8 @@ changes_table <- function(upgrade) {
   last <- parameters_words(models[[length(models)]]$fit)
   rows <- lapply(seq_along(models)[-1], function(k) {
     new <- setdiff(names(models[[k]]$fit$emulator$parameters), names(models[[k - 1]]$fit$emulator$parameters))
-    own <- last[last$name %in% new, ]
-    if (nrow(own)) cbind(mechanism = models[[k]]$mechanism, own)
+    brought <- last[last$name %in% new, ]
+    if (nrow(brought)) cbind(mechanism = models[[k]]$mechanism, brought)
   })
   do.call(rbind, rows)
 }

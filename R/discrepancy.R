@@ -54,14 +54,14 @@ new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
 # outside the simulation space and B = A^-1 - A^-1 K (K'A^-1 K)^-1 K'A^-1, the covariance of H v' given a draw is
 # (P - B / lambda) / lambda.
 paper_discrepancy <- function(fit, draws = 24) {
-  own <- fit$hyperparameters
-  picked <- systematic_draws(own$weights, draws)
+  hyper <- fit$hyperparameters
+  picked <- systematic_draws(hyper$weights, draws)
   means <- paper_discrepancy_(paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
-                              list(alpha = own$alpha[picked, , drop = FALSE], t2 = own$t2[picked],
-                                   lambda = own$lambda[picked]))
+                              list(alpha = hyper$alpha[picked, , drop = FALSE], t2 = hyper$t2[picked],
+                                   lambda = hyper$lambda[picked]))
   x <- scaled_conditions(fit$measurements, fit$rows)
   basis <- qr.Q(qr(fit$emulator$basis$vectors))
-  within <- vapply(picked, function(i) conditional_variance(x, basis, own$alpha[i, ], own$t2[i], own$lambda[i]),
+  within <- vapply(picked, function(i) conditional_variance(x, basis, hyper$alpha[i, ], hyper$t2[i], hyper$lambda[i]),
                    numeric(nrow(x)))
   mean <- rowMeans(means)
   sd <- sqrt(rowMeans(within) + rowMeans((means - mean)^2))
@@ -106,7 +106,7 @@ condition_responses <- function(fit, data) {
   phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
   b <- rowMeans(fit$coefficients)
   vapply(seq_along(fit$measurements$conditions), function(s) {
-    own <- data$condition == s - 1L
-    as.numeric(phi[, own, drop = FALSE] %*% b[own])
+    columns <- data$condition == s - 1L
+    as.numeric(phi[, columns, drop = FALSE] %*% b[columns])
   }, numeric(nrow(phi)))
 }

@@ -198,12 +198,12 @@ print.amiss_emulator <- function(x, ...) on_stdout(x, {
                                  "95 % intervals hold {round(100 * d$coverage95, 1)} % of the coefficients,",
                                  "{round(100 * d$series_coverage95, 1)} % of the series")))
   if (x$control$selection == "forward") {
-    own <- vapply(seq_len(ncol(x$basis$vectors)),
+    selected <- vapply(seq_len(ncol(x$basis$vectors)),
                   function(q) paste(x$selection$parameter[x$selection$vector == q], collapse = ", "), "")
-    shown <- seq_len(min(length(own), 8))
+    shown <- seq_len(min(length(selected), 8))
     cli::cli_bullets(c("*" = "own beta by forward selection, in order, of {length(x$parameters)} parameters:"))
-    cli::cli_verbatim(sprintf("    vector %d: %s", shown, ifelse(nzchar(own[shown]), own[shown], "none")))
-    if (length(own) > 8) cli::cli_verbatim(sprintf("    %d more: see tidy()", length(own) - 8))
+    cli::cli_verbatim(sprintf("    vector %d: %s", shown, ifelse(nzchar(selected[shown]), selected[shown], "none")))
+    if (length(selected) > 8) cli::cli_verbatim(sprintf("    %d more: see tidy()", length(selected) - 8))
   }
   cli::cli_bullets(c(">" = "next: {.fun calibrate}"))
 })

@@ -164,12 +164,12 @@ stand_in_inspection <- function(model) {
 # What the calibrated values ask to be found on site.
 site_inspection <- function(upgrade, model) {
   table <- changes_table(upgrade)
-  own <- table[table$mechanism == model$mechanism, ]
-  if (!NROW(own)) return(NULL)
-  unit <- ifelse(nzchar(own$unit), paste0(" ", own$unit), "")
-  between <- sub(" to ", " and ", own[["95 % interval"]], fixed = TRUE)
+  brought <- table[table$mechanism == model$mechanism, ]
+  if (!NROW(brought)) return(NULL)
+  unit <- ifelse(nzchar(brought$unit), paste0(" ", brought$unit), "")
+  between <- sub(" to ", " and ", brought[["95 % interval"]], fixed = TRUE)
   c(site = sprintf("If %s is the cause, %s: check that on site.", model$mechanism,
-                   listed(sprintf("%s lies between %s%s", own$parameter, between, unit))))
+                   listed(sprintf("%s lies between %s%s", brought$parameter, between, unit))))
 }
 
 # ---- what was not adopted

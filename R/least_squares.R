@@ -21,8 +21,8 @@ least_squares <- function(fit, threads = 1L) {
     seen
   }
   slopes <- function(unit) {
-    own <- at(unit)
-    if (is.null(own$slopes)) seen$slopes <<- central_differences(error_at, unit, lower, upper)
+    point <- at(unit)
+    if (is.null(point$slopes)) seen$slopes <<- central_differences(error_at, unit, lower, upper)
     seen$slopes
   }
   scale <- length(fit$rows) * m$noise_sd^2

@@ -395,6 +395,6 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
 })
 
 condition_values <- function(measurements, name) {
-  own <- measurements$boundary[, measurements$condition == match(name, measurements$conditions), drop = FALSE]
-  if (ncol(own) == 1) own[, 1] else (atan2(own[, 1], own[, 2]) * 180 / pi) %% 360
+  columns <- measurements$boundary[, measurements$condition == match(name, measurements$conditions), drop = FALSE]
+  if (ncol(columns) == 1) columns[, 1] else (atan2(columns[, 1], columns[, 2]) * 180 / pi) %% 360
 }

@@ -157,8 +157,8 @@ moves_at <- function(fit, use, threads, record = fit$measurements) {
   if (sum(made) < last) {
     abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
   }
-  own <- w[made, -last, drop = FALSE]
-  vectors <- cbind(sweep(runs[, made, drop = FALSE], 2, w[made, last]) %*% own %*% solve(crossprod(own)), 1)
+  coordinates <- w[made, -last, drop = FALSE]
+  vectors <- cbind(sweep(runs[, made, drop = FALSE], 2, w[made, last]) %*% coordinates %*% solve(crossprod(coordinates)), 1)
   vectors %*% emulator$spread
 }
 

@@ -71,24 +71,24 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   trained <- function(ensemble) in_round(train_emulator(ensemble, measurements, control$emulator, threads = threads))
   calibrated <- function(ensemble, calibration, emulator = trained(ensemble)) {
     force(emulator)
-    own <- tryCatch(in_round(calibrate_with_runs(emulator, measurements, calibration, seed, threads)),
+    found <- tryCatch(in_round(calibrate_with_runs(emulator, measurements, calibration, seed, threads)),
                     amiss_error_numerical = function(e) {
       if (is.null(ensemble$region) || round >= rounds) rlang::cnd_signal(e)
     })
-    if (is.null(own)) {  # the posterior lies at the very end of the region
+    if (is.null(found)) {  # the posterior lies at the very end of the region
       next_round()
       runs_made <<- runs_made + runs
       set <- list(emulator = emulator, measurements = measurements)
       wider <- in_round(regional_ensemble(ensemble, wider_region(ensemble$region), set, runs, threads))
       return(calibrated(wider, calibration))
     }
-    runs_made <<- runs_made + length(own$made$draws) + sum(own$made$failed)
-    c(list(ensemble = ensemble), own)
+    runs_made <<- runs_made + length(found$made$draws) + sum(found$made$failed)
+    c(list(ensemble = ensemble), found)
   }
   searched <- function(ensemble, set, centre = NULL) {
-    own <- in_round(staged("search by the simulator", searched_ensemble(ensemble, set, centre, runs, threads)))
-    runs_made <<- runs_made + own$runs
-    calibrated(own$ensemble, coarsely(control$calibration))
+    found <- in_round(staged("search by the simulator", searched_ensemble(ensemble, set, centre, runs, threads)))
+    runs_made <<- runs_made + found$runs
+    calibrated(found$ensemble, coarsely(control$calibration))
   }
   coarse <- FALSE
   result <- first
@@ -231,10 +231,10 @@ regional_ensemble <- function(ensemble, region, fit, runs, threads) {
   values <- unit_to_values(unit, ensemble$parameters)
   outputs <- simulate_measured(ensemble$simulator, values, fit$measurements, "calibrate", threads)
   # The last of the runs that lie inside: those of checks, where the posterior was seen last.
-  own <- utils::tail(which(in_region(region, ensemble$unit)), 40)
-  new_ensemble(ensemble$parameters, rbind(ensemble$unit[own, , drop = FALSE], unit),
-               rbind(ensemble$values[own, , drop = FALSE], values),
-               cbind(ensemble$outputs[, own, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
+  inside <- utils::tail(which(in_region(region, ensemble$unit)), 40)
+  new_ensemble(ensemble$parameters, rbind(ensemble$unit[inside, , drop = FALSE], unit),
+               rbind(ensemble$values[inside, , drop = FALSE], values),
+               cbind(ensemble$outputs[, inside, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
                without_simulator(emulator_over_priors(fit$emulator)), hours = ensemble$hours)
 }
 

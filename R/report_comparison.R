@@ -76,8 +76,8 @@ probability_sentences <- function(comparison) {
 remains_sentences <- function(comparison) {
   table <- comparison$tables$attribution
   vapply(names(comparison$models), function(name) {
-    own <- table[table$model == name & table$significant, ]
-    sprintf("%s: the discrepancy answers to %s.", name, listed(own$boundary, "no boundary condition"))
+    driving <- table[table$model == name & table$significant, ]
+    sprintf("%s: the discrepancy answers to %s.", name, listed(driving$boundary, "no boundary condition"))
   }, "", USE.NAMES = FALSE)
 }
 
@@ -202,7 +202,7 @@ result_list.amiss_comparison <- function(x) {
     model <- x$models[[i]]
     fit <- model$fit
     row <- evidence[i, ]
-    own <- function(table) table_rows(table[table$model == model$name, setdiff(names(table), "model")])
+    rows_of <- function(table) table_rows(table[table$model == model$name, setdiff(names(table), "model")])
     loss <- model$heat_loss
     list(name = model$name, Q = ncol(fit$emulator$basis$vectors), N = length(fit$rows),
          M = nrow(fit$emulator$processes$inputs),
@@ -212,9 +212,9 @@ result_list.amiss_comparison <- function(x) {
          rank = row$rank,
          probability = row$probability, log10_bf = row$log10_bf, log10_bf_interval = c(row$bf_lower95, row$bf_upper95),
          against = row$against,
-         word = row$word, log10_bf_first = row$log10_bf_first, criteria = own(x$tables$criteria)[[1]],
+         word = row$word, log10_bf_first = row$log10_bf_first, criteria = rows_of(x$tables$criteria)[[1]],
          coverage95_validation = model$scores$validate[["coverage95"]],
-         parameters = own(x$tables$parameters), attribution = own(x$tables$attribution),
+         parameters = rows_of(x$tables$parameters), attribution = rows_of(x$tables$attribution),
          heat_loss = if (length(loss)) list(mean = mean(loss),
                                             interval = unname(stats::quantile(loss, c(0.025, 0.975)))))
   }

@@ -179,8 +179,8 @@ report_model <- function(model, say) {
 trial_order <- function(catalogue, attribution) {
   table <- attribution$table
   weight <- vapply(catalogue, function(m) {
-    own <- table$log10_bf_dropped[table$boundary %in% m$boundary & table$significant]
-    if (length(own)) max(own) else 0
+    lost <- table$log10_bf_dropped[table$boundary %in% m$boundary & table$significant]
+    if (length(lost)) max(lost) else 0
   }, 0)
   names(catalogue)[order(-weight)]
 }
@@ -323,9 +323,9 @@ named_cause <- function(models, candidates, catalogue) {
   first <- which(verdicts == if (any(verdicts == "named")) "named" else "likely")
   if (!length(first)) return(NULL)
   model <- adopted[[first[1]]]
-  own <- candidates[candidates$from == model$parent & candidates$mechanism == model$mechanism, ]
+  trial <- candidates[candidates$from == model$parent & candidates$mechanism == model$mechanism, ]
   entry <- catalogue[[model$mechanism]]
-  list(mechanism = model$mechanism, boundary = entry$boundary, log10_bf = own$log10_bf, sentence = entry$sentence)
+  list(mechanism = model$mechanism, boundary = entry$boundary, log10_bf = trial$log10_bf, sentence = entry$sentence)
 }
 
 upgrade_gain <- function(models) {

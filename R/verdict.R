@@ -52,8 +52,8 @@ held_out_gain <- function(parent, model) {
 still_answers <- function(parent, model, boundary) {
   strength <- function(m) {
     table <- m$attribution$table
-    own <- table$boundary %in% boundary & table$significant
-    if (any(own)) max(table$log10_bf_dropped[own]) else 0
+    driven <- table$boundary %in% boundary & table$significant
+    if (any(driven)) max(table$log10_bf_dropped[driven]) else 0
   }
   before <- strength(parent)
   before > 0 && strength(model) > 0.5 * before

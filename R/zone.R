@@ -238,7 +238,7 @@ zone <- function(..., volume, air_capacity_factor = 1, initial_air = 20, initial
                            initial_wall_offset = initial_wall_offset))
 }
 
-new_zone <- function(components, own, call = rlang::caller_env()) {
+new_zone <- function(components, extra, call = rlang::caller_env()) {
   if (!all(vapply(components, inherits, NA, "amiss_component"))) {
     abort_input(c("A zone is composed of components.", i = "Give for example {.fn wall}, {.fn window}, {.fn heater}."),
                 call = call)
@@ -248,7 +248,7 @@ new_zone <- function(components, own, call = rlang::caller_env()) {
   if (length(twice) > 0) {
     abort_input(c("Every component needs a name of its own; used more than once: {.val {twice}}."), call = call)
   }
-  x <- c(list(components = components), own)
+  x <- c(list(components = components), extra)
   check_fields(x, zone_fields$zone, "zone", call)
   structure(x, class = "amiss_zone")
 }

@@ -43,17 +43,18 @@ class FunctionTarget : public Target {
 
 // [[Rcpp::export]]
 Rcpp::List ais_(const Rcpp::Function& log_likelihood, const Rcpp::Nullable<Rcpp::Function>& gradient,
-                int dimension, const Rcpp::List& control, const Rcpp::List& context) {
-  Context own = convert::context(context);
-  own.threads = 1;
+                int dimension, const Rcpp::List& control, const Rcpp::List& context_list) {
+  Context context = convert::context(context_list);
+  context.threads = 1;  // R is called from one only
   const AisResult result =
-      sample_ais(FunctionTarget(log_likelihood, gradient, dimension), convert::ais_options(control), own);
+      sample_ais(FunctionTarget(log_likelihood, gradient, dimension), convert::ais_options(control), context);
   Rcpp::List out = convert::ais_list(result);
   out["unit"] = Eigen::MatrixXd(result.draws.transpose().unaryExpr(&normal_cdf));
   return out;
 }
 
-// What AisOptions says if nothing is given: the one place where the options of `control$ais` have their defaults.
+// What AisOptions says if nothing is given: the one place where the options of `control$ais` have their
+// defaults.
 // [[Rcpp::export]]
 Rcpp::List ais_defaults_() {
   const AisOptions o;

@@ -44,8 +44,8 @@ MatrixXd BentMap::monomials(const MatrixXd& s) const {
   MatrixXd values(s.cols(), static_cast<Index>(all.size()));
   values.col(0).setOnes();
   for (Index k = 1; k < values.cols(); ++k) {
-    const Monomial& own = all[static_cast<std::size_t>(k)];
-    values.col(k) = values.col(own.parent).cwiseProduct(t.col(own.last));
+    const Monomial& term = all[static_cast<std::size_t>(k)];
+    values.col(k) = values.col(term.parent).cwiseProduct(t.col(term.last));
   }
   return values;
 }
@@ -124,11 +124,11 @@ VectorXd BentMap::gradient(const VectorXd& x, const VectorXd& by_z) const {
   const std::vector<Monomial> all = all_monomials(leading);
   MatrixXd slopes = MatrixXd::Zero(values.size(), leading);  // of the monomials
   for (Index k = 1; k < values.size(); ++k) {
-    const Monomial& own = all[static_cast<std::size_t>(k)];
-    const double at = s[own.last] * per_sd_[own.last];
+    const Monomial& term = all[static_cast<std::size_t>(k)];
+    const double at = s[term.last] * per_sd_[term.last];
     const bool level = std::abs(at) > kFarthest;
-    slopes.row(k) = slopes.row(own.parent) * std::clamp(at, -kFarthest, kFarthest);
-    if (!level) slopes(k, own.last) += values[own.parent] * per_sd_[own.last];
+    slopes.row(k) = slopes.row(term.parent) * std::clamp(at, -kFarthest, kFarthest);
+    if (!level) slopes(k, term.last) += values[term.parent] * per_sd_[term.last];
   }
   VectorXd by_s = by_z;
   by_s.head(leading) -= slopes.transpose() * (coefficients_ * by_z);

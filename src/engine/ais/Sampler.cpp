@@ -86,9 +86,10 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
 
   // The estimate that is not reported lies above the other: it has seen what that one missed, or is loose. A
   // third run, from a mixture fitted to the draws of both, decides.
-  const AnnealedRun& own = shorter ? bridged : annealed;
+  const AnnealedRun& reported = shorter ? bridged : annealed;
   const AnnealedRun& other = shorter ? annealed : bridged;
-  if (!(other.log_evidence() > own.log_evidence() + kDoubt * std::max(own.spread().se, options.precision)))
+  if (!(other.log_evidence() >
+        reported.log_evidence() + kDoubt * std::max(reported.spread().se, options.precision)))
     return;
   DrawPool both;
   for (const AnnealedRun* run : {&annealed, &bridged}) {

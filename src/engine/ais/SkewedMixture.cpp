@@ -58,10 +58,10 @@ SkewMap SkewMap::fit(const MatrixXd& x, const VectorXd& weights) {
   map.even_knots_ = Eigen::Map<const VectorXd>(kNormal, kKnots);
   map.knots_.resize(kKnots, x.rows());
   for (Index j = 0; j < x.rows(); ++j) {
-    auto own = map.knots_.col(j);
-    own = weighted_quantiles(x.row(j).transpose(), weights, p);
+    auto knots = map.knots_.col(j);
+    knots = weighted_quantiles(x.row(j).transpose(), weights, p);
     for (Index i = 0; i + 1 < kKnots; ++i) {
-      if (!(own[i + 1] > own[i])) own = map.even_knots_;
+      if (!(knots[i + 1] > knots[i])) knots = map.even_knots_;
     }
   }
   const auto steps = [](const MatrixXd& knots) {
@@ -75,10 +75,10 @@ MatrixXd SkewMap::even(const MatrixXd& x) const {
   if (knots_.rows() == 0) return x;
   MatrixXd z(x.rows(), x.cols());
   for (Index j = 0; j < x.rows(); ++j) {
-    const auto own = knots_.col(j);
+    const auto knots = knots_.col(j);
     for (Index c = 0; c < x.cols(); ++c) {
-      const Index i = piece(own, x(j, c));
-      z(j, c) = even_knots_[i] + (x(j, c) - own[i]) * slopes_(i, j);
+      const Index i = piece(knots, x(j, c));
+      z(j, c) = even_knots_[i] + (x(j, c) - knots[i]) * slopes_(i, j);
     }
   }
   return z;
@@ -88,9 +88,9 @@ VectorXd SkewMap::skewed(const VectorXd& z) const {
   if (knots_.rows() == 0) return z;
   VectorXd x(z.size());
   for (Index j = 0; j < z.size(); ++j) {
-    const auto own = knots_.col(j);
+    const auto knots = knots_.col(j);
     const Index i = piece(even_knots_, z[j]);
-    x[j] = own[i] + (z[j] - even_knots_[i]) / slopes_(i, j);
+    x[j] = knots[i] + (z[j] - even_knots_[i]) / slopes_(i, j);
   }
   return x;
 }
@@ -99,8 +99,8 @@ MatrixXd SkewMap::slope(const MatrixXd& x) const {
   MatrixXd slope = MatrixXd::Ones(x.rows(), x.cols());
   if (knots_.rows() == 0) return slope;
   for (Index j = 0; j < x.rows(); ++j) {
-    const auto own = knots_.col(j);
-    for (Index c = 0; c < x.cols(); ++c) slope(j, c) = slopes_(piece(own, x(j, c)), j);
+    const auto knots = knots_.col(j);
+    for (Index c = 0; c < x.cols(); ++c) slope(j, c) = slopes_(piece(knots, x(j, c)), j);
   }
   return slope;
 }

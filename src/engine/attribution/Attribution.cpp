@@ -15,7 +15,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-
 constexpr Index kLeastGroup = 2;
 constexpr int kFewSurrogates = 39;
 
@@ -79,23 +78,23 @@ Attribution attribute(const HistoryModel& model, const Emulator& emulator, const
   Attribution out;
   const AisResult& posterior = calibration.posterior;
   const auto drop = [&](std::vector<int> set) {
-    DroppedSet own = dropped_by_draws(model, calibration, std::move(set));
-    if (own.standard_error > options.ais.precision) {
-      const CalibrationTarget without(model, conditions_but(model, own.conditions), emulator);
+    DroppedSet dropped = dropped_by_draws(model, calibration, std::move(set));
+    if (dropped.standard_error > options.ais.precision) {
+      const CalibrationTarget without(model, conditions_but(model, dropped.conditions), emulator);
       const AisResult again =
           sample_posterior(without, options.ais, context.fork(kWithout + out.sets.size()));
-      own.lost = posterior.log_evidence - again.log_evidence;
-      own.standard_error = std::hypot(posterior.standard_error, again.standard_error);
-      own.trusted = posterior.trusted && again.trusted;
+      dropped.lost = posterior.log_evidence - again.log_evidence;
+      dropped.standard_error = std::hypot(posterior.standard_error, again.standard_error);
+      dropped.trusted = posterior.trusted && again.trusted;
     }
-    out.sets.push_back(std::move(own));
+    out.sets.push_back(std::move(dropped));
   };
   for (int s = 0; s < model.conditions(); ++s) drop({s});
   // By what the singles lose in truth: chains that stick may never drop one of two that say the same.
   for (std::vector<int>& group : find_groups(model, calibration, out.sets, options.least))
     drop(std::move(group));
   std::vector<std::vector<int>> sets;
-  for (const DroppedSet& own : out.sets) sets.push_back(own.conditions);
+  for (const DroppedSet& dropped : out.sets) sets.push_back(dropped.conditions);
 
   Index best = 0;
   posterior.log_likelihood.maxCoeff(&best);

@@ -17,7 +17,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Coalition = std::uint64_t;
 
-
 Coalition bit(int player) { return Coalition{1} << player; }
 
 // A coalition of c others comes before a player in c! (n - c - 1)! of the n! orders.
@@ -97,8 +96,8 @@ MatrixXd shapley_shares(const HistoryModel& model, const GaussianSimulator& simu
       }
       return alone > 0 ? 1.0 - model.quadratic(seen, log_variance, t) / alone : 0.0;
     };
-    const VectorXd own = shapley_values(static_cast<int>(acting.size()), value, options, context);
-    for (std::size_t a = 0; a < acting.size(); ++a) shares(i, acting[a]) = own[static_cast<Index>(a)];
+    const VectorXd values = shapley_values(static_cast<int>(acting.size()), value, options, context);
+    for (std::size_t a = 0; a < acting.size(); ++a) shares(i, acting[a]) = values[static_cast<Index>(a)];
   });
   return shares;
 }

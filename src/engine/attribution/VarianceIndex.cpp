@@ -71,13 +71,13 @@ VectorXd variance_shares(const KernelModel& model, const KernelParameters& p) {
   VectorXd shares = VectorXd::Zero(model.conditions() + 1);
   if (!(total > 0)) return shares;
   for (int s = 0; s <= model.conditions(); ++s) {
-    std::vector<Index> own;
+    std::vector<Index> columns;
     for (std::size_t j = 0; j < model.condition().size(); ++j) {
-      if (model.condition()[j] == s) own.push_back(static_cast<Index>(j));
+      if (model.condition()[j] == s) columns.push_back(static_cast<Index>(j));
     }
-    MatrixXd x(model.size(), static_cast<Index>(own.size()));
-    for (std::size_t j = 0; j < own.size(); ++j) {
-      x.col(static_cast<Index>(j)) = std::sqrt(p.decay[s]) * model.columns().col(own[j]);
+    MatrixXd x(model.size(), static_cast<Index>(columns.size()));
+    for (std::size_t j = 0; j < columns.size(); ++j) {
+      x.col(static_cast<Index>(j)) = std::sqrt(p.decay[s]) * model.columns().col(columns[j]);
     }
     PivotedCholesky cholesky(std::move(x));
     cholesky.extend(kTrace * noise, model.size());
@@ -105,9 +105,9 @@ VarianceIndex variance_index(const KernelModel& model, const std::vector<KernelP
   index.mean = index.difference.transpose() * weights / weights.sum();
   index.median.resize(s);
   for (Index k = 0; k < s; ++k) {
-    const VectorXd own = index.difference.col(k);
-    index.median[k] = weighted_median(own, weights);
-    index.hdi.push_back(highest_density_interval(own, weights, probability));
+    const VectorXd difference = index.difference.col(k);
+    index.median[k] = weighted_median(difference, weights);
+    index.hdi.push_back(highest_density_interval(difference, weights, probability));
     index.significant.push_back(index.hdi.back().lower > 0 || index.hdi.back().upper < 0);
   }
   index.rank.resize(static_cast<std::size_t>(s));

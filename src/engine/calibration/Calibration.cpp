@@ -20,7 +20,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-
 // How error and discrepancy are sampled under a Gaussian simulator, and at how many of the draws the modes of
 // the parameters are sought.
 struct StartOptions {
@@ -110,14 +109,14 @@ AisResult sample_once(const CalibrationTarget& target, const AisOptions& options
   Stream stream(context.seed, kCloser, 0);
   const SkewedMixture mixture =
       closer_mixture(target, population, {kRoundDraws * target.dimension(), kRounds}, context, stream, spent);
-  AisOptions own = options;
-  own.skewed = true;
+  AisOptions skewed = options;
+  skewed.skewed = true;
   const Context last = context.fork(kPosterior);
   AisResult result;
   try {
-    result = sample_ais(target, mixture, own, last);
+    result = sample_ais(target, mixture, skewed, last);
   } catch (const std::runtime_error&) {  // the mixture has lost the posterior: from where it came
-    result = sample_ais(target, reference, own, last);
+    result = sample_ais(target, reference, skewed, last);
   }
   result.evaluations += spent;
   return result;
@@ -170,9 +169,9 @@ Calibration calibrate(const HistoryModel& model, const Emulator& emulator, const
     const HistoryParameters& point =
         out.history[static_cast<std::size_t>(out.kept[static_cast<std::size_t>(k)])];
     out.coefficients.col(k) = model.coefficients(point, mean.row(k).transpose(), variance.row(k).transpose());
-    MatrixXd& own = held[static_cast<std::size_t>(point.setting / model.error_settings())];
-    if (own.size() == 0) own = model.withheld(point.setting);
-    out.withheld.col(k) = own * out.coefficients.col(k);
+    MatrixXd& withheld = held[static_cast<std::size_t>(point.setting / model.error_settings())];
+    if (withheld.size() == 0) withheld = model.withheld(point.setting);
+    out.withheld.col(k) = withheld * out.coefficients.col(k);
   }
   const VectorXd centre = posterior.draws.bottomRows(emulator.n_inputs()) * posterior.weights;
   out.tangent = tangent_at(emulator, centre);

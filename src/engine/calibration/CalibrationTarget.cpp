@@ -21,7 +21,7 @@ class AlongParameters : public Conditional {
   AlongParameters(const Emulator& emulator, std::vector<CoefficientLikelihood> exact)
       : emulator_(emulator), exact_(std::move(exact)) {
     const VectorXd variance = emulator.typical_variance().transpose();
-    for (const CoefficientLikelihood& own : exact_) typical_.push_back(own.blurred(variance));
+    for (const CoefficientLikelihood& likelihood : exact_) typical_.push_back(likelihood.blurred(variance));
   }
 
   VectorXd log_likelihood(const MatrixXd& x) const override {

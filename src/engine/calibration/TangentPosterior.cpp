@@ -28,9 +28,9 @@ TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors
   data.y -= run;
   data.basis.resize(run.size(), d);
   for (Index j = 0; j < d; ++j) {
-    const Index own = acting[static_cast<std::size_t>(j)];
-    data.basis.col(j) = slopes.col(own);
-    data.y += x0[own] * slopes.col(own);
+    const Index parameter = acting[static_cast<std::size_t>(j)];
+    data.basis.col(j) = slopes.col(parameter);
+    data.y += x0[parameter] * slopes.col(parameter);
   }
   const HistoryModel model(std::move(data), priors, context);
   std::vector<int> active(static_cast<std::size_t>(model.conditions()));
@@ -45,12 +45,12 @@ TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors
   out.covariance = MatrixXd::Zero(p, p);
   for (int k = 0; k < draws; ++k) {
     out.history.push_back(target.parameters(population.col((2 * k + 1) * population.cols() / (2 * draws))));
-    const CoefficientLikelihood::Posterior own = model.given(out.history.back()).posterior();
+    const CoefficientLikelihood::Posterior given = model.given(out.history.back()).posterior();
     for (Index i = 0; i < d; ++i) {
       const Index row = acting[static_cast<std::size_t>(i)];
-      means(row, k) = own.mean[i];
+      means(row, k) = given.mean[i];
       for (Index j = 0; j < d; ++j)
-        out.covariance(row, acting[static_cast<std::size_t>(j)]) += own.covariance(i, j) / draws;
+        out.covariance(row, acting[static_cast<std::size_t>(j)]) += given.covariance(i, j) / draws;
     }
   }
   for (Index j = 0; j < p; ++j) {

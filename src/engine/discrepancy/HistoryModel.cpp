@@ -56,9 +56,9 @@ struct HistoryModel::FreeGram {
     if (x.isZero(0.0)) return out;
     const Index q = data.coefficients, p = data.cross.size() - q;
     const MatrixXd left = mixed.topRows(q) * x, half = mixed.bottomRows(p) * x;
-    const MatrixXd own =
+    const MatrixXd left_over =
         data.gram.bottomRightCorner(p, p) - half - half.transpose() + x.transpose() * directions * x;
-    out.gram.bottomRightCorner(p, p) = 0.5 * (own + own.transpose());
+    out.gram.bottomRightCorner(p, p) = 0.5 * (left_over + left_over.transpose());
     out.gram.topRightCorner(q, p) -= left;
     out.gram.bottomLeftCorner(p, q) = out.gram.topRightCorner(q, p).transpose();
     out.cross.tail(p) -= x.transpose() * cross;
@@ -226,7 +226,7 @@ VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameter
   const Index p = data_.responses.cols();
   VectorXd values(runs.cols());
   parallel_for(static_cast<int>(groups.size()), context, [&](int k) {
-    const auto& [setting, own] = groups[static_cast<std::size_t>(k)];
+    const auto& [setting, members] = groups[static_cast<std::size_t>(k)];
     const Whitener whitener(data_.axis, priors_.error.correlation_times,
                             priors_.error.setting(error_of(setting)));
     const MatrixXd responses = data_.responses - data_.moves * withheld(setting);
@@ -235,7 +235,7 @@ VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameter
     seen.gram = whitened(setting).gram.bottomRightCorner(p, p);
     seen.log_det = whitener.log_det();
     seen.size = data_.y.size();
-    for (Index i : own) {
+    for (Index i : members) {
       const VectorXd left = whitener(data_.y - runs.col(i));
       seen.cross = white.transpose() * left;
       seen.square = left.squaredNorm();
@@ -269,14 +269,14 @@ HistoryModel::Factor HistoryModel::factorise(const WhitenedData& whitened, doubl
   VectorXd b(n);
   MatrixXd matrix(n, n);
   for (Index j = 0; j < n; ++j) {
-    const Index own = out.kept[j];
-    if (own < q) {
-      out.root[j] = root[own];
+    const Index column = out.kept[j];
+    if (column < q) {
+      out.root[j] = root[column];
     } else {
-      const int s = data_.condition[static_cast<std::size_t>(own - q)];
+      const int s = data_.condition[static_cast<std::size_t>(column - q)];
       out.root[j] = std::sqrt(t[s] / columns_[s]);
     }
-    b[j] = out.root[j] * cross[own];
+    b[j] = out.root[j] * cross[column];
   }
   for (Index j = 0; j < n; ++j) {
     for (Index i = j; i < n; ++i)
@@ -319,11 +319,11 @@ double log_density(const WhitenedData& whitened, double log_variance, double squ
 
 double HistoryModel::log_likelihood(const HistoryParameters& point, const VectorXd& mean,
                                     const VectorXd& variance) const {
-  const WhitenedData& own = whitened(point.setting);
+  const WhitenedData& seen = whitened(point.setting);
   double square = 0.0;
-  const VectorXd cross = shifted_cross(own, mean - reference_, square);
-  const Factor factor = factorise(own, 1.0 / point.variance, point.t, variance.cwiseSqrt(), cross);
-  return log_density(own, std::log(point.variance), square, factor.lower.matrixLLT(), factor.half,
+  const VectorXd cross = shifted_cross(seen, mean - reference_, square);
+  const Factor factor = factorise(seen, 1.0 / point.variance, point.t, variance.cwiseSqrt(), cross);
+  return log_density(seen, std::log(point.variance), square, factor.lower.matrixLLT(), factor.half,
                      factor.largest);
 }
 
@@ -363,40 +363,40 @@ double HistoryModel::quadratic(const WhitenedData& whitened, double log_variance
 // With G_K the columns of the Gram matrix that belong to K and F the factor of the responses alone,
 //     A = [G_KK - G_K' D^1/2 F^-1 D^1/2 G_K / sigma^2] / sigma^2, and c likewise.
 CoefficientLikelihood HistoryModel::given(const HistoryParameters& point) const {
-  const WhitenedData& own = whitened(point.setting);
+  const WhitenedData& seen = whitened(point.setting);
   const double precision = 1.0 / point.variance;
-  const Index q = own.coefficients;
+  const Index q = seen.coefficients;
   WhitenedData responses;  // the simulator's coefficients fixed at w0
-  const Index p = own.cross.size() - q;
-  responses.gram = own.gram.bottomRightCorner(p, p);
-  responses.cross = own.cross.tail(p);
-  responses.square = own.square;
-  responses.log_det = own.log_det;
-  responses.size = own.size;
+  const Index p = seen.cross.size() - q;
+  responses.gram = seen.gram.bottomRightCorner(p, p);
+  responses.cross = seen.cross.tail(p);
+  responses.square = seen.square;
+  responses.log_det = seen.log_det;
+  responses.size = seen.size;
   const Factor factor = factorise(responses, precision, point.t, VectorXd(), responses.cross);
   MatrixXd half(static_cast<Index>(factor.kept.size()), q);
   for (Index j = 0; j < half.rows(); ++j)
-    half.row(j) = factor.root[j] * own.gram.row(q + factor.kept[j]).head(q);
+    half.row(j) = factor.root[j] * seen.gram.row(q + factor.kept[j]).head(q);
   factor.lower.matrixL().solveInPlace(half);
   const double squared = precision * precision;
-  return {reference_, precision * own.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
-          precision * own.cross.head(q) - squared * (half.transpose() * factor.half),
-          log_density(responses, std::log(point.variance), own.square, factor.lower.matrixLLT(), factor.half,
+  return {reference_, precision * seen.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
+          precision * seen.cross.head(q) - squared * (half.transpose() * factor.half),
+          log_density(responses, std::log(point.variance), seen.square, factor.lower.matrixLLT(), factor.half,
                       factor.largest)};
 }
 
 VectorXd HistoryModel::coefficients(const HistoryParameters& point, const VectorXd& mean,
                                     const VectorXd& variance) const {
-  const WhitenedData& own = whitened(point.setting);
+  const WhitenedData& seen = whitened(point.setting);
   double square = 0.0;
-  const VectorXd cross = shifted_cross(own, mean - reference_, square);
+  const VectorXd cross = shifted_cross(seen, mean - reference_, square);
   const double precision = 1.0 / point.variance;
-  const Factor factor = factorise(own, precision, point.t, variance.cwiseSqrt(), cross);
+  const Factor factor = factorise(seen, precision, point.t, variance.cwiseSqrt(), cross);
   const VectorXd solved = factor.lower.matrixL().transpose().solve(factor.half);
   VectorXd out = VectorXd::Zero(data_.responses.cols());
-  for (std::size_t j = static_cast<std::size_t>(own.coefficients); j < factor.kept.size(); ++j) {
+  for (std::size_t j = static_cast<std::size_t>(seen.coefficients); j < factor.kept.size(); ++j) {
     const Index k = static_cast<Index>(j);
-    out[factor.kept[j] - own.coefficients] = precision * factor.root[k] * solved[k];
+    out[factor.kept[j] - seen.coefficients] = precision * factor.root[k] * solved[k];
   }
   return out;
 }

@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kSmallestTail = 1e-15;  // of Phi; keeps logarithms finite
-constexpr Index kBlock = 96;  // columns of the covariance built at once
+constexpr Index kBlock = 96;             // columns of the covariance built at once
 
 double tail(double x) { return std::max(normal_cdf(x), kSmallestTail); }
 
@@ -36,13 +36,13 @@ MatrixXd scale_to_unit(const MatrixXd& x, const std::vector<int>& condition) {
   const Eigen::RowVectorXd range = x.colwise().maxCoeff() - x.colwise().minCoeff();
   std::vector<double> width(condition.size(), 0.0);
   for (std::size_t j = 0; j < condition.size(); ++j) {
-    double& own = width[static_cast<std::size_t>(condition[j])];
-    own = std::max(own, range[static_cast<Index>(j)]);
+    double& widest = width[static_cast<std::size_t>(condition[j])];
+    widest = std::max(widest, range[static_cast<Index>(j)]);
   }
   MatrixXd scaled = x.rowwise() - x.colwise().mean();
   for (std::size_t j = 0; j < condition.size(); ++j) {
-    const double own = width[static_cast<std::size_t>(condition[j])];
-    if (own > 0) scaled.col(static_cast<Index>(j)) /= own;  // else constant: distances are zero
+    const double widest = width[static_cast<std::size_t>(condition[j])];
+    if (widest > 0) scaled.col(static_cast<Index>(j)) /= widest;  // else constant: distances are zero
   }
   return scaled;
 }

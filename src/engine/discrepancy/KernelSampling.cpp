@@ -34,7 +34,7 @@ constexpr double kCoarser = 10.0;               // tolerance while only draws ar
 constexpr int kPilotChains = 64, kChains = 16;  // unless asked otherwise
 constexpr int kRefitDraws = 300, kEffectiveDraws = 400;  // likewise
 constexpr int kRoughSweeps = 1;                          // likewise, while only draws are needed
-constexpr double kRoughDrop = 0.4;     // conditional effective size while only draws are needed
+constexpr double kRoughDrop = 0.4;  // conditional effective size while only draws are needed
 
 // Skeletons from small to large that together serve nearly all draws of a distribution: one for its bulk, one
 // for draws that are rough in one direction only, and the largest that is still worth it for the others.
@@ -132,11 +132,11 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
     picked.push_back(at);
   }
   parallel_for(n, context, [&](int i) {
-    const Index own = picked[static_cast<std::size_t>(i)];
-    const KernelParameters p = target.parameters(posterior.draws.col(own));
+    const Index draw = picked[static_cast<std::size_t>(i)];
+    const KernelParameters p = target.parameters(posterior.draws.col(draw));
     KernelModel::Memory memory;
     const double value = bounded_likelihood(model, p, sampling.tolerance, Certificate::both, memory).value;
-    difference[i] = value - posterior.log_likelihood[own];
+    difference[i] = value - posterior.log_likelihood[draw];
   });
   sample.largest_error = difference.cwiseAbs().maxCoeff();
   sample.correction = log_mean_exp(difference);
@@ -155,18 +155,18 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
 // Where the posterior of this record lies, found by way of thinned ones.
 SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
                            const KernelSamplingOptions& sampling, const Context& context, long& evaluations) {
-  const Context own = context.fork(kThinned);
-  Stream stream(own.seed, kStage, 0);
+  const Context thinned = context.fork(kThinned);
+  Stream stream(thinned.seed, kStage, 0);
   const KernelTarget target(model);
   if (model.size() <= sampling.coarsest)
     return closer_mixture(
-        target, sample_population(target, StandardNormal(target.dimension()), options, own, evaluations),
-        {kRoundDraws}, own, stream, evaluations);
+        target, sample_population(target, StandardNormal(target.dimension()), options, thinned, evaluations),
+        {kRoundDraws}, thinned, stream, evaluations);
   const SkewedMixture before =
-      sample_stage(model.thinned(sampling.thinning), options, sampling, own, evaluations);
+      sample_stage(model.thinned(sampling.thinning), options, sampling, thinned, evaluations);
   const ApproximateTarget approximate(model, before, kCoarser * sampling.tolerance, context, stream);
-  const MatrixXd draws = sample_population(approximate, before, options, own, evaluations);
-  return closer_mixture(approximate, draws, {kRoundDraws}, own, stream, evaluations);
+  const MatrixXd draws = sample_population(approximate, before, options, thinned, evaluations);
+  return closer_mixture(approximate, draws, {kRoundDraws}, thinned, stream, evaluations);
 }
 
 }  // namespace
@@ -188,19 +188,19 @@ KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
     sample.direct = sample.posterior.evaluations;
     return sample;
   }
-  AisOptions own = options;
-  if (own.pilot_chains == 0) own.pilot_chains = kPilotChains;
-  if (own.chains == 0) own.chains = kChains;
-  if (own.refit_draws == 0) own.refit_draws = kRefitDraws;
-  if (own.effective_draws == 0) own.effective_draws = kEffectiveDraws;
-  own.skewed = true;
-  AisOptions rough = own;
-  rough.ess_drop = std::min(own.ess_drop, kRoughDrop);
+  AisOptions careful = options;
+  if (careful.pilot_chains == 0) careful.pilot_chains = kPilotChains;
+  if (careful.chains == 0) careful.chains = kChains;
+  if (careful.refit_draws == 0) careful.refit_draws = kRefitDraws;
+  if (careful.effective_draws == 0) careful.effective_draws = kEffectiveDraws;
+  careful.skewed = true;
+  AisOptions rough = careful;
+  rough.ess_drop = std::min(careful.ess_drop, kRoughDrop);
   if (options.sweeps == 0) rough.sweeps = kRoughSweeps;  // and more, while likelihoods remember
   const SkewedMixture before = sample_stage(model, rough, sampling, context, sample.coarse);
   Stream stream(context.seed, kStage, 0);
   const ApproximateTarget approximate(model, before, sampling.tolerance, context, stream);
-  AisResult& posterior = sample.posterior = sample_ais(approximate, before, own, context);
+  AisResult& posterior = sample.posterior = sample_ais(approximate, before, careful, context);
   posterior.evaluations += sample.coarse;
   sample.direct = approximate.direct;
   sample.by_skeleton = approximate.by_skeleton;

@@ -115,14 +115,14 @@ KernelSkeleton::KernelSkeleton(const KernelModel& model, VectorXd decay, double 
   const Index m = cholesky.rank();
   VectorXd memory = std::move(cholesky).take_root();
   Eigen::Map<MatrixXd> u(memory.data(), model.size(), m);
-  MatrixXd own(m, m);
+  MatrixXd at_pivots(m, m);
   pivots_.resize(m, model.columns().cols());
   for (Index i = 0; i < m; ++i) {
-    own.row(i) = u.row(rows[static_cast<std::size_t>(i)]);
+    at_pivots.row(i) = u.row(rows[static_cast<std::size_t>(i)]);
     pivots_.row(i) = model.columns().row(rows[static_cast<std::size_t>(i)]);
   }
   // U = C_:I C_II^-1 = L L_I^-1, L_I lower triangular in the order of the pivots.
-  own.triangularView<Eigen::Lower>().solveInPlace<Eigen::OnTheRight>(u);
+  at_pivots.triangularView<Eigen::Lower>().solveInPlace<Eigen::OnTheRight>(u);
   u.noalias() -= model.orthonormal() * (model.orthonormal().transpose() * u).eval();
   projected_ = u.transpose() * model.outside();
   // In the place of U, which is large for a long record.

@@ -47,9 +47,9 @@ Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.co
   predict(region_.inputs(region_.place(normal)), mean, variance);
   typical_variance_.resize(n_outputs());
   for (Index q = 0; q < n_outputs(); ++q) {
-    double* const own = variance.col(q).data();
-    std::nth_element(own, own + kPoints / 2, own + kPoints);
-    typical_variance_[q] = own[kPoints / 2];
+    double* const variances = variance.col(q).data();
+    std::nth_element(variances, variances + kPoints / 2, variances + kPoints);
+    typical_variance_[q] = variances[kPoints / 2];
   }
 }
 

@@ -301,10 +301,11 @@ void GaussianProcess::leave_one_out(const HyperPriors& priors, VectorXd& mean, V
     const VectorXd a = slope.error.row(i).transpose();
     const double v = variance[i], e = error[i];
     const VectorXd score = -(e / v) * a - 0.5 * (1.0 - e * e / v) * b;
-    const VectorXd step = information.solve(score), own = information.solve(a) / v;
-    const double change = a.dot(step) / (1.0 - std::min(kGreatestLeverage, a.dot(own)));  // Sherman, Morrison
+    const VectorXd step = information.solve(score), leverage = information.solve(a) / v;
+    const double change =
+        a.dot(step) / (1.0 - std::min(kGreatestLeverage, a.dot(leverage)));  // Sherman, Morrison
     mean[i] += change;
-    variance[i] *= std::exp(-b.dot(step) - b.dot(own) * change);
+    variance[i] *= std::exp(-b.dot(step) - b.dot(leverage) * change);
   }
 }
 

@@ -98,14 +98,14 @@ void PivotedCholesky::add_block(Index most) {
   const Index r = rank();
   const std::vector<Index> rows = candidates(kStretches);
   const Index c = static_cast<Index>(rows.size());
-  MatrixXd own(c, x_.cols()), own_root(c, r);
+  MatrixXd there(c, x_.cols()), root_there(c, r);
   for (Index i = 0; i < c; ++i) {
-    own.row(i) = x_.row(rows[static_cast<std::size_t>(i)]);
-    own_root.row(i) = root().row(rows[static_cast<std::size_t>(i)]);
+    there.row(i) = x_.row(rows[static_cast<std::size_t>(i)]);
+    root_there.row(i) = root().row(rows[static_cast<std::size_t>(i)]);
   }
   // E among the candidates, and its own pivoted Cholesky factor.
-  MatrixXd small = gaussian_kernel(own, own);
-  small.noalias() -= own_root * own_root.transpose();
+  MatrixXd small = gaussian_kernel(there, there);
+  small.noalias() -= root_there * root_there.transpose();
   VectorXd left(c);  // not the diagonal of `small`, in which rounding may leave nothing of a pivot
   for (Index i = 0; i < c; ++i) left[i] = left_[rows[static_cast<std::size_t>(i)]];
   const double worthy = kWorthy * left.maxCoeff();
@@ -128,8 +128,8 @@ void PivotedCholesky::add_block(Index most) {
   MatrixXd pivots(k, x_.cols()), pivot_root(k, r), triangle(k, k);
   for (Index i = 0; i < k; ++i) {
     const Index row = chosen[static_cast<std::size_t>(i)];
-    pivots.row(i) = own.row(row);
-    pivot_root.row(i) = own_root.row(row);
+    pivots.row(i) = there.row(row);
+    pivot_root.row(i) = root_there.row(row);
     triangle.row(i) = factor.row(row).head(k);
     pivots_.push_back(rows[static_cast<std::size_t>(row)]);
   }
