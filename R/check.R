@@ -123,7 +123,8 @@ error_ratios_of <- function(fit, draws) {
 exact_evidence <- function(fit, made, threads) {
   drawn <- made$draws
   posterior <- fit$posterior
-  points <- list(setting = posterior$setting[drawn], variance = posterior$variance[drawn] - fit$priors$discarded_variance,
+  points <- list(setting = posterior$setting[drawn],
+                 variance = posterior$variance[drawn] - fit$priors$discarded_variance,
                  t = posterior$t[drawn, , drop = FALSE])
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   exact <- call_engine(run_likelihood_(data, fit$priors, points, made$runs, engine_context(fit$seed, threads)))

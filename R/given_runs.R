@@ -44,27 +44,6 @@ runs_given <- function(fit, use) {
   runs[m$use %in% use & !is.na(m$y), , drop = FALSE]
 }
 
-# As predict() by the simulator, but by emulators at the draws `picked`; their standard deviations join that of the
-# error.
-predict_given <- function(fit, picked, rows, use, discrepancy, interval, level, seed, threads,
-                          call = rlang::caller_env()) {
-  m <- fit$measurements
-  values <- fit$values[rep_len(picked, 200), , drop = FALSE]
-  mean <- sd <- matrix(0, length(rows), nrow(values))
-  for (one in intersect(use, m$use[rows])) {
-    emulated <- stats::predict(if (one == "calibrate") fit$emulator else held_out_emulator(fit, call), values)
-    mean[m$use[rows] == one, ] <- emulated$mean
-    sd[m$use[rows] == one, ] <- emulated$sd
-  }
-  left <- error_sd(fit)
-  if (discrepancy) {
-    carried <- carried_response(fit, use, threads)
-    mean <- mean + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(mean)), drop = FALSE]
-    left <- carried$sd
-  }
-  with_seed(seed, summarise_prediction(m, rows, mean, sqrt(left^2 + sd^2), interval, level))
-}
-
 # Ensembles among the models of a loop: of runs given, at the rows of the measurements.
 check_given <- function(models, measurements, call = rlang::caller_env()) {
   for (name in names(models)) {

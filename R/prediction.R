@@ -158,7 +158,8 @@ moves_at <- function(fit, use, threads, record = fit$measurements) {
     abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
   }
   coordinates <- w[made, -last, drop = FALSE]
-  vectors <- cbind(sweep(runs[, made, drop = FALSE], 2, w[made, last]) %*% coordinates %*% solve(crossprod(coordinates)), 1)
+  shifted <- sweep(runs[, made, drop = FALSE], 2, w[made, last])
+  vectors <- cbind(shifted %*% coordinates %*% solve(crossprod(coordinates)), 1)
   vectors %*% emulator$spread
 }
 
@@ -264,4 +265,25 @@ drawn_errors <- function(fit, draws) {
 # Stationary, of variance one; `kept` is what each value keeps of the one before it.
 ornstein_uhlenbeck <- function(kept) {
   Reduce(function(x, i) kept[i] * x + sqrt(1 - kept[i]^2) * stats::rnorm(1), seq_along(kept), 0, accumulate = TRUE)[-1]
+}
+
+# As predict() by the simulator, but by emulators at the draws `picked`; their standard deviations join that of the
+# error.
+predict_given <- function(fit, picked, rows, use, discrepancy, interval, level, seed, threads,
+                          call = rlang::caller_env()) {
+  m <- fit$measurements
+  values <- fit$values[rep_len(picked, 200), , drop = FALSE]
+  mean <- sd <- matrix(0, length(rows), nrow(values))
+  for (one in intersect(use, m$use[rows])) {
+    emulated <- stats::predict(if (one == "calibrate") fit$emulator else held_out_emulator(fit, call), values)
+    mean[m$use[rows] == one, ] <- emulated$mean
+    sd[m$use[rows] == one, ] <- emulated$sd
+  }
+  left <- error_sd(fit)
+  if (discrepancy) {
+    carried <- carried_response(fit, use, threads)
+    mean <- mean + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(mean)), drop = FALSE]
+    left <- carried$sd
+  }
+  with_seed(seed, summarise_prediction(m, rows, mean, sqrt(left^2 + sd^2), interval, level))
 }

@@ -200,8 +200,8 @@ try_mechanisms <- function(current, catalogue, settings, say) {
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
 
-# Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined no
-# further. A budget leaves out the last.
+# Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined
+# no further. A budget leaves out the last.
 screened_mechanisms <- function(current, trials, responses, settings, say) {
   coarse <- as_coarse(current$fit)
   screens <- list()

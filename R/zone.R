@@ -45,8 +45,8 @@
 #' @return `zone()`: an object of class `amiss_zone`; the others: a component (`amiss_component`) or `amiss_layer`.
 #' @details One opening alone exchanges nothing: use two at different heights or facades.
 #' @source Wind pressure coefficients: Liddament (1986), Air infiltration calculation techniques, Air Infiltration and
-#'   Ventilation Centre, as in ESP-r; between its nodes interpolated as by Fritsch and Carlson (1980), Monotone piecewise
-#'   cubic interpolation, SIAM Journal on Numerical Analysis 17, 238-246.
+#'   Ventilation Centre, as in ESP-r; between its nodes interpolated as by Fritsch and Carlson (1980), Monotone
+#'   piecewise cubic interpolation, SIAM Journal on Numerical Analysis 17, 238-246.
 #' @examples
 #' zone(
 #'   zone_wall("facade", area = 12, zone_layer(0.02, 0.8, 1.4e6),

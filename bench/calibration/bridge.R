@@ -56,7 +56,8 @@ bridge_one <- function(world, seed) {
   complement <- qr.Q(qr(world$emulator$basis$vectors), complete = TRUE)[, -seq_len(ncol(world$emulator$basis$vectors))]
   data <- list(world = world, y = y, priors = fit$priors, h = complement, v = crossprod(complement, y),
                x = cbind(m$boundary, fictitious))
-  inside <- bridge(cbind(stats::qnorm(fit$posterior$unit), z_lambda(fit$lambda)), fit$weights, log_posterior_inside, data)
+  inside <- bridge(cbind(stats::qnorm(fit$posterior$unit), z_lambda(fit$lambda)), fit$weights, log_posterior_inside,
+                   data)
   outside <- bridge(cbind(stats::qnorm(h$alpha), stats::qnorm(h$t2), z_lambda(h$lambda)), h$weights,
                     log_posterior_outside, data)
   own <- fit$evidence[1:2, ]
