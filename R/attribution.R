@@ -123,8 +123,8 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
               call = call)
   check_input(checkmate::check_number(control$level, lower = 0, upper = 1), named("level"), call = call)
   check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE), named("least_log10_bf"), call = call)
-  control$ais <- fill_ais_control(merge_control(ais, control$ais, named("ais"), names(ais_control), call), named("ais"),
-                                  call)
+  ais <- merge_control(ais, control$ais, named("ais"), names(ais_defaults_()), call)
+  control$ais <- fill_ais_control(ais, named("ais"), call)
   control
 }
 

@@ -1,13 +1,13 @@
 # What every calibration has, by whatever method it was made.
 
 # A calibration by whatever method: what went into it (`set`: emulator, measurements, control, seed, rows, priors), what
-# the sampler said of the parameters, the evidence, and what its method alone knows.
-new_fit <- function(class, set, posterior, evidence, ...) {
+# the sampler said of the parameters, the evidence in all (`total`), and what its method alone knows.
+new_fit <- function(class, set, posterior, total, ...) {
   common <- c("emulator", "measurements", "control", "seed", "rows", "priors")
   structure(c(list(format_version = format_version), set[common],
               list(values = unit_to_values(posterior$unit, set$emulator$parameters), weights = posterior$weights,
                    posterior = posterior),
-              evidence[c("log_evidence", "standard_error", "interval")], list(...)),
+              total[c("log_evidence", "standard_error", "interval")], list(...)),
             class = c(class, "amiss_fit"))
 }
 

@@ -45,7 +45,7 @@ test_that("contenders are those within the margin, and none where nothing comes 
     posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
     structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10),
                    standard_error = se * log(10), posterior = posterior),
-              class = "amiss_calibration")
+              class = c("amiss_calibration", "amiss_fit"))
   }
   control <- list(margin = 3, decisive = 2)
   reference <- fit(0, 0)
