@@ -29,7 +29,9 @@
 #' @examples
 #' folder <- file.path(tempdir(), "calibro")
 #' dir.create(folder, showWarnings = FALSE)
-#' write <- function(x, name) write.table(x, file.path(folder, name), sep = ",", row.names = FALSE, col.names = FALSE)
+#' write <- function(x, name) {
+#'   write.table(x, file.path(folder, name), sep = ",", row.names = FALSE, col.names = FALSE)
+#' }
 #' Te <- 5 + 3 * sin(1:48 / 4)
 #' gain <- c(0, seq(-1, 1, 0.2))
 #' write(20 + 0.4 * Te + 0.1 * sin(61 * (1:48)^2), "obs.csv")

@@ -45,7 +45,8 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)
 #' house <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1)
 #' gain <- free("gain", uniform(0, 1))
-#' blind <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain, boundary = "Te")
+#' blind <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain,
+#'                             boundary = "Te")
 #' sunny <- function_simulator(function(values, drivers) {
 #'   20 + values[["gain"]] * drivers[, "Te"] + values[["sun"]] * drivers[, "Gv"]
 #' }, gain, free("sun", uniform(0, 1)), boundary = c("Te", "Gv"))

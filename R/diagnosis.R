@@ -18,12 +18,15 @@
 #'                      validate = table$hour > 72)
 #' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 1)), boundary = "Te")
-#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
-#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
-#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' brighter <- function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"]
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.",
+#'                  edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv", f = brighter)
 #' })
-#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 19))
-#' upgrade <- upgrade_model(linear, room, catalogue(sun), runs = 20, control = quick, seed = 1, quiet = TRUE)
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)),
+#'               attribution = list(surrogates = 19))
+#' upgrade <- upgrade_model(linear, room, catalogue(sun), runs = 20, control = quick, seed = 1,
+#'                          quiet = TRUE)
 #' summary(upgrade)
 #' @export
 summary.amiss_upgrade <- function(object, ...) {

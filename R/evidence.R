@@ -19,7 +19,8 @@
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' sunny <- function_simulator(function(values, drivers) 20 + values[["sun"]] * drivers[, "Gv"],
 #'                             free("sun", uniform(0, 0.1)), boundary = "Gv")
-#' other <- calibrate(train_emulator(simulate_design(sunny, room, runs = 20, seed = 1), room), room, quick, seed = 1)
+#' more <- simulate_design(sunny, room, runs = 20, seed = 1)
+#' other <- calibrate(train_emulator(more, room), room, quick, seed = 1)
 #' bayes_factor(fit, other)
 #' @export
 bayes_factor <- function(model, reference) {

@@ -12,7 +12,8 @@
 #' @return Heat loss coefficients, W/K, one for each point.
 #' @examples
 #' box <- paper_box("M2")
-#' values <- c(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179, heater_radiant = 0.79)
+#' values <- c(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179,
+#'             heater_radiant = 0.79)
 #' heat_loss_coefficient(box, values)
 #' @export
 heat_loss_coefficient <- function(simulator, values, drivers = numeric(), outside = 10, inside = 30) {

@@ -58,8 +58,8 @@
 #' stamp <- as.POSIXct("2024-03-30", tz = "Europe/Berlin") + 3600 * table$hour
 #' table$time <- format(stamp, "%d.%m.%Y %H:%M")
 #' table$Te[20] <- NA
-#' measurements(table[-30, ], time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1, time_zone = "Europe/Berlin",
-#'              fill_gaps = 2)
+#' measurements(table[-30, ], time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+#'              time_zone = "Europe/Berlin", fill_gaps = 2)
 #' @export
 measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, average = NULL, calibrate = NULL,
                          validate = NULL, warmup = 0, name = target, unit = "", time_format = NULL, time_zone = NULL,

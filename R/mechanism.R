@@ -12,9 +12,10 @@
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
 #' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class `amiss_catalogue`.
 #' @examples
-#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
-#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
-#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' brighter <- function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"]
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.",
+#'                  edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv", f = brighter)
 #' })
 #' leaks <- mechanism("leaks", boundary = "Te", sentence = "Air enters.", edit = function(zone) {
 #'   add_component(zone, zone_infiltration("leaks", free("ach", uniform(0, 1), "1/h"), outside = "Te"))

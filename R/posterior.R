@@ -45,8 +45,9 @@ parameter_table <- function(fit) {
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
 #' m <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
-#' model <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
-#'                             free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
+#' model <- function_simulator(function(values, drivers) {
+#'   values[["offset"]] + values[["gain"]] * drivers[, "Te"]
+#' }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
 #' fit <- calibrate(train_emulator(simulate_design(model, m, runs = 30, seed = 1), m), m,
 #'                  control = list(ais = list(pilot_chains = 48, groups = 4)), seed = 1)
 #' confint(fit, "gain", level = 0.9)
@@ -127,8 +128,9 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
 #' m <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
-#' model <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
-#'                             free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
+#' model <- function_simulator(function(values, drivers) {
+#'   values[["offset"]] + values[["gain"]] * drivers[, "Te"]
+#' }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
 #' fit <- calibrate(train_emulator(simulate_design(model, m, runs = 30, seed = 1), m), m,
 #'                  control = list(ais = list(pilot_chains = 48, groups = 4)), seed = 1)
 #' posterior::summarise_draws(posterior::as_draws_df(fit), "mean", "sd")

@@ -31,8 +31,9 @@
 #' @examples
 #' rule <- c("BEGIN { FS = \",\"; print \"Ti\" }", "NR > 1 { print 20 + {{gain}} * $3 }")
 #' linear <- program_simulator(c("awk", "-f", "model.awk", "drivers.csv"), free("gain", uniform(0, 2)),
-#'                             output = c(file = "stdout.txt", column = "Ti"), templates = list(model.awk = I(rule)),
-#'                             boundary = "Te", cache = tempfile("runs"))
+#'                             output = c(file = "stdout.txt", column = "Ti"),
+#'                             templates = list(model.awk = I(rule)), boundary = "Te",
+#'                             cache = tempfile("runs"))
 #' linear
 #' simulate_runs(linear, cbind(gain = c(0.5, 1)), cbind(Te = c(4, 6, 5)), step_h = 1)
 #' @export
@@ -76,11 +77,12 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
 #' @examples
 #' rule <- c("BEGIN { FS = \",\"; print \"Ti\" }", "NR > 1 { print {{gain}} * $3 }")
 #' base <- program_simulator(c("awk", "-f", "model.awk", "drivers.csv"), free("gain", uniform(0, 2)),
-#'                           output = c(file = "stdout.txt", column = "Ti"), templates = list(model.awk = I(rule)),
-#'                           boundary = "Te", cache = tempfile("runs"))
+#'                           output = c(file = "stdout.txt", column = "Ti"),
+#'                           templates = list(model.awk = I(rule)), boundary = "Te",
+#'                           cache = tempfile("runs"))
 #' mechanism("sun", boundary = "Gv", sentence = "Sun enters.", edit = function(model) {
-#'   with_template(model, list(model.awk = function(lines) sub("* $3", "* $3 + {{sun}} * $4", lines, fixed = TRUE)),
-#'                 free("sun", uniform(0, 0.1)), boundary = "Gv")
+#'   brighter <- function(lines) sub("* $3", "* $3 + {{sun}} * $4", lines, fixed = TRUE)
+#'   with_template(model, list(model.awk = brighter), free("sun", uniform(0, 0.1)), boundary = "Gv")
 #' })
 #' @export
 with_template <- function(simulator, templates, ..., boundary = character()) {

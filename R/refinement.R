@@ -26,7 +26,7 @@
 #' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 1)), boundary = "Te")
 #' runs <- simulate_design(linear, room, runs = 20, seed = 1)
-#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # a coarse sampler, for speed
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # coarse, for speed
 #' fit <- calibrate_refined(runs, room, control = quick, seed = 1)
 #' c(fit$rounds, fit$runs_made)
 #' @export

@@ -26,17 +26,14 @@
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
-#' gain <- free("gain", uniform(0, 1))
-#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain,
-#'                              boundary = "Te")
-#' bent <- function_simulator(function(values, drivers) 20 + values[["gain"]]^2 * drivers[, "Te"], gain,
-#'                            boundary = "Te")
-#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # a coarse sampler, for speed
-#' comparison <- compare_models(list(linear = linear, bent = bent), room, runs = 20, control = quick, seed = 1,
-#'                              quiet = TRUE)
-#' if (rmarkdown::pandoc_available("1.12.3")) report(comparison, file.path(tempdir(), "room.html"))
+#' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_design(linear, room, runs = 20, seed = 1)
+#' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
+#' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
+#' if (rmarkdown::pandoc_available("1.12.3")) report(fit, file.path(tempdir(), "room.html"))
 #' \dontrun{
-#' report_fragment(comparison, parts = "summary", level = 3)  # in a chunk of a document
+#' report_fragment(fit, parts = "summary", level = 3)  # in a chunk of a document
 #' }
 #' @export
 report <- function(x, file, quiet = TRUE) {

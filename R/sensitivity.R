@@ -34,8 +34,9 @@
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
-#' model <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
-#'                             free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
+#' model <- function_simulator(function(values, drivers) {
+#'   values[["offset"]] + values[["gain"]] * drivers[, "Te"]
+#' }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
 #' sobol_indices(train_emulator(simulate_design(model, room, runs = 30, seed = 1), room), seed = 1)
 #' @export
 sobol_indices <- function(x, points = 256, replicates = 16, by_time = FALSE, seed = NULL) {

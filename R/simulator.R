@@ -31,10 +31,14 @@
 #' # Mechanisms that stack.
 #' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters.", edit = function(model) {
 #'   with_parameters(model, free("sun", uniform(0, 0.1)), boundary = "Gv",
-#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#'                   f = function(values, drivers, base) {
+#'     base(values) + values[["sun"]] * drivers[, "Gv"]
+#'   })
 #' })
-#' drift <- mechanism("drift", boundary = character(), sentence = "The sensor drifts.", edit = function(model) {
-#'   with_parameters(model, free("drift", normal(0, 0.1), "K/d"), f = function(values, drivers, info, base) {
+#' drift <- mechanism("drift", boundary = character(), sentence = "The sensor drifts.",
+#'                    edit = function(model) {
+#'   with_parameters(model, free("drift", normal(0, 0.1), "K/d"),
+#'                   f = function(values, drivers, info, base) {
 #'     base(values) + values[["drift"]] * info$step_h * seq_len(nrow(drivers)) / 24
 #'   })
 #' })

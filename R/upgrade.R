@@ -58,11 +58,13 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'                       validate = table$hour > 90)
 #' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 1)), boundary = "Te")
-#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
-#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv",
-#'                   f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+#' brighter <- function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"]
+#' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.",
+#'                  edit = function(model) {
+#'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv", f = brighter)
 #' })
-#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 19))
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)),
+#'               attribution = list(surrogates = 19))
 #' upgrade_model(linear, house, catalogue(sun), runs = 30, control = quick, seed = 1, quiet = TRUE)
 #'
 #' # The same of runs that were made elsewhere, over all rows.
@@ -72,8 +74,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' parameters <- list(free("gain", uniform(0, 1)), free("sun", uniform(0, 0.1)))
 #' given <- ensemble(design[, "gain", drop = FALSE], runs, parameters[1], measurements = house)
 #' with_sun <- ensemble(design, sunny, parameters, measurements = house)
-#' upgrade_model(given, house, catalogue(mechanism("sun", with_sun, "Gv", "Sun enters.")), control = quick, seed = 1,
-#'               quiet = TRUE)
+#' other <- mechanism("sun", with_sun, "Gv", "Sun enters.")
+#' upgrade_model(given, house, catalogue(other), control = quick, seed = 1, quiet = TRUE)
 #' }
 #' @export
 upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1,

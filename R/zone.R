@@ -405,7 +405,8 @@ fill_free <- function(x, fields, values) {
 #' box <- paper_box("M2")
 #' names(zone_parameters(box))
 #' zone_boundary(box)
-#' zone_resolve(box, c(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179, heater_radiant = 0.79))
+#' zone_resolve(box, c(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179,
+#'                     heater_radiant = 0.79))
 #' @export
 zone_parameters <- function(zone) {
   check_zone(zone)

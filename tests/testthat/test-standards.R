@@ -21,10 +21,11 @@ test_that("columns with a class of their own are numbers, others are refused if 
 test_that("a table of any class is the same record (G2.7, G2.10)", {
   table <- linear_data(60)
   plain <- linear_measurements(table)
-  for (package in c("tibble", "data.table")) {
-    if (!requireNamespace(package, quietly = TRUE)) next
-    as_other <- switch(package, tibble = tibble::as_tibble, data.table = data.table::as.data.table)
-    expect_equal(linear_measurements(as_other(table))[c("y", "boundary")], plain[c("y", "boundary")])
+  as_other <- c(tibble = "as_tibble", data.table = "as.data.table")
+  for (package in names(as_other)) {
+    if (!nzchar(system.file(package = package))) next
+    other <- getExportedValue(package, as_other[[package]])(table)
+    expect_equal(linear_measurements(other)[c("y", "boundary")], plain[c("y", "boundary")])
   }
 })
 
