@@ -416,9 +416,9 @@ stop_reason <- function(table, attribution, decisive) {
                                   " remains unexplained") else paste0(tail, " and no boundary condition is significant")
 }
 
-# The first mechanism that is named or, if none is, likely; a stand-in is no cause.
+# The first mechanism that is named or, if none is, likely; a stand-in is no cause, nor is a description.
 named_cause <- function(models, candidates, catalogue) {
-  adopted <- models[-1]
+  adopted <- Filter(function(model) !describes(catalogue[[model$mechanism]]), models[-1])
   verdicts <- vapply(adopted, `[[`, "", "verdict")
   first <- which(verdicts == if (any(verdicts == "named")) "named" else "likely")
   if (!length(first)) return(NULL)
@@ -450,6 +450,8 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   }
   others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")
   if (length(others)) cli::cli_bullets(c("*" = "{others}"))
+  told <- unlist(lapply(x$catalogue[vapply(adopted, `[[`, "", "mechanism")], description_sentence, last_fit(x)))
+  for (sentence in told) cli::cli_bullets(c("*" = "{sentence}"))
   g <- x$gain
   cli::cli_bullets(c("*" = "RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)} held out",
                      "*" = "stopped because {x$stopped_because}",
