@@ -17,9 +17,9 @@
 #' such as heat in a mass, water in a soil or charge in a capacitor. With a time constant of few steps it acts at once,
 #' as a direct gain or loss does. It does not bend, wear off or depend on anything else.
 #'
-#' *Priors.* The gain is normal about zero. Its standard deviation is that of the target over that of the condition, in
-#' the rows that calibrate: unsmoothed, such a response would vary as much as the target itself. The time constant is
-#' log-uniform from one step of the record to a sixth of its calibration rows. Rows at the start of a segment know no
+#' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of the target over that of
+#' the condition, in the rows that calibrate: unsmoothed, such a response would vary twice as much as the target itself.
+#' The time constant is log-uniform from one step of the record to a sixth of its calibration rows. Rows at the start of a segment know no
 #' history: the low-pass starts at their first value, so give a `warmup`.
 #'
 #' *Reference.* Where nothing is added: zero, if the condition rests there for a tenth of the time as sun, rain or a heater
@@ -108,8 +108,10 @@ new_response <- function(boundary, measurements, unit, gain, time_constant, refe
   response$gains <- gsub("[^A-Za-z0-9_.]", "_", paste0("gain_", of))
   response$time_constant <- paste0("time_constant_", boundary)
   response$per <- per
+  # Uniform also because the output is then linear in the emulator's input, so that few runs show it.
+  largest <- 2 * stats::sd(m$raw$y[rows]) / spread
   gains <- lapply(seq_along(of), function(i) {
-    free(response$gains[i], gain %||% normal(0, stats::sd(m$raw$y[rows]) / spread[i]),
+    free(response$gains[i], gain %||% uniform(-largest[i], largest[i]),
          paste0(m$unit, if (nzchar(per)) paste(" per", per)), paste("gain of the response to", of[i]))
   })
   slowest <- sum(m$use == "calibrate") * m$step_h / 6
@@ -156,8 +158,9 @@ responding_ensemble <- function(ensemble, response, measurements) {
   m <- measurements
   check_same_rows(ensemble$hours, m)
   runs <- nrow(ensemble$unit)
-  # By the number of parameters there, so that no two responses have the same design.
-  unit <- with_seed(length(ensemble$parameters), lhs::randomLHS(runs, length(response$parameters)))
+  # A seed that made no other design: of the same seed, new and old parameters would go together.
+  seed <- strtoi(substr(content_hash(ensemble$unit), 1, 7), 16)
+  unit <- with_seed(seed, lhs::randomLHS(runs, length(response$parameters)))
   values <- unit_to_values(unit, response$parameters)
   fine <- response_runs(response, m$raw$drivers[, response$boundary], m$raw$hours, c(TRUE, diff(m$raw$segment) != 0),
                         values)
