@@ -1,5 +1,5 @@
 # Twin House O5 by given runs alone: the sun's way into the room is missing, and the simulator cannot be changed.
-# Usage: Rscript given_runs.R [FOLDER for the report]
+# Usage: Rscript given_runs.R [FOLDER for the report] (five minutes)
 library(amiss)
 
 record <- read.csv(system.file("extdata", "twinhouse_exp1_O5_rolbs_freefloat_10min.csv", package = "amiss"))
@@ -21,7 +21,7 @@ runs <- lapply(c("rolbs", "freefloat"), function(phase) {
 
 # ---- Here: only the design, the runs and the measurements are known.
 given <- ensemble(design, do.call(rbind, runs), unname(free_parameters(shaded)), measurements = room)
-upgrade <- upgrade_model(given, room, responses(room), seed = 1)
+upgrade <- upgrade_model(given, room, responses(room, c(Gv_S = "W/m2", Gv_W = "W/m2")), seed = 1)
 print(upgrade)
 print(summary(upgrade))
 folder <- commandArgs(trailingOnly = TRUE)

@@ -46,3 +46,10 @@ ideas <- catalogue(
       append(lines[-at], slow, at - 1)
     }), free("c_heater", uniform(10, 4e4), "J/K", "heat capacity of the heater"))
   }))
+
+# ---- Few runs, and a coarse sampler: a minute of one core.
+quick <- list(max_steps = 1, attribution = list(surrogates = 19),
+              calibration = list(check = 15, ais = list(pilot_chains = 48, groups = 4)))
+upgrade <- upgrade_model(network, room, ideas, runs = 60, control = quick, seed = 1, quiet = TRUE)
+print(upgrade)
+print(tail(tidy(upgrade), 1))
