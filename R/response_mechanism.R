@@ -12,18 +12,18 @@
 #' gets values of the new parameters from a Latin hypercube. To a simulator it is added after each run.
 #'
 #' *A description, no mechanism.* It says what the target answers to, how strongly and how fast, not why. It is never
-#' named as a cause, and where a [mechanism()] of the catalogue explains the same, that should win. A single store between
-#' the condition and the target has this shape: something that the condition fills and that empties at a steady rate,
-#' such as heat in a mass, water in a soil or charge in a capacitor. With a time constant of few steps it acts at once,
-#' as a direct gain or loss does. It does not bend, wear off or depend on anything else.
+#' named as a cause. A single store between the condition and the target has this shape: something that the condition
+#' fills and that empties at a steady rate, such as heat in a mass, water in a soil or charge in a capacitor. With a
+#' time constant of hardly a step it acts at once, as a direct gain or loss does. It does not bend, wear off or depend
+#' on anything else.
 #'
-#' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of the target over that of
-#' the condition, in the rows that calibrate: unsmoothed, such a response would vary twice as much as the target itself.
-#' The time constant is log-uniform from one step of the record to a sixth of its calibration rows. Rows at the start of a segment know no
-#' history: the low-pass starts at their first value, so give a `warmup`.
+#' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of the target over that
+#' of the condition, in the rows that calibrate: unsmoothed, such a response would vary twice as much as the target
+#' itself. The time constant is log-uniform from one step of the record to a sixth of its calibration rows. The low-pass
+#' starts at the first value of each segment, whose history it does not know: give a `warmup`.
 #'
-#' *Reference.* Where nothing is added: zero, if the condition rests there for a tenth of the time as sun, rain or a heater
-#' do, and otherwise its mean over the rows that calibrate.
+#' *Reference.* Where nothing is added: zero, if the condition rests there for a tenth of the time as sun, rain or a
+#' heater do, and otherwise its mean over the rows that calibrate.
 #'
 #' @param boundary Name of the condition, a driver column of the `measurements`. One that [circular()] marks answers by
 #'   its sine and its cosine, each with a gain.
@@ -63,8 +63,8 @@ response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, t
   of <- measurements$target
   entry <- mechanism(
     name, function(model) with_response(model, response, measurements), boundary,
-    sprintf(paste("%s answers to %s in a way that the model lacks: described here by a gain and a time constant, and not",
-                  "explained."), of, boundary))
+    sprintf(paste("%s answers to %s in a way that the model lacks: described here by a gain and a time constant, and",
+                  "not explained."), of, boundary))
   entry$response <- response
   structure(entry, class = c("amiss_response_mechanism", class(entry)))
 }
@@ -77,7 +77,8 @@ responses <- function(measurements, units = character()) {
   check_input(checkmate::check_subset(names(units), measurements$conditions), "units",
               "Name boundary conditions that are analysed.")
   units <- c(units, stats::setNames(rep("", length(measurements$conditions)), measurements$conditions))
-  do.call(catalogue, lapply(measurements$conditions, function(name) response_mechanism(name, measurements, units[[name]])))
+  of <- function(name) response_mechanism(name, measurements, units[[name]])
+  do.call(catalogue, lapply(measurements$conditions, of))
 }
 
 #' @export
@@ -208,7 +209,8 @@ simulate_runs.amiss_responding <- function(simulator, values, drivers, step_h, h
 print.amiss_responding <- function(x, ...) on_stdout(x, {
   print(without_responses(x))
   of <- vapply(attr(x, "responses"), `[[`, "", "boundary")
-  cli::cli_bullets(c("*" = "its output takes {cli::qty(of)}the response{?s} to {.field {of}}, which describe{?s/} and do{?es/} not explain"))
+  told <- "with {cli::qty(of)}the response{?s} to {.field {of}}, which describe{?s/} and do{?es/} not explain"
+  cli::cli_bullets(c("*" = told))
 })
 
 # ---- in words
@@ -232,8 +234,8 @@ description_sentence <- function(entry, fit) {
                   "water in a soil."), response$boundary)
   }
   gains <- paste(vapply(response$gains, number, ""), collapse = " and ")
-  sprintf(paste("This describes and does not explain: %s answers to %s with a gain of %s, smoothed over a time constant",
-                "of %s. %s"), m$target, response$boundary, gains, number(response$time_constant), shape)
+  sprintf(paste("This describes and does not explain: %s answers to %s with a gain of %s, smoothed over a time",
+                "constant of %s. %s"), m$target, response$boundary, gains, number(response$time_constant), shape)
 }
 
 description_inspection <- function(upgrade, model) {

@@ -16,7 +16,7 @@ test_that("the network that ngspice solves is the one that is meant", {
   runs <- simulate_runs(network, cbind(c = 7.2e5), cbind(Te = rep(0:1, c(12, 24))), step_h = 1 / 6)
   hours <- 1:36 / 6
   expected <- ifelse(hours <= 2, 10 * exp(-hours / 2), 1 - (1 - 10 * exp(-1)) * exp(-(hours - 2) / 2))
-  expect_lt(max(abs(runs - expected)), 0.02)  # the trapezoidal rule at these steps, and the jump within one of them
+  expect_lt(max(abs(runs - expected)), 0.05)  # a jump of 1 K within a step of 10 minutes is 0.08 K
 })
 
 test_that("the sun of house O5 is found in a network that knows of none, and the gain measured", {

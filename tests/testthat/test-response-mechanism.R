@@ -3,10 +3,12 @@ room_data <- small_record()
 room <- measurements(room_data, time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05, unit = "K",
                      calibrate = 1:240 <= 168, validate = 1:240 > 168, warmup = 12)
 room_parameters <- list(free("offset", uniform(10, 20), "K"), free("gain", uniform(0, 2)))
-room_design <- withr::with_seed(2, amiss:::unit_to_values(lhs::randomLHS(60, 2), amiss:::named_parameters(room_parameters)))
+room_design <- amiss:::unit_to_values(withr::with_seed(2, lhs::randomLHS(60, 2)),
+                                      amiss:::named_parameters(room_parameters))
 room_runs <- sweep(tcrossprod(lagged(room_data$Te, 6), room_design[, "gain"]), 2, room_design[, "offset"], "+")
 given <- ensemble(room_design, room_runs, room_parameters, measurements = room)
-room_model <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * lagged(drivers[, "Te"], 6),
+room_model <- function_simulator(function(values, drivers) values[["offset"]] +
+                                 values[["gain"]] * lagged(drivers[, "Te"], 6),
                                  room_parameters[[1]], room_parameters[[2]], boundary = "Te")
 sun <- response_mechanism("Gv", room, unit = "W/m2")
 
@@ -20,9 +22,10 @@ test_that("a response is the gain times the condition behind a low-pass", {
 
 test_that("given runs with a response are those that the simulator with it would give", {
   for (average in list(NULL, 2)) {
-    m <- suppressMessages(measurements(room_data[-100, ], time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05,
-                      average = average, calibrate = c(1:99, 101:240) <= 168, validate = c(1:99, 101:240) > 168,
-                      warmup = 12))
+    rows <- setdiff(1:240, 100)
+    m <- suppressMessages(measurements(room_data[rows, ], time = "time", target = "Ti", boundary = ~ Te + Gv,
+                                       noise_sd = 0.05, average = average, calibrate = rows <= 168,
+                                       validate = rows > 168, warmup = 12))
     base <- simulate_design(room_model, m, runs = 20, seed = 1)
     runs <- amiss:::simulate_measured(room_model, base$values, m, c("calibrate", "validate"), 1)
     entry <- response_mechanism("Gv", m)
@@ -79,9 +82,8 @@ test_that("responses stack with other edits of any simulator, in any order", {
     added <- amiss:::response_runs(sun$response, drivers[, "Gv"], 1:30, 1:30 == 1, values)
     expect_equal(simulate_runs(sun$edit(other(model)), values, drivers, step_h = 1), plain + added)
   }
-  both(room_model, function(model) with_parameters(model, free("more", uniform(0, 1)), f = function(values, drivers, base) {
-    base(values) + values[["more"]]
-  }))
+  more <- function(values, drivers, base) base(values) + values[["more"]]
+  both(room_model, function(model) with_parameters(model, free("more", uniform(0, 1)), f = more))
   both(room_model, Te$edit)
   box <- zone(zone_wall("wall", 10, zone_layer(0.1, 1, 1e6), outside = "Te"), zone_heater("heater", "P"),
               zone_infiltration("leak", free("ach", uniform(0, 1)), "Te"), volume = 30)
@@ -127,7 +129,8 @@ test_that("the loop extends given runs by the response that lacks, measures it a
   expect_null(upgrade$named_cause)
   told <- summary(upgrade)
   expect_equal(told$tag, "Described, not explained")
-  sentence <- "describes and does not explain: Ti answers to Gv with a gain of 0.006.* K per W/m\u00b2 .*time constant of .* h .*store"
+  sentence <- paste("describes and does not explain: Ti answers to Gv with a gain of 0.006.* K per W/m\u00b2",
+                    ".*time constant of .* h .*store")
   expect_match(paste(told$change, collapse = " "), sentence)
   expect_match(told$mechanisms[[1]]$sentence, sentence)
   expect_match(printed(upgrade), "describes and does not explain")
@@ -145,7 +148,7 @@ test_that("a study of given runs and responses runs from its file", {
   write(room_runs, "runs.csv")
   writeLines(c("function(measurements) {",
                "  ensemble(read.csv(\"design.csv\"), read.csv(\"runs.csv\"), measurements = measurements,",
-               "           parameters = list(free(\"offset\", uniform(10, 20), \"K\"), free(\"gain\", uniform(0, 2))))", "}"),
+               "           parameters = list(free(\"offset\", uniform(10, 20)), free(\"gain\", uniform(0, 2))))", "}"),
              file.path(folder, "model.R"))
   writeLines("responses", file.path(folder, "catalogue.R"))
   writeLines(c("study: given", "data: record.csv", "time: time", "target: Ti", "unit: K", "boundary: [Te, Gv]",

@@ -11,17 +11,16 @@ room <- measurements(record, time = "time_cet", target = "Ti", unit = "K", noise
 
 network <- program_simulator(
   c("sh", "run.sh"),
-  free("c_air", uniform(1e5, 3e6), "J/K", "capacity of the air and what follows it"),
-  free("c_mass", uniform(5e6, 8e7), "J/K", "capacity of walls, floor and ceiling"),
-  free("h_mass", uniform(50, 800), "W/K", "between both"),
-  free("h_out", uniform(2, 40), "W/K", "windows and leaks"), free("h_shell", uniform(1, 30), "W/K", "facade"),
-  free("h_door", uniform(0, 300), "W/K", "door to the corridor"),
-  free("h_rooms", uniform(0, 60), "W/K", "partition to the kitchen"),
-  free("h_slabs", uniform(1, 40), "W/K", "ceiling and floor, each"),
-  free("start", normal(0, 1, -3, 3), "K", "mass at the start, against the kitchen"),
+  free("c_air", uniform(2e5, 2e6), "J/K", "capacity of the air and what follows it"),
+  free("c_mass", uniform(5e6, 5e7), "J/K", "capacity of walls, floor and ceiling"),
+  free("h_mass", uniform(50, 600), "W/K", "between both"),
+  free("h_out", uniform(5, 40), "W/K", "windows, leaks and facade"),
+  free("h_door", uniform(0, 200), "W/K", "door to the corridor"),
+  free("h_rooms", uniform(1, 40), "W/K", "partition to the kitchen, ceiling and floor, each"),
   templates = c(room.cir = file.path(folder, "room.cir"), run.sh = file.path(folder, "run.sh")),
   output = function(directory) utils::read.table(file.path(directory, "out.txt"))[-1, 2],
-  boundary = c("Te", "Ti_corridor", "T_kitchen", "T_attic_w", "T_cellar", "vent_supply_m3h", "vent_supply_T", "P_living"),
+  boundary = c("Te", "Ti_corridor", "T_kitchen", "T_attic_w", "T_cellar", "vent_supply_m3h", "vent_supply_T",
+               "P_living"),
   cache = file.path(tempdir(), "ngspice"), name = "room by ngspice")
 
 # Each mechanism is the circuit with other lines.
