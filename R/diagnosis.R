@@ -75,8 +75,9 @@ diagnosis_verdict <- function(upgrade) {
   }
   likely <- of("likely")
   if (length(likely)) {
-    return(list(verdict = "likely", tag = paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; ")),
-                headline = headline))
+    tag <- if (describes(upgrade$catalogue[[likely[[1]]$mechanism]])) "Described, not explained"
+           else paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; "))
+    return(list(verdict = "likely", tag = tag, headline = headline))
   }
   list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
 }
@@ -222,7 +223,8 @@ change_sentences <- function(upgrade) {
     entry <- upgrade$catalogue[[model$mechanism]]
     c(sprintf("%s (%s), driven by %s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict,
               listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf)),
-      step_sentence(upgrade, model), doubt_sentence(model), confounded_sentence(model))
+      description_sentence(entry, last_fit(upgrade)), step_sentence(upgrade, model), doubt_sentence(model),
+      confounded_sentence(model))
   }))
 }
 
@@ -231,7 +233,8 @@ mechanism_words <- function(model, upgrade) {
   row <- upgrade$candidates[upgrade$candidates$from == model$parent & upgrade$candidates$mechanism == model$mechanism, ]
   entry <- upgrade$catalogue[[model$mechanism]]
   changes <- changes_table(upgrade)
-  list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary, sentence = entry$sentence,
+  list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
+       sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))), collapse = " "),
        evidence = evidence_sentence(row), brought = step_sentence(upgrade, model), against = doubt_sentence(model),
        also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
        inspect = mechanism_inspections(upgrade, model),
@@ -344,6 +347,8 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   }
   others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")
   if (length(others)) cli::cli_bullets(c("*" = "{others}"))
+  told <- unlist(lapply(x$catalogue[vapply(adopted, `[[`, "", "mechanism")], description_sentence, last_fit(x)))
+  for (sentence in told) cli::cli_bullets(c("*" = "{sentence}"))
   g <- x$gain
   cli::cli_bullets(c("*" = paste("RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in",
                                  "calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)}",

@@ -102,7 +102,9 @@ mechanism_inspections <- function(upgrade, model) {
   told <- c(vapply(rivals$mechanism, function(rival) separating_words(upgrade, trials, model$mechanism, rival), ""),
             confounded_inspection(upgrade, model))
   c(stats::setNames(told, rep("rival", length(told))),
-    if (model$verdict == "stand-in") stand_in_inspection(model) else site_inspection(upgrade, model),
+    if (model$verdict == "stand-in") stand_in_inspection(model)
+    else if (describes(upgrade$catalogue[[model$mechanism]])) description_inspection(upgrade, model)
+    else site_inspection(upgrade, model),
     if (any(grepl("drifting sensor", model$doubts))) {
       c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: a drift of it would",
                               "explain as much as %s."),

@@ -180,9 +180,10 @@ simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, st
   files <- c(program, simulator$command[file.exists(simulator$command)])
   shared <- rlang::hash(list(table, unname(tools::md5sum(files)), simulator$version, plain(simulator$output),
                              simulator$drivers))
+  csv <- csv_lines(table)
   made <- future.apply::future_lapply(seq_len(nrow(values)),
                                       function(m) {
-                                        run <- program_run(simulator, values[m, ], table, shared)
+                                        run <- program_run(simulator, values[m, ], csv, shared)
                                         piece_done()
                                         run
                                       }, future.packages = "amiss", future.seed = NULL)
@@ -200,6 +201,14 @@ drivers_table <- function(drivers, step_h, time) {
   data.frame(time = time, hours = step_h * seq_len(nrow(drivers)), drivers, check.names = FALSE)
 }
 
+# Written once for all runs.
+csv_lines <- function(table) {
+  file <- tempfile()
+  on.exit(unlink(file))
+  utils::write.csv(table, file, row.names = FALSE, quote = FALSE)
+  readLines(file)
+}
+
 tell_failed <- function(simulator, made, failed) {
   if (!length(failed)) return(invisible())
   first <- made[[failed[1]]]
@@ -209,7 +218,7 @@ tell_failed <- function(simulator, made, failed) {
 }
 
 # The output of one run, from the cache or made; list(why, directory, stderr) if it failed.
-program_run <- function(simulator, values, table, shared) {
+program_run <- function(simulator, values, csv, shared) {
   templates <- lapply(simulator$templates, render, values)
   command <- c(simulator$command[1], render(simulator$command[-1], values))
   key <- rlang::hash(list(shared, templates, command))
@@ -218,8 +227,8 @@ program_run <- function(simulator, values, table, shared) {
   directory <- tempfile(paste0(key, "-"), simulator$cache)
   for (attempt in 0:simulator$retries) {
     unlink(directory, recursive = TRUE)
-    write_inputs(directory, templates, simulator$drivers, table)
-    out <- tryCatch(run_program(simulator, command, directory, nrow(table)), error = conditionMessage)
+    write_inputs(directory, templates, simulator$drivers, csv)
+    out <- tryCatch(run_program(simulator, command, directory, length(csv) - 1), error = conditionMessage)
     if (is.numeric(out)) {
       part <- tempfile("part-", simulator$cache)
       saveRDS(out, part)
@@ -235,14 +244,14 @@ program_run <- function(simulator, values, table, shared) {
   list(why = out, directory = failed, stderr = if (file.exists(stderr)) utils::tail(readLines(stderr, warn = FALSE), 5))
 }
 
-write_inputs <- function(directory, templates, drivers, table) {
+write_inputs <- function(directory, templates, drivers, csv) {
   for (file in names(templates)) {
     path <- file.path(directory, file)
     dir.create(dirname(path), recursive = TRUE, showWarnings = FALSE)
     writeLines(templates[[file]], path)
   }
   dir.create(directory, showWarnings = FALSE)
-  utils::write.csv(table, file.path(directory, drivers), row.names = FALSE, quote = FALSE)
+  writeLines(csv, file.path(directory, drivers))
 }
 
 # The output of one run of the program; an error says why there is none.

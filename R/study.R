@@ -18,6 +18,9 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' whose value is a named list of simulators) compares them by [compare_models()], with `method` (`paper` or `history`)
 #' and, where the record is synthetic, `truth` (an R file whose value is a list of a `simulator` and its `values`).
 #'
+#' The value of `model` and of `catalogue` may also be a function of the [measurements()] that returns the piece: so a
+#' study can have given runs ([ensemble()]) as its model, and [responses()] as its catalogue.
+#'
 #' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
 #' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`,
 #' `average_h`, `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]), `calibrate`,
@@ -98,11 +101,11 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
                  warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
                  time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0)
   }
-  pieces <- if (is.null(study$models)) upgrade_pieces(files) else comparison_pieces(files, study$method)
+  measured <- if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure()
+  pieces <- if (is.null(study$models)) upgrade_pieces(files, measured) else comparison_pieces(files, study$method)
   c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150,
          control = study$control),
-    pieces, list(measurements = if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure(),
-                 code = content_hash(lapply(files[is_code(files)], study_code))))
+    pieces, list(measurements = measured, code = content_hash(lapply(files[is_code(files)], study_code))))
 }
 
 # The options that can be checked before anything is computed.
@@ -179,10 +182,10 @@ study_data <- function(path, call = rlang::caller_env()) {
   })
 }
 
-upgrade_pieces <- function(files, call = rlang::caller_env()) {
-  model <- source_value(files[["model"]], "model", call)
-  check_simulator(model, call)
-  catalogue <- source_value(files[["catalogue"]], "catalogue", call)
+upgrade_pieces <- function(files, measurements, call = rlang::caller_env()) {
+  model <- source_value(files[["model"]], "model", call, measurements)
+  if (!inherits(model, "amiss_ensemble")) check_simulator(model, call)
+  catalogue <- source_value(files[["catalogue"]], "catalogue", call, measurements)
   check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue", call = call)
   list(model = model, catalogue = catalogue)
 }
@@ -208,23 +211,23 @@ study_path <- function(path, folder, field, call = rlang::caller_env()) {
 }
 
 # The value of the last expression of an R file, evaluated in its folder, where it sees the package and nothing of the
-# session.
-source_value <- function(path, field, call = rlang::caller_env()) {
-  tryCatch(sys.source_value(path), error = function(e) {
+# session. Where it is a function and the measurements are known, what it makes of them.
+source_value <- function(path, field, call = rlang::caller_env(), measurements = NULL) {
+  tryCatch(sys.source_value(path, measurements), error = function(e) {
     if (inherits(e, "amiss_error")) stop(e)
     abort_input(c("The {.field {field}} file {.file {path}} stopped with an error.", x = "{conditionMessage(e)}"),
                 call = call)
   })
 }
 
-sys.source_value <- function(path) {
+sys.source_value <- function(path, measurements = NULL) {
   scope <- new.env(parent = new.env(parent = asNamespace("amiss")))
   code <- study_code(path)
   before <- setwd(dirname(path))
   on.exit(setwd(before))
   value <- NULL
   for (expression in code) value <- eval(expression, scope)
-  value
+  if (is.function(value) && !is.null(measurements)) value(measurements) else value
 }
 
 # The parsed expressions of an R file: its comments and layout make no difference.

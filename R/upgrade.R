@@ -318,9 +318,9 @@ stop_reason <- function(table, attribution, decisive) {
                                   " remains unexplained") else paste0(tail, " and no boundary condition is significant")
 }
 
-# The first mechanism that is named or, if none is, likely; a stand-in is no cause.
+# The first mechanism that is named or, if none is, likely; a stand-in is no cause, nor is a description.
 named_cause <- function(models, candidates, catalogue) {
-  adopted <- models[-1]
+  adopted <- Filter(function(model) !describes(catalogue[[model$mechanism]]), models[-1])
   verdicts <- vapply(adopted, `[[`, "", "verdict")
   first <- which(verdicts == if (any(verdicts == "named")) "named" else "likely")
   if (!length(first)) return(NULL)

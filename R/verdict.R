@@ -14,6 +14,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control) {
     gain <- held_out_gain(parent, model)
     no_gain <- isFALSE(gain$improves)
     doubts <- c(
+      if (describes(catalogue[[model$mechanism]])) "it describes what is missing and does not explain it",
       if (row$probability < 0.95) "other causes are possible",
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (no_gain) "data held out do not gain by it",

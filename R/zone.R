@@ -299,7 +299,9 @@ find_component <- function(zone, name, call) {
 #' @export
 add_component <- function(zone, component) {
   check_zone(zone)
-  new_zone(c(unname(zone$components), list(component)), unclass(zone)[names(zone_fields$zone)])
+  zone$components <- new_zone(c(unname(zone$components), list(component)),
+                              unclass(zone)[names(zone_fields$zone)])$components
+  zone
 }
 
 #' @rdname zone_edits
