@@ -73,8 +73,13 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
   set <- calibration_setting(emulator, measurements, control, seed, call)
   control <- set$control
   data <- history_data(emulator, measurements, set$rows, control)
-  result <- staged("sampling the posterior", call_engine(
-    calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads))))
+  result <- tryCatch(
+    staged("sampling the posterior", call_engine(
+      calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads)))),
+    amiss_error_numerical = function(e) {
+      check_noise_visible(emulator, measurements$noise_sd, e, call)
+      rlang::cnd_signal(e)
+    })
   posterior <- result$posterior
   fit <- new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept,
                  coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
@@ -83,6 +88,16 @@ calibrate_with_runs <- function(emulator, measurements, control, seed, threads, 
   checked <- checked_by_runs(fit, threads)
   checked$fit$trust <- fit_trust(checked$fit)
   checked
+}
+
+# A noise that is lost in the rounding of what the simulator moves is told as the reason of a failure.
+check_noise_visible <- function(emulator, noise_sd, parent, call) {
+  spread <- sqrt(mean(rowSums(simulator_moves(emulator)^2)))
+  if (noise_sd > 1e-5 * spread) return(invisible())
+  abort_numerical(c("The noise of {signif(noise_sd, 3)} is lost beside the runs, which spread by {signif(spread, 3)}.",
+                    x = "{conditionMessage(parent)}",
+                    i = "Double precision holds a noise of a hundred-thousandth of the spread: narrow the priors, or give {.arg noise_sd} of {.fun measurements} as large as the instrument's error."),
+                  call = call)
 }
 
 # What a calibration is made of before it is made: list(emulator, measurements, rows, control, priors, seed).
@@ -128,7 +143,8 @@ fill_calibration_control <- function(control, measurements, n, what = "control",
   check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), named("confidence"),
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
   check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1), named("inclusion"), call = call)
-  check_input(checkmate::check_number(control$amplitude, lower = 1e-12, finite = TRUE), named("amplitude"), call = call)
+  check_input(checkmate::check_number(control$amplitude, lower = .Machine$double.xmin, finite = TRUE),
+              named("amplitude"), call = call)
   check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1,
                                        any.missing = FALSE), named("time_constants"), call = call)
   check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE,

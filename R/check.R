@@ -96,12 +96,12 @@ error_over_noise <- function(fit, error) {
   data$y <- numeric(nrow(error))
   priors <- fit$priors
   priors$discarded_variance <- 0
-  each <- rep(picked, each = ncol(error) + 1)
-  points <- list(setting = posterior$setting[each], variance = posterior$variance[each],
-                 t = matrix(0, length(each), ncol(posterior$t)))
-  runs <- cbind(0, error)[, rep(seq_len(ncol(error) + 1), length(picked)), drop = FALSE]
-  log_l <- matrix(call_engine(run_likelihood_(data, priors, points, runs, engine_context(fit$seed, 1))),
-                  ncol(error) + 1)
+  runs <- cbind(0, error)
+  log_l <- vapply(picked, function(draw) {
+    points <- list(setting = rep(posterior$setting[draw], ncol(runs)),
+                   variance = rep(posterior$variance[draw], ncol(runs)), t = matrix(0, ncol(runs), ncol(posterior$t)))
+    call_engine(run_likelihood_(data, priors, points, runs, engine_context(fit$seed, 1)))
+  }, numeric(ncol(runs)))
   squares <- 2 * sweep(-log_l[-1, , drop = FALSE], 2, log_l[1, ], "+")
   seen <- sqrt(sum(fit$weights * posterior$variance * (1 + error_share(fit))))
   sqrt(mean(squares) / nrow(error)) * max(1, seen / fit$measurements$noise_sd)

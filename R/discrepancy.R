@@ -61,8 +61,9 @@ paper_discrepancy <- function(fit, draws = 24) {
                                    lambda = hyper$lambda[picked]))
   x <- scaled_conditions(fit$measurements, fit$rows)
   basis <- qr.Q(qr(fit$emulator$basis$vectors))
-  within <- vapply(picked, function(i) conditional_variance(x, basis, hyper$alpha[i, ], hyper$t2[i], hyper$lambda[i]),
-                   numeric(nrow(x)))
+  within <- vapply(picked, function(i) {
+    conditional_variance(x, basis, hyper$alpha[i, ], hyper$t2[i], hyper$lambda[i], fit$priors$unit)
+  }, numeric(nrow(x)))
   mean <- rowMeans(means)
   sd <- sqrt(rowMeans(within) + rowMeans((means - mean)^2))
   new_discrepancy(fit, mean, mean - 1.96 * sd, mean + 1.96 * sd)
@@ -75,11 +76,11 @@ scaled_conditions <- function(measurements, rows) {
   structure(sweep(x, 2, width, "/"), condition = measurements$condition)
 }
 
-conditional_variance <- function(x, basis, alpha, t2, lambda) {
+conditional_variance <- function(x, basis, alpha, t2, lambda, unit = 1) {
   decay <- -4 * log(pmax(alpha[attr(x, "condition")], .Machine$double.xmin))
   left <- x %*% diag(2 * decay, ncol(x)) %*% t(x)
   squares <- 0.5 * diag(left)
-  covariance <- (1 - t2) / t2 * exp(left - outer(squares, squares, "+"))
+  covariance <- unit^2 * (1 - t2) / t2 * exp(left - outer(squares, squares, "+"))
   inverse <- chol2inv(chol(covariance + diag(1 / lambda, nrow(x))))
   weighted <- inverse %*% basis
   outside <- diag(inverse) - rowSums((weighted %*% solve(crossprod(basis, weighted))) * weighted)

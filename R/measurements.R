@@ -271,8 +271,9 @@ boundary_columns <- function(drivers, terms) {
 
 constant_conditions <- function(x, rows) {
   spread <- apply(x$values[rows, , drop = FALSE], 2, function(v) diff(range(v)))
-  size <- apply(abs(x$values[rows, , drop = FALSE]), 2, max)
-  x$names[!tapply(spread > 1e-9 * (1 + size), x$condition, any)]
+  # Beside the rounding of values as large as the condition has anywhere.
+  size <- tapply(apply(abs(x$values), 2, max), x$condition, max)[x$condition]
+  x$names[!tapply(spread > 1e-9 * size, x$condition, any)]
 }
 
 x_keep <- function(x, names, call = rlang::caller_env()) {

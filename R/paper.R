@@ -1,5 +1,5 @@
-paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1), t2 = c(1, 1), fictitious_seed = 1,
-                      probability = 0.95, tolerance = 0.01, ais = list())
+paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1), t2 = c(1, 1), unit = 1,
+                      fictitious_seed = 1, probability = 0.95, tolerance = 0.01, ais = list())
 
 #' Calibrate a simulator as in the paper
 #'
@@ -20,7 +20,8 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' explains less than white noise does; its rank shows that.
 #'
 #' The prior of the discrepancy's variance, `(1 - t2) / t2` with `t2` uniform, has its median at 1 in the target's unit
-#' squared: unlike [calibrate()]'s, the evidence depends on that unit beyond the change of density.
+#' squared: unlike [calibrate()]'s, the evidence depends on that unit beyond the change of density, unless `unit` changes
+#' with it.
 #'
 #' *Cost.* The kernel of (6) is smooth in the values of the conditions and so of low rank. Beyond 120 steps its
 #' posterior is annealed by way of every 4th, 16th, ... step of the record, with values that are approximate to
@@ -30,7 +31,8 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' @inheritParams calibrate
 #' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
 #'   `shared_lambda` (one noise precision for all basis vectors; `FALSE`), `alpha` and `t2` (the two shapes of their
-#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `fictitious_seed` (of the white noise, which is part of the data; 1),
+#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `unit` (of the target, in whose square `(1 - t2) / t2` is the
+#'   discrepancy's variance; 1), `fictitious_seed` (of the white noise, which is part of the data; 1),
 #'   `probability` of the highest-density intervals (0.95), `tolerance` (0.01, in nats; 0 for dense values), and `ais`,
 #'   a list for the sampler as in [calibrate()].
 #' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of the parameters),
@@ -59,8 +61,8 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
   threads <- check_threads(threads)
   control <- fill_paper_control(control, length(rows))
   data <- paper_data(emulator, measurements, rows, control)
-  priors <- list(alpha = control$alpha, t2 = control$t2, noise_sd = measurements$noise_sd,
-                 noise_shape = length(rows) * control$confidence)
+  priors <- list(alpha = control$alpha, t2 = control$t2, unit = control$unit,
+                 noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence)
   result <- staged("sampling the posterior", call_engine(
     calibrate_paper_(data, priors, emulator$processes, control, engine_context(seed, threads))))
   inside <- result$inside
@@ -99,6 +101,8 @@ fill_paper_control <- function(control, n, what = "control", call = rlang::calle
                 named(prior),
                 "Give the two shapes of a beta distribution.", call = call)
   }
+  check_input(checkmate::check_number(control$unit, lower = .Machine$double.xmin, finite = TRUE), named("unit"),
+              call = call)
   check_seed(control$fictitious_seed, named("fictitious_seed"), call)
   check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999), named("probability"),
               call = call)

@@ -28,19 +28,20 @@ KernelPriors make_kernel_priors(const Rcpp::List& priors) {
   KernelPriors out;
   out.alpha = make_beta(priors["alpha"]);
   out.t2 = make_beta(priors["t2"]);
+  out.unit = priors["unit"];
   out.noise.sd = priors["noise_sd"];
   out.noise.shape = priors["noise_shape"];
   return out;
 }
 
-Rcpp::List list_draws(const std::vector<KernelParameters>& draws, int conditions) {
+Rcpp::List list_draws(const std::vector<KernelParameters>& draws, int conditions, double unit) {
   const Eigen::Index n = static_cast<Eigen::Index>(draws.size());
   MatrixXd alpha(n, conditions + 1);
   VectorXd t2(n), lambda(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const KernelParameters& p = draws[static_cast<std::size_t>(i)];
     alpha.row(i) = p.alpha().transpose();
-    t2[i] = p.t2();
+    t2[i] = p.t2(unit);
     lambda[i] = p.lambda;
   }
   return Rcpp::List::create(Rcpp::_["alpha"] = alpha, Rcpp::_["t2"] = t2, Rcpp::_["lambda"] = lambda);
@@ -84,7 +85,7 @@ Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, co
   const VarianceIndex index = variance_index(model, fit.draws, fit.outside.posterior.weights,
                                              Rcpp::as<double>(control["probability"]), context);
   Rcpp::List outside = convert::ais_list(fit.outside.posterior), inside = convert::ais_list(fit.inside);
-  outside["hyperparameters"] = list_draws(fit.draws, model.conditions());
+  outside["hyperparameters"] = list_draws(fit.draws, model.conditions(), model.priors().unit);
   outside["approximation"] = list_approximation(fit.outside);
   inside["unit"] = fit.unit;
   inside["lambda"] = fit.lambda;
@@ -104,13 +105,14 @@ Eigen::VectorXd fictitious_condition_(int n, double seed) {
 Eigen::MatrixXd paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors,
                                    const Rcpp::List& draws) {
   const KernelModel model(make_kernel_data(data), make_kernel_priors(priors));
+  const double unit = model.priors().unit;
   const MatrixXd alpha = Rcpp::as<MatrixXd>(draws["alpha"]);
   const VectorXd t2 = Rcpp::as<VectorXd>(draws["t2"]), lambda = Rcpp::as<VectorXd>(draws["lambda"]);
   MatrixXd out(model.size(), alpha.rows());
   for (Eigen::Index i = 0; i < alpha.rows(); ++i) {
     KernelParameters p;
     p.decay = -4.0 * alpha.row(i).transpose().array().log();
-    p.amplitude = (1.0 - t2[i]) / t2[i];
+    p.amplitude = unit * unit * ((1.0 - t2[i]) / t2[i]);
     p.lambda = lambda[i];
     out.col(i) = model.discrepancy(p);
   }

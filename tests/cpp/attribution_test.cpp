@@ -228,6 +228,26 @@ TEST(SurrogateTest, StatisticIsTheLossOfLogLikelihoodOfFreeFits) {
   EXPECT_EQ(test.statistic[1], test.statistic[2]);
 }
 
+// Powers of two round nothing but the logarithms of the unit.
+TEST(SurrogateTest, UnitOfTheTargetDoesNotMatter) {
+  const HistoryData data = make_data(0.2, 3);
+  const SurrogateTest in_one = singles_test(make_model(data), few_surrogates(19));
+  const auto in_unit = [&](double unit) {
+    HistoryData scaled = data;
+    scaled.y *= unit;
+    scaled.basis *= unit;
+    HistoryPriors priors;
+    priors.noise_sd = priors.amplitude = 0.5 * unit;
+    priors.reach = {kInfinity};
+    return singles_test(HistoryModel(scaled, priors, Context()), few_surrogates(19));
+  };
+  for (double unit : {std::exp2(-40.0), std::exp2(40.0)}) {
+    const SurrogateTest test = in_unit(unit);
+    EXPECT_LT((test.statistic - in_one.statistic).cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_LT((test.null_statistics - in_one.null_statistics).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
 TEST(SurrogateTest, PValuesCountTheSurrogates) {
   const SurrogateTest test = singles_test(make_model(make_data(0.2, 3)), few_surrogates(49));
   ASSERT_EQ(test.null_statistics.rows(), 49);

@@ -414,6 +414,17 @@ TEST(HistoryModel, UnitsOfTheConditionsDoNotMatter) {
   HistoryData scaled = make_data();
   scaled.responses = (scaled.responses * 1000.0).array() - 273.15;
   EXPECT_NEAR(log_likelihood(make_model(), at(5)), log_likelihood(make_model(scaled), at(5)), 1e-9);
+  scaled = make_data();
+  scaled.responses *= 1e-15;
+  EXPECT_NEAR(log_likelihood(make_model(), at(5)), log_likelihood(make_model(scaled), at(5)), 1e-9);
+}
+
+// The sine of whole turns, beside its cosine.
+TEST(HistoryModel, RoundingIsNoResponse) {
+  HistoryData data = make_data(), zero = data;
+  data.responses.col(3) = 1e-16 * normal_vector(kN, 7);
+  zero.responses.col(3).setZero();
+  EXPECT_NEAR(log_likelihood(make_model(data), at(5)), log_likelihood(make_model(zero), at(5)), 1e-9);
 }
 
 TEST(HistoryModel, ConditionThatNeverChangesHasNoEffect) {

@@ -271,6 +271,9 @@ TEST(KernelModel, WhatCannotBeUsedIsRefused) {
   priors = make_priors();
   priors.noise.sd = 0.0;
   EXPECT_THROW(KernelModel(make_data(), priors), std::invalid_argument);
+  priors = make_priors();
+  priors.unit = 0.0;
+  EXPECT_THROW(KernelModel(make_data(), priors), std::invalid_argument);
   KernelParameters p = make_points()[0];
   p.amplitude = 1e12;
   EXPECT_EQ(make_model().log_likelihood(p), -std::numeric_limits<double>::infinity());
@@ -280,7 +283,7 @@ TEST(KernelTarget, CoordinatesAreQuantilesOfThePriors) {
   KernelPriors priors = make_priors();
   for (int variant = 0; variant < 3; ++variant) {
     if (variant == 1) priors.alpha = {2.0, 0.7}, priors.t2 = {3.0, 2.0};
-    if (variant == 2) priors.alpha = {2.5, 1.0};
+    if (variant == 2) priors.alpha = {2.5, 1.0}, priors.unit = 1e3;
     const KernelModel model(make_data(), priors);
     const KernelTarget target(model);
     ASSERT_EQ(target.dimension(), 6);
@@ -297,7 +300,7 @@ TEST(KernelTarget, CoordinatesAreQuantilesOfThePriors) {
         const boost::math::beta_distribution<> mirror(priors.alpha.b, priors.alpha.a);
         EXPECT_NEAR(cdf(mirror, complement), cdf_normal(-x[s]), 1e-10) << variant;
       }
-      EXPECT_NEAR(cdf(t2, p.t2()), cdf_normal(x[4]), 1e-12) << variant;
+      EXPECT_NEAR(cdf(t2, p.t2(priors.unit)), cdf_normal(x[4]), 1e-12) << variant;
       EXPECT_NEAR(cdf(lambda, p.lambda), cdf_normal(x[5]), 1e-12) << variant;
     }
   }

@@ -23,15 +23,21 @@ constexpr double kNegligible = 0.02;  // nats: a condition that matters less nee
 
 struct Fit {
   double value = -std::numeric_limits<double>::infinity();
-  VectorXd x;  // log sigma^2, log t_s
+  VectorXd x;  // log sigma^2, log t_s, in units of the stated noise variance
 };
 
 using Set = std::vector<int>;
 
-VectorXd variances(const VectorXd& x, const Set& dropped) {
-  VectorXd t = x.tail(x.size() - 1).array().exp();
+double log_unit(const HistoryModel& model) { return 2.0 * std::log(model.priors().noise_sd); }
+
+// As a density of the data in units of the stated noise: where a search ends, and with it the test, does not
+// hang on the target's unit.
+double log_likelihood(const HistoryModel& model, const WhitenedData& data, const VectorXd& x,
+                      const Set& dropped, VectorXd* gradient = nullptr) {
+  const double unit = log_unit(model);
+  VectorXd t = (x.tail(x.size() - 1).array() + unit).exp();
   for (int s : dropped) t[s] = 0.0;
-  return t;
+  return model.log_likelihood(data, x[0] + unit, t, gradient) + 0.5 * static_cast<double>(data.size) * unit;
 }
 
 // log sigma^2 at which the quadratic form without any response is about N.
@@ -49,7 +55,7 @@ Fit best_fit(const HistoryModel& model, const WhitenedData& data, const Set& dro
              double log_scale, const SurrogateOptions& options) {
   const Objective objective = [&](const VectorXd& x, Eigen::Ref<VectorXd> gradient) {
     VectorXd slope;
-    const double value = model.log_likelihood(data, x[0], variances(x, dropped), &slope);
+    const double value = log_likelihood(model, data, x, dropped, &slope);
     gradient = slope;
     return value;
   };
@@ -66,7 +72,7 @@ VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>&
   std::vector<Fit> full;
   std::vector<double> log_scale;
   for (const auto& data : settings) {
-    log_scale.push_back(log_error_scale(model, data));
+    log_scale.push_back(log_error_scale(model, data) - log_unit(model));
     VectorXd start = VectorXd::Constant(1 + model.conditions(), log_scale.back() - 3.0);
     start[0] = log_scale.back() - 0.5;
     full.push_back(best_fit(model, data, {}, start, log_scale.back(), options));
@@ -78,7 +84,7 @@ VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>&
     double without = -std::numeric_limits<double>::infinity();
     for (std::size_t g = 0; g < settings.size(); ++g) {
       const VectorXd& x = full[g].x;
-      double value = model.log_likelihood(settings[g], x[0], variances(x, sets[s]));
+      double value = log_likelihood(model, settings[g], x, sets[s]);
       if (full[g].value - value > kNegligible)
         value = std::max(value, best_fit(model, settings[g], sets[s], x, log_scale[g], options).value);
       without = std::max(without, value);

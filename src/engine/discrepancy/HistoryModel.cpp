@@ -133,8 +133,14 @@ HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context
   data_.responses.rowwise() -= centre_;
   scale_ = (data_.responses.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, data_.y.size())))
                .cwiseSqrt();
+  VectorXd size = VectorXd::Zero(conditions_);  // of each condition, in its own unit
   for (Index j = 0; j < scale_.size(); ++j) {
-    if (!(scale_[j] > 1e-12 * (1.0 + std::abs(centre_[j])))) scale_[j] = 1.0;  // constant: its column is zero
+    double& largest = size[data_.condition[static_cast<std::size_t>(j)]];
+    largest = std::max(largest, std::abs(centre_[j]) + scale_[j]);
+  }
+  for (Index j = 0; j < scale_.size(); ++j) {
+    const double largest = size[data_.condition[static_cast<std::size_t>(j)]];
+    if (!(scale_[j] > 1e-12 * largest)) scale_[j] = 1.0;  // constant: its column is zero
   }
   data_.responses.array().rowwise() /= scale_.array();
   norms_ = column_norms(data_.basis);

@@ -93,6 +93,7 @@ double NoisePrior::precision(double x) const {
 void KernelPriors::check() const {
   alpha.check();
   t2.check();
+  if (!(unit > 0) || !std::isfinite(unit)) throw std::invalid_argument("kernel: unit must be positive");
   noise.check();
 }
 
@@ -270,7 +271,7 @@ KernelParameters KernelTarget::parameters(const VectorXd& x) const {
   for (Index i = 0; i < s; ++i)
     p.decay[model_.order()[static_cast<std::size_t>(i)]] = -4.0 * priors.alpha.quantile(x[i]).log();
   const BetaPrior::Quantile t2 = priors.t2.quantile(x[s]);
-  p.amplitude = t2.complement / t2.value;
+  p.amplitude = priors.unit * priors.unit * (t2.complement / t2.value);
   p.lambda = priors.noise.precision(x[s + 1]);
   return p;
 }

@@ -37,6 +37,7 @@ struct NoisePrior {
 struct KernelPriors {
   BetaPrior alpha{1.0, 0.1};
   BetaPrior t2{1.0, 1.0};
+  double unit = 1.0;  ///< of the target, in whose square (1 - t2) / t2 is a variance
   NoisePrior noise;
 
   void check() const;
@@ -61,11 +62,11 @@ Eigen::VectorXd fictitious_condition(Eigen::Index n, std::uint64_t seed);
 /// A point of the posterior (6).
 struct KernelParameters {
   Eigen::VectorXd decay;   ///< S+1: -4 log(alpha_s), the fictitious condition last
-  double amplitude = 1.0;  ///< (1 - t2) / t2, in the target's unit squared
+  double amplitude = 1.0;  ///< unit^2 (1 - t2) / t2
   double lambda = 1.0;     ///< lambda*, precision of the noise
 
   Eigen::VectorXd alpha() const { return (-0.25 * decay).array().exp(); }
-  double t2() const { return 1.0 / (1.0 + amplitude); }
+  double t2(double unit = 1.0) const { return 1.0 / (1.0 + amplitude / (unit * unit)); }
 };
 
 /// Discrepancy of the method's paper (equation 6): v = H'y, H the orthonormal complement of K,
