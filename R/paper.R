@@ -20,8 +20,8 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' explains less than white noise does; its rank shows that.
 #'
 #' The prior of the discrepancy's variance, `(1 - t2) / t2` with `t2` uniform, has its median at 1 in the target's unit
-#' squared: unlike [calibrate()]'s, the evidence depends on that unit beyond the change of density, unless `unit` changes
-#' with it.
+#' squared: unlike [calibrate()]'s, the evidence depends on that unit beyond the change of density, unless `unit`
+#' changes with it.
 #'
 #' *Cost.* The kernel of (6) is smooth in the values of the conditions and so of low rank. Beyond 120 steps its
 #' posterior is annealed by way of every 4th, 16th, ... step of the record, with values that are approximate to
