@@ -7,9 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "engine/random/purposes.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/parallel_for.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 

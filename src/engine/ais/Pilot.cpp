@@ -5,8 +5,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "engine/random/purposes.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
+#include "engine/random/purposes.hpp"
 
 namespace amiss {
 
