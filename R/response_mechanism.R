@@ -19,8 +19,9 @@
 #'
 #' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of the target over that
 #' of the condition, in the rows that calibrate: unsmoothed, such a response would vary twice as much as the target
-#' itself. The time constant is log-uniform from one step of the record to a sixth of its calibration rows. The low-pass
-#' starts at the first value of each segment, whose history it does not know: give a `warmup`.
+#' itself. The time constant is log-uniform from a quarter of a step of the record, which is at once, to a sixth of its
+#' calibration rows. The low-pass starts at the first value of each segment, whose history it does not know: give a
+#' `warmup`.
 #'
 #' *Reference.* Where nothing is added: zero, if the condition rests there for a tenth of the time as sun, rain or a
 #' heater do, and otherwise its mean over the rows that calibrate.
@@ -116,7 +117,7 @@ new_response <- function(boundary, measurements, unit, gain, time_constant, refe
          paste0(m$unit, if (nzchar(per)) paste(" per", per)), paste("gain of the response to", of[i]))
   })
   slowest <- sum(m$use == "calibrate") * m$step_h / 6
-  lag <- free(response$time_constant, time_constant %||% log_uniform(m$step_h, max(slowest, 2 * m$step_h)), "h",
+  lag <- free(response$time_constant, time_constant %||% log_uniform(m$step_h / 4, max(slowest, 2 * m$step_h)), "h",
               paste("time constant of the response to", boundary))
   response$parameters <- named_parameters(c(gains, list(lag)))
   response
