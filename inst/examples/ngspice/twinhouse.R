@@ -37,13 +37,6 @@ ideas <- catalogue(
   mechanism("wind", boundary = c("Ws", "Te"), sentence = "Wind drives outdoor air in.", edit = function(model) {
     with_template(model, more("Bwind air 0 I={{wind}}*v(Ws)*(v(air)-v(Te))"),
                   free("wind", uniform(0, 10), "W/K per m/s", "exchange by wind"), boundary = "Ws")
-  }),
-  mechanism("heater lag", boundary = "P_living", sentence = "The heater stores heat.", edit = function(model) {
-    slow <- c("Bheater 0 heater I=v(P_living)", "Gheater heater air heater air 15", "Cheater heater 0 {{c_heater}}")
-    with_template(model, list(room.cir = function(lines) {
-      at <- which(lines == "Bheater 0 air I=v(P_living)")
-      append(lines[-at], slow, at - 1)
-    }), free("c_heater", uniform(10, 4e4), "J/K", "heat capacity of the heater"))
   }))
 
 # ---- Few runs, and a coarse sampler.
