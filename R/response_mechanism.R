@@ -14,7 +14,7 @@
 #' *A description, no mechanism.* It says what the target answers to, how strongly and how fast, not why. It is never
 #' named as a cause. A single store between the condition and the target has this shape: something that the condition
 #' fills and that empties at a steady rate, such as heat in a mass, water in a soil or charge in a capacitor. With a
-#' time constant of hardly a step it acts at once, as a direct gain or loss does. It does not bend, wear off or depend
+#' time constant of less than a step it acts at once, as a direct gain or loss does. It does not bend, wear off or depend
 #' on anything else.
 #'
 #' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of the target over that
@@ -227,8 +227,8 @@ description_sentence <- function(entry, fit) {
     sprintf("%s %s (%s to %s)", short(row$median), pretty_unit(row$unit), short(row$lower95), short(row$upper95))
   }
   lag <- rows$median[rows$name == response$time_constant]
-  shape <- if (lag < 2 * m$step_h) {
-    sprintf("That is hardly longer than a step: what %s does at once, as a direct gain or loss, has this shape.",
+  shape <- if (lag < m$step_h) {
+    sprintf("That is less than a step: what %s does at once, as a direct gain or loss, has this shape.",
             response$boundary)
   } else {
     sprintf(paste("A store that %s fills and that empties at a steady rate has this shape, such as heat in a mass or",
