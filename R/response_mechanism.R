@@ -14,13 +14,14 @@
 #' *A description, no mechanism.* It says what the target answers to, how strongly and how fast, not why. It is never
 #' named as a cause. A single store between the condition and the target has this shape: something that the condition
 #' fills and that empties at a steady rate, such as heat in a mass, water in a soil or charge in a capacitor. With a
-#' time constant of hardly a step it acts at once, as a direct gain or loss does. It does not bend, wear off or depend
+#' time constant of less than a step it acts at once, as a direct gain or loss does. It does not bend, wear off or depend
 #' on anything else.
 #'
 #' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of the target over that
 #' of the condition, in the rows that calibrate: unsmoothed, such a response would vary twice as much as the target
-#' itself. The time constant is log-uniform from one step of the record to a sixth of its calibration rows. The low-pass
-#' starts at the first value of each segment, whose history it does not know: give a `warmup`.
+#' itself. The time constant is log-uniform from a quarter of a step of the record, which is at once, to a sixth of its
+#' calibration rows. The low-pass starts at the first value of each segment, whose history it does not know: give a
+#' `warmup`.
 #'
 #' *Reference.* Where nothing is added: zero, if the condition rests there for a tenth of the time as sun, rain or a
 #' heater do, and otherwise its mean over the rows that calibrate.
@@ -116,7 +117,7 @@ new_response <- function(boundary, measurements, unit, gain, time_constant, refe
          paste0(m$unit, if (nzchar(per)) paste(" per", per)), paste("gain of the response to", of[i]))
   })
   slowest <- sum(m$use == "calibrate") * m$step_h / 6
-  lag <- free(response$time_constant, time_constant %||% log_uniform(m$step_h, max(slowest, 2 * m$step_h)), "h",
+  lag <- free(response$time_constant, time_constant %||% log_uniform(m$step_h / 4, max(slowest, 2 * m$step_h)), "h",
               paste("time constant of the response to", boundary))
   response$parameters <- named_parameters(c(gains, list(lag)))
   response
@@ -226,8 +227,8 @@ description_sentence <- function(entry, fit) {
     sprintf("%s %s (%s to %s)", short(row$median), pretty_unit(row$unit), short(row$lower95), short(row$upper95))
   }
   lag <- rows$median[rows$name == response$time_constant]
-  shape <- if (lag < 2 * m$step_h) {
-    sprintf("That is hardly longer than a step: what %s does at once, as a direct gain or loss, has this shape.",
+  shape <- if (lag < m$step_h) {
+    sprintf("That is less than a step: what %s does at once, as a direct gain or loss, has this shape.",
             response$boundary)
   } else {
     sprintf(paste("A store that %s fills and that empties at a steady rate has this shape, such as heat in a mass or",

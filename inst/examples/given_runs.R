@@ -1,5 +1,5 @@
 # Twin House O5 by given runs alone: the sun's way into the room is missing, and the simulator cannot be changed.
-# Usage: Rscript given_runs.R [FOLDER for the report] (five minutes)
+# Usage: Rscript given_runs.R [FOLDER for the report]
 library(amiss)
 
 record <- read.csv(system.file("extdata", "twinhouse_exp1_O5_rolbs_freefloat_10min.csv", package = "amiss"))

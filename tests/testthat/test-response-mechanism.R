@@ -44,10 +44,10 @@ test_that("the priors have the scale of the record", {
   expect_equal(gain$prior, uniform(-largest, largest))
   expect_equal(gain$unit, "K per W/m2")
   lag <- sun$response$parameters$time_constant_Gv$prior
-  expect_equal(c(lag$lower, lag$upper), c(1, 156 / 6))
-  middle <- exp(mean(log(c(1, 156 / 6))))
+  expect_equal(c(lag$lower, lag$upper), c(0.25, 156 / 6))
+  middle <- exp(mean(log(c(0.25, 156 / 6))))
   expect_equal(amiss:::prior_cdf(lag, middle), 0.5)
-  expect_equal(amiss:::prior_cdf(lag, sqrt(middle)), 0.25, tolerance = 1e-3)
+  expect_equal(amiss:::prior_cdf(lag, sqrt(0.25 * middle)), 0.25, tolerance = 1e-3)
   expect_equal(sun$response$reference, 0)  # the sun is off at night
   expect_equal(response_mechanism("Te", room)$response$reference, mean(room_data$Te[rows]))
   expect_equal(response_mechanism("Te", room, reference = 18)$response$reference, 18)
