@@ -96,8 +96,8 @@ check_noise_visible <- function(emulator, noise_sd, parent, call) {
   if (noise_sd > 1e-5 * spread) return(invisible())
   abort_numerical(c("The noise of {signif(noise_sd, 3)} is lost beside the runs, which spread by {signif(spread, 3)}.",
                     x = "{conditionMessage(parent)}",
-                    i = paste("Double precision holds a noise of a hundred-thousandth of the spread: narrow the priors,",
-                              "or give {.arg noise_sd} of {.fun measurements} the instrument's error.")),
+                    i = paste("Double precision holds a noise of a hundred-thousandth of the spread: narrow the",
+                              "priors, or give {.arg noise_sd} of {.fun measurements} the instrument's error.")),
                   call = call)
 }
 
