@@ -14,8 +14,8 @@
 #' *A description, no mechanism.* It says what the target answers to, how strongly and how fast, not why. It is never
 #' named as a cause. A single store between the condition and the target has this shape: something that the condition
 #' fills and that empties at a steady rate, such as heat in a mass, water in a soil or charge in a capacitor. With a
-#' time constant of less than a step it acts at once, as a direct gain or loss does. It does not bend, wear off or depend
-#' on anything else.
+#' time constant of less than a step it acts at once, as a direct gain or loss does. It does not bend, wear off or
+#' depend on anything else.
 #'
 #' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of the target over that
 #' of the condition, in the rows that calibrate: unsmoothed, such a response would vary twice as much as the target

@@ -20,6 +20,10 @@ test_that("the network that ngspice solves is the one that is meant", {
 })
 
 test_that("the sun of house O5 is found in a network that knows of none, and the gain measured", {
+  if (.Platform$OS.type == "unix") {
+    future::plan("multicore", workers = 2)
+    withr::defer(future::plan("sequential"))
+  }
   example <- new.env()
   utils::capture.output(suppressMessages(source(file.path(folder, "twinhouse.R"), local = example)))
   upgrade <- example$upgrade
