@@ -28,8 +28,8 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' [compare_models()]). R files are evaluated in their own folder.
 #'
 #' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical.
-#' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, `+ -
-#' * /` and `%in% c(...)`.
+#' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets,
+#' the four operations of arithmetic and `%in% c(...)`.
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It

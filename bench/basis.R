@@ -1,7 +1,9 @@
 #!/usr/bin/env Rscript
-# Does the evidence hang on the basis or on the design? Rscript bench/basis.R --out FILE [--threads N] log10 evidence of
-# five models of the Twin Houses with 8, 10, 12 and 16 basis vectors, with the package's own choice and twice as many,
-# and with 100, 150 and 250 runs (own choice of vectors); refined where the check by runs fails.
+# Does the evidence hang on the basis or on the design?
+# Usage: Rscript bench/basis.R --out FILE [--threads N]
+#
+# log10 evidence of five models of the Twin Houses with 8, 10, 12 and 16 basis vectors, with the package's own choice
+# and twice as many, and with 100, 150 and 250 runs (own choice of vectors); refined where the check by runs fails.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

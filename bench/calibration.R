@@ -1,11 +1,12 @@
 #!/usr/bin/env Rscript
-# Can the posteriors and the model probabilities be trusted? Rscript bench/calibration.R --out FILE [--draws 200]
-# [--seed 1] [--workers 2] [--figure FILE.png]
+# Can the posteriors and the model probabilities be trusted?
+# Usage: Rscript bench/calibration.R --out FILE [--draws 200] [--seed 1] [--workers 2] [--figure FILE.png]
 #
-# Simulation-based calibration of posterior (5) with separate and with one noise precision, of posterior (6) and of the
-# joint posterior; calibration of the probabilities of the models M1 to M3; evidences against bridge sampling, where
-# that package is installed. Writes JSON, one row a quantity: case, quantity, draws, p_value and holds (p-values
-# adjusted by Holm's method over all rows stay above 0.05, so that a right implementation fails in one of twenty seeds).
+# Simulation-based calibration of posterior (5) with separate and with one noise precision, of posterior (6) and of
+# the joint posterior; calibration of the probabilities of the models M1 to M3; evidences against bridge sampling,
+# where that package is installed. Writes JSON, one row a quantity: case, quantity, draws, p_value and holds (p-values
+# adjusted by Holm's method over all rows stay above 0.05, so that a right implementation fails in one of twenty
+# seeds).
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

@@ -1,10 +1,12 @@
 #!/usr/bin/env Rscript
-# How often intervals of emulators hold what they have not seen: Rscript bench/emulator_coverage.R --out FILE [--designs
-# 10] [--seed 9001] Known functions on random Latin hypercubes of M runs, without and with noise of 5 % of their
-# standard deviation; 1000 held-out points each. "before" are the same emulators widened to the leave-one-out errors of
-# hyper-parameters that have seen the run left out. FILE gets a row for each function and M: shares held by the
-# intervals of 90 and 95 %, mean squared standardised error, mean interval score of 95 % (Gneiting and Raftery 2007, in
-# standard deviations of the function), RMSE, standard deviation of the mean of `hold95`, seconds to train.
+# How often intervals of emulators hold what they have not seen.
+# Usage: Rscript bench/emulator_coverage.R --out FILE [--designs 10] [--seed 9001]
+#
+# Known functions on random Latin hypercubes of M runs, without and with noise of 5 % of their standard deviation;
+# 1000 held-out points each. "before" are the same emulators widened to the leave-one-out errors of hyper-parameters
+# that have seen the run left out. FILE gets a row for each function and M: shares held by the intervals of 90 and 95
+# %, mean squared standardised error, mean interval score of 95 % (Gneiting and Raftery 2007, in standard deviations
+# of the function), RMSE, standard deviation of the mean of `hold95`, seconds to train.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

@@ -1,6 +1,9 @@
 #!/usr/bin/env Rscript
-# Accuracy of the evidence: Rscript bench/evidence.R --out FILE [--repeats N] [--seed S] Every case of
-# bench/evidence/cases.R, whose evidence is known, is run N times (23: 207 intervals in all); rows are written as JSON.
+# Accuracy of the evidence.
+# Usage: Rscript bench/evidence.R --out FILE [--repeats N] [--seed S]
+#
+# Every case of bench/evidence/cases.R, whose evidence is known, is run N times (23: 207 intervals in all); rows are
+# written as JSON.
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 for (part in c("options.R", "evidence/cases.R")) source(file.path(here, part))
 suppressPackageStartupMessages(library(amiss))

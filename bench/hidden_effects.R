@@ -1,11 +1,14 @@
 #!/usr/bin/env Rscript
-# Hidden-effect benchmark: Rscript bench/hidden_effects.R [--family F,F] --worlds N --seed S --out FILE [--workers N]
+# Hidden-effect benchmark.
+# Usage: Rscript bench/hidden_effects.R [--family F,F] --worlds N --seed S --out FILE [--workers N]
+#
 # Worlds S, S+1, ... of each family named are drawn, scored and written as JSON: a row a world, with its family, and
 # rates and means for each family. Figures lie beside it: FILE-detection.png for all, FILE-confusion-FAMILY.png for
-# each. Families (hidden_effects/families.R): box, the test box with eight mechanisms and effects outside the catalogue,
-# which is the default; network, grey-box networks of a house; runoff, a catchment with thresholds; wrong, base models
-# that are wrong in structure besides. Each finished world is kept in FILE.worlds/, so that a stopped run goes on where
-# it was; worlds that failed are tried again. Work goes through the user's future plan if --workers is not given.
+# each. Families (hidden_effects/families.R): box, the test box with eight mechanisms and effects outside the
+# catalogue, which is the default; network, grey-box networks of a house; runoff, a catchment with thresholds; wrong,
+# base models that are wrong in structure besides. Each finished world is kept in FILE.worlds/, so that a stopped run
+# goes on where it was; worlds that failed are tried again. Work goes through the user's future plan if --workers is
+# not given.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

@@ -1,6 +1,6 @@
 #!/usr/bin/env Rscript
-# How much does it matter to the paper's evidence that one noise precision is drawn Q + 1 times? Rscript
-# bench/one_noise.R [--out FILE] [--records 8]
+# How much does it matter to the paper's evidence that one noise precision is drawn Q + 1 times?
+# Usage: Rscript bench/one_noise.R [--out FILE] [--records 8]
 #
 # Records with one noise throughout; the log evidence with a precision for each basis vector and one for the
 # discrepancy (as in the paper), with one for all basis vectors (shared_lambda), and with one for all, by ais() on the

@@ -1,9 +1,10 @@
 #!/usr/bin/env Rscript
-# The paper's synthetic experiment, again and again: Rscript bench/paper.R --seeds N --out FILE [--rivals R] [--samplers
-#   K] [--workers W] N noise seeds: do the intervals of M3 hold the truth? On R of them (all), M1 and M2 too: does what
-#   the paper found come out? K seeds of the sampler on one record (10): how far does the evidence scatter? Each
-#   finished fit is kept in FILE.fits/, so that a stopped run goes on where it was. FILE gets rows of name, value,
-#   required, holds.
+# The paper's synthetic experiment, again and again.
+# Usage: Rscript bench/paper.R --seeds N --out FILE [--rivals R] [--samplers K] [--workers W]
+#
+# N noise seeds: do the intervals of M3 hold the truth? On R of them (all), M1 and M2 too: does what the paper found
+# come out? K seeds of the sampler on one record (10): how far does the evidence scatter? Each finished fit is kept in
+# FILE.fits/, so that a stopped run goes on where it was. FILE gets rows of name, value, required, holds.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

@@ -1,6 +1,7 @@
 #!/usr/bin/env Rscript
-# How often the 95 % intervals of the true model's parameters hold the truth:
-# Rscript bench/parameter_coverage.R --out FILE [--family network] [--worlds 24] [--seed 71001] [--workers N]
+# How often the 95 % intervals of the true model's parameters hold the truth.
+# Usage: Rscript bench/parameter_coverage.R --out FILE [--family network] [--worlds 24] [--seed 71001] [--workers N]
+#
 # The worlds are those of bench/hidden_effects, each with a mechanism at four times the noise; the model that made the
 # record is calibrated by calibrate_refined(). FILE gets a row for each parameter: whether its interval holds the
 # truth, whether it is the mechanism's, runs made and seconds. Effects are scaled to their strength, often to the end

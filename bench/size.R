@@ -1,9 +1,11 @@
 #!/usr/bin/env Rscript
-# How large a record can be: Rscript bench/size.R --out FILE [--only quarters,minutes] A year of 15-minute steps
-# (35,040) and one of minutes (525,600), 100 runs each, from the measurements to the attribution, each in an R
-# session of its own with one thread. FILE gets a row for each stage and their sum: seconds, and the most memory that
-# the session had held by its end (MB, resident). Required: a year of minutes below 4 GB and ten minutes, one of
-# 15-minute steps below 500 MB and one minute.
+# How large a record can be.
+# Usage: Rscript bench/size.R --out FILE [--only quarters,minutes]
+#
+# A year of 15-minute steps (35,040) and one of minutes (525,600), 100 runs each, from the measurements to the
+# attribution, each in an R session of its own with one thread. FILE gets a row for each stage and their sum: seconds,
+# and the most memory that the session had held by its end (MB, resident). Required: a year of minutes below 4 GB and
+# ten minutes, one of 15-minute steps below 500 MB and one minute.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

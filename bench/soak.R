@@ -1,10 +1,12 @@
 #!/usr/bin/env Rscript
-# Does it last? Rscript bench/soak.R --out FILE [--studies 200] [--seed 1] Random small studies one after the other in
-# one R session, some of them with nothing to find in them or with data that have to be refused: records with gaps,
-# lost values, copied and constant conditions, targets of any unit, simulators that fail or know nothing. FILE gets a
-# row for each study: seconds, resident memory after it (MB), what came of it, and the class of the condition that ended
-# it. It holds if every condition is one of the package's own (class `amiss_error`) and the memory of the last quarter
-# is within 5 % of that of the second.
+# Does it last?
+# Usage: Rscript bench/soak.R --out FILE [--studies 200] [--seed 1]
+#
+# Random small studies one after the other in one R session, some of them with nothing to find in them or with data
+# that have to be refused: records with gaps, lost values, copied and constant conditions, targets of any unit,
+# simulators that fail or know nothing. FILE gets a row for each study: seconds, resident memory after it (MB), what
+# came of it, and the class of the condition that ended it. It holds if every condition is one of the package's own
+# (class `amiss_error`) and the memory of the last quarter is within 5 % of that of the second.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

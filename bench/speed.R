@@ -1,8 +1,10 @@
 #!/usr/bin/env Rscript
-# How fast: Rscript bench/speed.R --out FILE [--only history,kernel,ais,emulator,study,peers,growth,instructions] One
-# core, unless a row says otherwise. Required times are for a core on which dgemm (n = 1000) runs at 60 GFLOP/s; that
-# rate is measured in the same run and the times are scaled by it. The parts are the files of bench/speed; those that
-# time single functions build and run the micro-benchmarks of bench/micro (Google Benchmark, for this machine's
+# How fast.
+# Usage: Rscript bench/speed.R --out FILE [--only history,kernel,ais,emulator,study,peers,growth,instructions]
+#
+# One core, unless a row says otherwise. Required times are for a core on which dgemm (n = 1000) runs at 60 GFLOP/s;
+# that rate is measured in the same run and the times are scaled by it. The parts are the files of bench/speed; those
+# that time single functions build and run the micro-benchmarks of bench/micro (Google Benchmark, for this machine's
 # processor, in build/native), the others use the installed package. FILE gets rows of name, value, unit, required,
 # holds; parts that draw figures put them beside it.
 
