@@ -38,8 +38,6 @@ generics::glance
 #' @export
 generics::augment
 
-format_version <- 1L
-
 # A seed given by the user, or one drawn from R's generator, so that set.seed() governs.
 pick_seed <- function(seed, call = rlang::caller_env()) {
   if (is.null(seed)) return(sample.int(.Machine$integer.max, 1))

@@ -46,7 +46,7 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' attribute_discrepancy(fit, list(surrogates = 19), seed = 1)
 #' @export
 attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
-  check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
+  check_object(fit, "amiss_calibration", "fit")
   control <- fill_attribution_control(control, fit$control$ais, length(fit$measurements$conditions))
   seed <- pick_seed(seed)
   threads <- check_threads(threads)

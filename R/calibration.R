@@ -116,8 +116,8 @@ calibration_setting <- function(emulator, measurements, control, seed, call = rl
 
 # The calibration rows, which must be those that the emulator was trained on.
 emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
-  check_input(checkmate::check_class(emulator, "amiss_emulator"), "emulator", call = call)
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements", call = call)
+  check_object(emulator, "amiss_emulator", "emulator", call = call)
+  check_object(measurements, "amiss_measurements", "measurements", call = call)
   rows <- used_rows(measurements, "calibrate")
   if (nrow(emulator$basis$vectors) != length(rows)) {
     abort_input(c(paste("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have",

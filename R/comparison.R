@@ -58,7 +58,7 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
                            seed = NULL, threads = 1,
                            quiet = FALSE, checkpoint = NULL, truth = NULL) {
   check_models(models)
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_object(measurements, "amiss_measurements", "measurements")
   method <- if (missing(method)) comparison_methods[1] else method
   check_input(checkmate::check_choice(method, comparison_methods), "method")
   check_truth(truth)

@@ -36,6 +36,18 @@ check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) 
   abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)), call = call)
 }
 
+# What the objects of the package are made of; another number, as an object read from a file may have, is refused.
+format_version <- 2L
+
+check_object <- function(x, classes, name, hint = NULL, call = rlang::caller_env()) {
+  check_input(checkmate::check_multi_class(x, classes), name, hint, call)
+  version <- if (is.list(x)) unclass(x)[["format_version"]]
+  if (is.null(version) || identical(version, format_version)) return(invisible(TRUE))
+  abort_input(c("{.arg {name}} was made by another version of the package.",
+                x = "Its format is {.val {version}}; this version reads {.val {format_version}}.",
+                i = "Make it again with this version."), call = call)
+}
+
 # For checkmate dates, times and empty texts are numbers, too.
 number_checks <- paste0("check_", c("number", "count", "int", "numeric"))
 

@@ -24,7 +24,7 @@
 #' plot(discrepancy(fit))
 #' @export
 discrepancy <- function(fit) {
-  check_input(checkmate::check_class(fit, "amiss_fit"), "fit")
+  check_object(fit, "amiss_fit", "fit")
   if (!knows_history(fit)) return(paper_discrepancy(fit))
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   draws <- lacking_response(fit, data$responses, data$moves)

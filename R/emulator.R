@@ -68,7 +68,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 #' tidy(emulator)
 #' @export
 train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
-  check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
+  check_object(ensemble, "amiss_ensemble", "ensemble")
   if (inherits(noise_sd, "amiss_measurements")) {
     rows <- used_rows(noise_sd, "calibrate")
     if (nrow(ensemble$outputs) != length(rows)) {

@@ -23,7 +23,7 @@
 simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1, quiet = FALSE) {
   hush(quiet)
   check_simulator(simulator)
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_object(measurements, "amiss_measurements", "measurements")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
   check_run_number(runs, length(measurements$raw$hours))
   threads <- check_threads(threads)
@@ -156,7 +156,7 @@ places_in_priors <- function(values, parameters, call = rlang::caller_env()) {
 
 # Runs by the use of their rows: list(calibrate, hours, held_out), the last list(outputs, hours) or NULL.
 place_runs <- function(outputs, validation, measurements, time, call = rlang::caller_env()) {
-  check_input(checkmate::check_class(measurements, "amiss_measurements", null.ok = TRUE), "measurements", call = call)
+  if (!is.null(measurements)) check_object(measurements, "amiss_measurements", "measurements", call = call)
   if (is.null(measurements)) {
     if (!is.null(validation)) abort_input(paste("{.arg validation} needs {.arg measurements}, which say what its rows",
                                                 "are."), call = call)

@@ -26,7 +26,7 @@
 bayes_factor <- function(model, reference) {
   fits <- list(model = model, reference = reference)
   for (name in names(fits))
-    check_input(checkmate::check_class(fits[[name]], "amiss_fit"), name)
+    check_object(fits[[name]], "amiss_fit", name)
   if (!identical(class(model)[1], class(reference)[1])) {
     abort_input(
       c("{.arg model} and {.arg reference} were calibrated by different methods; their evidences cannot be compared.",

@@ -45,6 +45,7 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
                               interval = c("prediction", "confidence"), level = 0.95, seed = object$seed,
                               threads = 1, ...) {
   rlang::check_dots_empty()
+  check_object(object, "amiss_fit", "object")
   check_input(checkmate::check_character(use, min.len = 1), "use")
   check_input(checkmate::check_subset(use, c("calibrate", "validate")), "use")
   interval <- if (missing(interval)) "prediction" else interval
@@ -93,7 +94,7 @@ rows_used <- function(measurements, use) which(measurements$use %in% use & !is.n
 prediction_record <- function(m, newdata, call = rlang::caller_env()) {
   if (is.null(newdata)) return(m)
   if (is.data.frame(newdata)) return(new_record(m, newdata, call))
-  check_input(checkmate::check_class(newdata, "amiss_measurements"), "newdata",
+  check_object(newdata, "amiss_measurements", "newdata",
               "Give a data frame or {.fun measurements}; rows of the record itself are chosen by {.arg use}.",
               call = call)
   if (!isTRUE(all.equal(newdata$step_h, m$step_h)) || !identical(newdata$conditions, m$conditions)) {

@@ -180,7 +180,7 @@ print.amiss_prior <- function(x, ...) {
 #' @export
 free <- function(name, prior, unit = "", label = name) {
   check_input(checkmate::check_string(name, min.chars = 1), "name")
-  check_input(checkmate::check_class(prior, "amiss_prior"), "prior", "Give for example {.code uniform(0, 1)}.")
+  check_object(prior, "amiss_prior", "prior", "Give for example {.code uniform(0, 1)}.")
   check_input(checkmate::check_string(unit), "unit")
   check_input(checkmate::check_string(label), "label")
   structure(list(name = name, prior = prior, unit = unit, label = label), class = "amiss_free")

@@ -86,7 +86,7 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
 #' })
 #' @export
 with_template <- function(simulator, templates, ..., boundary = character()) {
-  check_input(checkmate::check_class(simulator, "amiss_program_simulator"), "simulator",
+  check_object(simulator, "amiss_program_simulator", "simulator",
               "Make one with {.fun program_simulator}.")
   check_columns_named(boundary)
   added <- read_templates(templates, simulator$templates)

@@ -33,9 +33,9 @@
 calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL,
                               threads = 1, quiet = FALSE) {
   hush(quiet)
-  check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
+  check_object(ensemble, "amiss_ensemble", "ensemble")
   check_input(checkmate::check_count(rounds), "rounds")
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_object(measurements, "amiss_measurements", "measurements")
   check_input(checkmate::check_count(runs, positive = TRUE, null.ok = TRUE), "runs")
   check_runs_asked(runs %||% 40, measurements)
   check_training_size((runs %||% 40) * 1.3^rounds, "rounds", rounds)
@@ -202,8 +202,8 @@ with_checked_runs <- function(result) {
 #' @export
 refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE) {
   hush(quiet)
-  check_input(checkmate::check_class(ensemble, "amiss_ensemble"), "ensemble")
-  check_input(checkmate::check_class(fit, "amiss_calibration"), "fit")
+  check_object(ensemble, "amiss_ensemble", "ensemble")
+  check_object(fit, "amiss_calibration", "fit")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
   check_run_number(runs, length(fit$measurements$raw$hours))
   threads <- check_threads(threads)

@@ -78,7 +78,7 @@ report_fragment <- function(x, parts = NULL, level = 2) {
 }
 
 check_reported <- function(x, call = rlang::caller_env()) {
-  check_input(checkmate::check_multi_class(x, c("amiss_upgrade", "amiss_comparison", "amiss_fit")), "x",
+  check_object(x, c("amiss_upgrade", "amiss_comparison", "amiss_fit"), "x",
               "It is made by {.fun upgrade_model}, {.fun compare_models} or {.fun calibrate}.", call = call)
 }
 

@@ -51,7 +51,7 @@
 response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, time_constant = NULL, reference = NULL,
                                name = paste("response to", boundary)) {
   check_input(checkmate::check_string(boundary, min.chars = 1), "boundary")
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_object(measurements, "amiss_measurements", "measurements")
   check_input(checkmate::check_string(unit), "unit")
   check_input(checkmate::check_class(gain, "amiss_prior", null.ok = TRUE), "gain")
   check_input(checkmate::check_class(time_constant, "amiss_prior", null.ok = TRUE), "time_constant")
@@ -73,7 +73,7 @@ response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, t
 #' @rdname response_mechanism
 #' @export
 responses <- function(measurements, units = character()) {
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_object(measurements, "amiss_measurements", "measurements")
   check_input(checkmate::check_character(units, any.missing = FALSE, names = if (length(units)) "unique"), "units")
   check_input(checkmate::check_subset(names(units), measurements$conditions), "units",
               "Name boundary conditions that are analysed.")

@@ -40,7 +40,7 @@
 #' sobol_indices(train_emulator(simulate_design(model, room, runs = 30, seed = 1), room), seed = 1)
 #' @export
 sobol_indices <- function(x, points = 256, replicates = 16, by_time = FALSE, seed = NULL) {
-  check_input(checkmate::check_multi_class(x, c("amiss_emulator", "amiss_fit")), "x",
+  check_object(x, c("amiss_emulator", "amiss_fit"), "x",
               "It is made by {.fun train_emulator} or {.fun calibrate}.")
   check_input(checkmate::check_count(points), "points")
   check_input(checkmate::check_count(replicates), "replicates")

@@ -58,7 +58,7 @@ function_simulator <- function(f, ..., boundary = character(), name = "simulator
 #' @param model The simulator to extend, made by `function_simulator()`.
 #' @export
 with_parameters <- function(model, ..., f = NULL, boundary = character(), name = model$name) {
-  check_input(checkmate::check_class(model, "amiss_function_simulator"), "model", "A {.fn zone} has edits of its own.")
+  check_object(model, "amiss_function_simulator", "model", "A {.fn zone} has edits of its own.")
   if (!is.null(f)) check_run_function(f, c("info", "base"))
   added <- named_parameters(list(...))
   check_columns_named(boundary)

@@ -186,7 +186,7 @@ upgrade_pieces <- function(files, measurements, call = rlang::caller_env()) {
   model <- source_value(files[["model"]], "model", call, measurements)
   if (!inherits(model, "amiss_ensemble")) check_simulator(model, call)
   catalogue <- source_value(files[["catalogue"]], "catalogue", call, measurements)
-  check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue", call = call)
+  check_object(catalogue, "amiss_catalogue", "catalogue", call = call)
   list(model = model, catalogue = catalogue)
 }
 

@@ -83,9 +83,9 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
                           checkpoint = NULL) {
   given <- inherits(simulator, "amiss_ensemble")
   if (!given) check_simulator(simulator)
-  check_input(checkmate::check_class(measurements, "amiss_measurements"), "measurements")
+  check_object(measurements, "amiss_measurements", "measurements")
   check_target_varies(measurements, used_rows(measurements, "calibrate"))
-  check_input(checkmate::check_class(catalogue, "amiss_catalogue"), "catalogue")
+  check_object(catalogue, "amiss_catalogue", "catalogue")
   check_given(c(if (given) list(base = simulator), lapply(catalogue, `[[`, "edit")), measurements)
   control <- fill_upgrade_control(control, measurements)
   check_runs_asked(runs, measurements, control$rounds, control$refine)

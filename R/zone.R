@@ -276,7 +276,7 @@ new_zone <- function(components, extra, call = rlang::caller_env()) {
 NULL
 
 check_zone <- function(zone, name = "zone", call = rlang::caller_env()) {
-  check_input(checkmate::check_class(zone, "amiss_zone"), name, "Make one with {.fn zone}.", call = call)
+  check_object(zone, "amiss_zone", name, "Make one with {.fn zone}.", call = call)
 }
 
 #' @rdname zone_edits
