@@ -11,11 +11,17 @@ figures_of.amiss_comparison <- function(x) {
 
 #' @rdname figures
 #' @export
-plot.amiss_comparison <- function(x, which = "evidence", ...) draw(comparison_figure(x, which))
+plot.amiss_comparison <- function(x, which = "evidence", ...) {
+  rlang::check_dots_empty()
+  draw(comparison_figure(x, which))
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_comparison <- function(object, which = "evidence", ...) comparison_figure(object, which)
+autoplot.amiss_comparison <- function(object, which = "evidence", ...) {
+  rlang::check_dots_empty()
+  comparison_figure(object, which)
+}
 
 comparison_figure <- function(comparison, which, call = rlang::caller_env()) {
   check_input(checkmate::check_choice(which, figures_of(comparison)), "which", call = call)

@@ -31,8 +31,14 @@ sobol_colours <- c(first = "#0072B2", total = "#E69F00")
 
 #' @rdname figures
 #' @export
-plot.amiss_sobol <- function(x, ...) draw(figure_sobol(x))
+plot.amiss_sobol <- function(x, ...) {
+  rlang::check_dots_empty()
+  draw(figure_sobol(x))
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_sobol <- function(object, ...) figure_sobol(object)
+autoplot.amiss_sobol <- function(object, ...) {
+  rlang::check_dots_empty()
+  figure_sobol(object)
+}

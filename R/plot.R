@@ -15,7 +15,7 @@ figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy
 #'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`, `"criteria"` (ranks by
 #'   each), `"attribution"`, `"fit"` (measured and simulated), `"discrepancy"` (over time), `"parameters"`,
 #'   `"heat_loss"` (of zones) or `"held_out"` (where rows validate).
-#' @param ... Not used.
+#' @param ... Not used: an argument that is not known is an error.
 #' @return A ggplot.
 #' @examples
 #' table <- data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4))
@@ -25,51 +25,87 @@ NULL
 
 #' @rdname figures
 #' @export
-plot.amiss_upgrade <- function(x, which = "fit", ...) draw(upgrade_figure(x, which))
+plot.amiss_upgrade <- function(x, which = "fit", ...) {
+  rlang::check_dots_empty()
+  draw(upgrade_figure(x, which))
+}
 
 #' @rdname figures
 #' @export
-plot.amiss_attribution <- function(x, ...) draw(figure_attribution(list("the model" = x)))
+plot.amiss_attribution <- function(x, ...) {
+  rlang::check_dots_empty()
+  draw(figure_attribution(list("the model" = x)))
+}
 
 #' @rdname figures
 #' @export
-plot.amiss_discrepancy <- function(x, ...) draw(figure_discrepancy(list("the model" = x)))
+plot.amiss_discrepancy <- function(x, ...) {
+  rlang::check_dots_empty()
+  draw(figure_discrepancy(list("the model" = x)))
+}
 
 #' @rdname figures
 #' @export
-plot.amiss_calibration <- function(x, ...) draw(figure_parameters(list("the model" = x)))
+plot.amiss_calibration <- function(x, ...) {
+  rlang::check_dots_empty()
+  draw(figure_parameters(list("the model" = x)))
+}
 
 #' @rdname figures
 #' @export
-plot.amiss_ais <- function(x, ...) draw(figure_sampler(list("the model" = x)))
+plot.amiss_ais <- function(x, ...) {
+  rlang::check_dots_empty()
+  draw(figure_sampler(list("the model" = x)))
+}
 
 #' @rdname figures
 #' @export
-plot.amiss_measurements <- function(x, ...) draw(figure_measurements(x))
+plot.amiss_measurements <- function(x, ...) {
+  rlang::check_dots_empty()
+  draw(figure_measurements(x))
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_upgrade <- function(object, which = "fit", ...) upgrade_figure(object, which)
+autoplot.amiss_upgrade <- function(object, which = "fit", ...) {
+  rlang::check_dots_empty()
+  upgrade_figure(object, which)
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_attribution <- function(object, ...) figure_attribution(list("the model" = object))
+autoplot.amiss_attribution <- function(object, ...) {
+  rlang::check_dots_empty()
+  figure_attribution(list("the model" = object))
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_discrepancy <- function(object, ...) figure_discrepancy(list("the model" = object))
+autoplot.amiss_discrepancy <- function(object, ...) {
+  rlang::check_dots_empty()
+  figure_discrepancy(list("the model" = object))
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_calibration <- function(object, ...) figure_parameters(list("the model" = object))
+autoplot.amiss_calibration <- function(object, ...) {
+  rlang::check_dots_empty()
+  figure_parameters(list("the model" = object))
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_ais <- function(object, ...) figure_sampler(list("the model" = object))
+autoplot.amiss_ais <- function(object, ...) {
+  rlang::check_dots_empty()
+  figure_sampler(list("the model" = object))
+}
 
 #' @rdname figures
 #' @export
-autoplot.amiss_measurements <- function(object, ...) figure_measurements(object)
+autoplot.amiss_measurements <- function(object, ...) {
+  rlang::check_dots_empty()
+  figure_measurements(object)
+}
 
 draw <- function(figure) {
   print(figure)

@@ -65,3 +65,12 @@ test_that("a circular condition is shown in degrees", {
   m <- measurements(table, time = "hour", target = "Ti", boundary = ~ circular(Wd), noise_sd = 0.1, warmup = 6)
   expect_equal(condition_values(m, "Wd"), table$Wd)
 })
+
+test_that("an argument that a figure does not know is an error", {
+  upgrade <- small_upgrade()
+  fit <- upgrade$models[[1]]$fit
+  for (x in list(upgrade, fit, upgrade$models[[1]]$attribution, discrepancy(fit), upgrade$measurements)) {
+    expect_error(plot(x, colour = "red"), "must be empty")
+    expect_error(ggplot2::autoplot(x, colour = "red"), "must be empty")
+  }
+})
