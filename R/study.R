@@ -61,7 +61,7 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
   if (!is.null(out)) {
     check_report_tools()
     held <- hold_folder(out)
-    on.exit(release_folder(held))
+    on.exit(release_folder(held), add = TRUE)  # after what hush() undoes
     stages <- file.path(out, "stages", study$code)
   }
   result <- staged(paste("study", study$study), if (is.null(study$models)) {

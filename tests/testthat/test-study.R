@@ -28,6 +28,7 @@ test_that("a study writes its files with the agreed fields", {
   folder <- withr::local_tempdir()
   out <- file.path(folder, "100 %d")  # a name that R could take for a format
   upgrade <- run_study(write_study_file(folder), out, quiet = TRUE, trust = TRUE)
+  expect_null(getOption("amiss.progress"))  # quiet only as long as the study ran
   expect_setequal(list.files(out), c("report.html", "figures", "result.rds", "result.json"))
   expect_gt(length(list.files(file.path(out, "figures"), "png$")), 3)
   json <- jsonlite::read_json(file.path(out, "result.json"))
