@@ -51,8 +51,7 @@ print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain,
                 "What remains" = x$remains,
                 "What to inspect next" = x$inspect)
-  for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
-  cli::cli_bullets(c(">" = "next: {.fun report}"))
+  say_parts(parts)
 })
 
 # The first step's trials, best first, and the probability that is left to no change.

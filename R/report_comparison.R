@@ -47,8 +47,7 @@ print.summary.amiss_comparison <- function(x, ...) on_stdout(x, {
   parts <- list("Evidence" = x$evidence, "What remains" = x$remains, "What practice would do" = x$practice,
                 "Doubts" = x$doubts,
                 "What to inspect next" = x$inspect)
-  for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
-  cli::cli_bullets(c(">" = "next: {.fun report}"))
+  say_parts(parts)
 })
 
 comparison_headline <- function(comparison) {
