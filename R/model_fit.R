@@ -60,8 +60,8 @@ screen_model <- function(simulator, name, settings, hopeless = function(fit) FAL
 
 refined_runs <- function(settings) round((settings$control$refine %||% refining_control$refine) * settings$runs)
 
-# The full calibration, with the remaining runs made where the coarse posterior lies. It keeps the coarse one's
-# evidence.
+# The full calibration. Where the coarse one did with runs spread over the priors, the remaining runs are made where
+# its posterior lies. It keeps the coarse one's evidence.
 fit_fully <- function(simulator, name, settings, first = NULL) {
   more <- refined_runs(settings)
   if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
@@ -74,9 +74,10 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
       refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
                            settings$threads,
                            runs = regional_runs(first$ensemble$parameters, more), first = first)$fit
+    } else if (more > 0 && is.null(first$ensemble$region)) {
+      fit_runs(refine_ensemble(with_checked_runs(first), first$fit, more, threads = settings$threads), settings)
     } else {
-      fit_runs(if (more > 0) refine_ensemble(with_checked_runs(first), first$fit, more,
-                                             threads = settings$threads) else first$ensemble, settings)
+      fit_runs(with_checked_runs(first), settings)
     }
     fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     fit

@@ -8,6 +8,7 @@
 #include "engine/ais/CloserReference.hpp"
 #include "engine/ais/ImportanceSample.hpp"
 #include "engine/ais/StandardNormal.hpp"
+#include "engine/ais/spread_draws.hpp"
 #include "engine/calibration/ParameterModes.hpp"
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/purposes.hpp"
@@ -34,18 +35,6 @@ const StartOptions kStart{96, 0.5, 5, 2, {64, 3}};  // for each reach
 constexpr double kReferenceDof = 8.0;
 constexpr int kRounds = 2;          // that bring the reference closer
 constexpr Index kRoundDraws = 100;  // each, per coordinate
-
-// n draws of equal weight, evenly spread over weighted ones.
-std::vector<Index> spread_draws(const VectorXd& weights, int n) {
-  std::vector<Index> picked;
-  double cumulative = 0.0;
-  Index at = -1;
-  for (int i = 0; i < n; ++i) {
-    while (cumulative < (i + 0.5) / n && at + 1 < weights.size()) cumulative += weights[++at];
-    picked.push_back(at);
-  }
-  return picked;
-}
 
 struct Start {
   MatrixXd history;  // draws of equal weight

@@ -1,9 +1,10 @@
 #include "engine/calibration/ResponseEvidence.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
+
+#include "engine/calibration/Calibration.hpp"
 
 namespace amiss {
 
@@ -36,10 +37,8 @@ AisResult response_evidence(HistoryData data, const HistoryPriors& priors, const
   data.moves = (MatrixXd(n, data.moves.cols() + k) << data.moves, responses).finished();
   const Index d = data.basis.cols();
   const HistoryModel model(std::move(data), priors, context);
-  std::vector<int> active(static_cast<std::size_t>(model.conditions()));
-  std::iota(active.begin(), active.end(), 0);
-  return sample_ais(HistoryTarget(model, active, {VectorXd::Zero(d), MatrixXd::Identity(d, d)}), options,
-                    context);
+  const HistoryTarget target(model, conditions_but(model, {}), {VectorXd::Zero(d), MatrixXd::Identity(d, d)});
+  return sample_ais(target, options, context);
 }
 
 }  // namespace amiss

@@ -1,12 +1,12 @@
 #include "engine/calibration/TangentPosterior.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 
 #include "engine/ais/Sampler.hpp"
 #include "engine/ais/StandardNormal.hpp"
+#include "engine/calibration/Calibration.hpp"
 
 namespace amiss {
 
@@ -33,9 +33,7 @@ TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors
     data.y += x0[parameter] * slopes.col(parameter);
   }
   const HistoryModel model(std::move(data), priors, context);
-  std::vector<int> active(static_cast<std::size_t>(model.conditions()));
-  std::iota(active.begin(), active.end(), 0);
-  const HistoryTarget target(model, active, {VectorXd::Zero(d), MatrixXd::Identity(d, d)});
+  const HistoryTarget target(model, conditions_but(model, {}), {VectorXd::Zero(d), MatrixXd::Identity(d, d)});
   long evaluations = 0;
   const MatrixXd population =
       sample_population(target, StandardNormal(target.dimension()), options, context, evaluations);

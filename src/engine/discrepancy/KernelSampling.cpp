@@ -10,6 +10,7 @@
 #include "engine/ais/ImportanceSample.hpp"
 #include "engine/ais/Sampler.hpp"
 #include "engine/ais/StandardNormal.hpp"
+#include "engine/ais/spread_draws.hpp"
 #include "engine/discrepancy/LowRankKernel.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/parallel/MemoryPool.hpp"
@@ -123,14 +124,7 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
   AisResult& posterior = sample.posterior;
   const int n = sampling.certified;
   VectorXd difference(n);
-  std::vector<Index> picked;
-  double cumulative = 0.0;
-  Index at = -1;
-  for (int i = 0; i < n; ++i) {
-    while (cumulative < (i + 0.5) / n && at + 1 < posterior.weights.size())
-      cumulative += posterior.weights[++at];
-    picked.push_back(at);
-  }
+  const std::vector<Index> picked = spread_draws(posterior.weights, n);
   parallel_for(n, context, [&](int i) {
     const Index draw = picked[static_cast<std::size_t>(i)];
     const KernelParameters p = target.parameters(posterior.draws.col(draw));
