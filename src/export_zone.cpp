@@ -1,3 +1,5 @@
+#include <map>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -49,7 +51,9 @@ Window read_window(const Rcpp::List& from) {
 
 Exposure read_exposure(const std::string& name) {
   if (name == "exposed") return Exposure::exposed;
-  return name == "sheltered" ? Exposure::sheltered : Exposure::semi_exposed;
+  if (name == "semi-exposed") return Exposure::semi_exposed;
+  if (name == "sheltered") return Exposure::sheltered;
+  throw std::invalid_argument("zone: unknown exposure '" + name + "'");
 }
 
 Opening read_opening(const Rcpp::List& from, OpeningKind kind) {
@@ -72,29 +76,47 @@ Opening read_opening(const Rcpp::List& from, OpeningKind kind) {
   return opening;
 }
 
+Infiltration read_infiltration(const Rcpp::List& from) {
+  return {text(from, "name"), number(from, "ach"), column(from, "outside")};
+}
+
+Heater read_heater(const Rcpp::List& from) {
+  return {text(from, "name"), column(from, "power"), number(from, "radiant_fraction"),
+          number(from, "capacity"), number(from, "conductance")};
+}
+
+Supply read_supply(const Rcpp::List& from) {
+  return {text(from, "name"), column(from, "flow"), column(from, "temperature"), number(from, "scale")};
+}
+
+Coupling read_coupling(const Rcpp::List& from) {
+  return {text(from, "name"), number(from, "conductance"), column(from, "temperature")};
+}
+
+Gain read_gain(const Rcpp::List& from) {
+  return {text(from, "name"), column(from, "power"), number(from, "scale"), number(from, "radiant_fraction")};
+}
+
+using Reader = void (*)(const Rcpp::List&, Zone&);
+const std::map<std::string, Reader> component_readers = {
+    {"wall", [](const Rcpp::List& from, Zone& zone) { zone.walls.push_back(read_wall(from)); }},
+    {"window", [](const Rcpp::List& from, Zone& zone) { zone.windows.push_back(read_window(from)); }},
+    {"opening", [](const Rcpp::List& from,
+                   Zone& zone) { zone.openings.push_back(read_opening(from, OpeningKind::orifice)); }},
+    {"crack", [](const Rcpp::List& from,
+                 Zone& zone) { zone.openings.push_back(read_opening(from, OpeningKind::crack)); }},
+    {"infiltration",
+     [](const Rcpp::List& from, Zone& zone) { zone.infiltrations.push_back(read_infiltration(from)); }},
+    {"heater", [](const Rcpp::List& from, Zone& zone) { zone.heaters.push_back(read_heater(from)); }},
+    {"supply", [](const Rcpp::List& from, Zone& zone) { zone.supplies.push_back(read_supply(from)); }},
+    {"coupling", [](const Rcpp::List& from, Zone& zone) { zone.couplings.push_back(read_coupling(from)); }},
+    {"gain", [](const Rcpp::List& from, Zone& zone) { zone.gains.push_back(read_gain(from)); }}};
+
 void read_component(const Rcpp::List& from, Zone& zone) {
-  const std::string type = text(from, "type");
-  const std::string name = text(from, "name");
-  if (type == "wall") zone.walls.push_back(read_wall(from));
-  if (type == "window") zone.windows.push_back(read_window(from));
-  if (type == "opening") zone.openings.push_back(read_opening(from, OpeningKind::orifice));
-  if (type == "crack") zone.openings.push_back(read_opening(from, OpeningKind::crack));
-  if (type == "infiltration")
-    zone.infiltrations.push_back({name, number(from, "ach"), column(from, "outside")});
-  if (type == "heater") {
-    zone.heaters.push_back({name, column(from, "power"), number(from, "radiant_fraction"),
-                            number(from, "capacity"), number(from, "conductance")});
-  }
-  if (type == "supply") {
-    zone.supplies.push_back({name, column(from, "flow"), column(from, "temperature"), number(from, "scale")});
-  }
-  if (type == "coupling") {
-    zone.couplings.push_back({name, number(from, "conductance"), column(from, "temperature")});
-  }
-  if (type == "gain") {
-    zone.gains.push_back(
-        {name, column(from, "power"), number(from, "scale"), number(from, "radiant_fraction")});
-  }
+  const auto reader = component_readers.find(text(from, "type"));
+  if (reader == component_readers.end())
+    throw std::invalid_argument("zone: unknown component '" + text(from, "type") + "'");
+  reader->second(from, zone);
 }
 
 Zone read_zone(const Rcpp::List& from) {

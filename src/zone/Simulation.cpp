@@ -96,19 +96,21 @@ void Simulation::add_walls(const Options& options) {
 
 void Simulation::add_exchanges() {
   const auto add = [this](const auto& components) {
+    const std::size_t first = exchanges_.size();
     for (const auto& component : components) {
       Exchange exchange;
       exchange.name = component.name;
       exchanges_.push_back(exchange);
     }
+    return first;
   };
-  add(zone_.windows);
-  add(zone_.openings);
-  add(zone_.infiltrations);
-  add(zone_.heaters);
-  add(zone_.supplies);
-  add(zone_.couplings);
-  add(zone_.gains);
+  first_.window = add(zone_.windows);
+  first_.opening = add(zone_.openings);
+  first_.infiltration = add(zone_.infiltrations);
+  first_.heater = add(zone_.heaters);
+  first_.supply = add(zone_.supplies);
+  first_.coupling = add(zone_.couplings);
+  first_.gain = add(zone_.gains);
 }
 
 void Simulation::add_heaters() {
@@ -251,34 +253,40 @@ void Simulation::set_walls() {
 
 // The exchanges of openings and heaters change within the interval: see set_flows() and set_heaters().
 void Simulation::set_exchanges() {
-  auto e = exchanges_.begin();
-  for (const Window& window : zone_.windows) {
+  for (std::size_t i = 0; i < zone_.windows.size(); ++i) {
+    const Window& window = zone_.windows[i];
+    Exchange& e = exchanges_[first_.window + i];
     const double sun = window.sun == no_column ? 0.0 : window.solar_factor * window.area * driver(window.sun);
-    e->conductance = window.u_value * window.area;
-    e->temperature = driver(window.outside);
-    e->to_air = window.to_air * sun;
-    e++->by_area = (1.0 - window.to_air) * sun;
+    e.conductance = window.u_value * window.area;
+    e.temperature = driver(window.outside);
+    e.to_air = window.to_air * sun;
+    e.by_area = (1.0 - window.to_air) * sun;
   }
-  e += static_cast<std::ptrdiff_t>(zone_.openings.size());
-  for (const Infiltration& infiltration : zone_.infiltrations) {
-    e->temperature = driver(infiltration.outside);
-    const double flow = air_density(e->temperature) * zone_.volume * infiltration.ach / 3600.0;
-    e++->conductance = air_heat * flow;
+  for (std::size_t i = 0; i < zone_.infiltrations.size(); ++i) {
+    const Infiltration& infiltration = zone_.infiltrations[i];
+    Exchange& e = exchanges_[first_.infiltration + i];
+    e.temperature = driver(infiltration.outside);
+    const double flow = air_density(e.temperature) * zone_.volume * infiltration.ach / 3600.0;
+    e.conductance = air_heat * flow;
   }
-  e += static_cast<std::ptrdiff_t>(zone_.heaters.size());
-  for (const Supply& supply : zone_.supplies) {
-    e->temperature = driver(supply.temperature);
-    const double flow = air_density(e->temperature) * std::max(0.0, driver(supply.flow)) / 3600.0;
-    e++->conductance = supply.scale * air_heat * flow;
+  for (std::size_t i = 0; i < zone_.supplies.size(); ++i) {
+    const Supply& supply = zone_.supplies[i];
+    Exchange& e = exchanges_[first_.supply + i];
+    e.temperature = driver(supply.temperature);
+    const double flow = air_density(e.temperature) * std::max(0.0, driver(supply.flow)) / 3600.0;
+    e.conductance = supply.scale * air_heat * flow;
   }
-  for (const Coupling& coupling : zone_.couplings) {
-    e->temperature = driver(coupling.temperature);
-    e++->conductance = coupling.conductance;
+  for (std::size_t i = 0; i < zone_.couplings.size(); ++i) {
+    Exchange& e = exchanges_[first_.coupling + i];
+    e.temperature = driver(zone_.couplings[i].temperature);
+    e.conductance = zone_.couplings[i].conductance;
   }
-  for (const Gain& gain : zone_.gains) {
+  for (std::size_t i = 0; i < zone_.gains.size(); ++i) {
+    const Gain& gain = zone_.gains[i];
+    Exchange& e = exchanges_[first_.gain + i];
     const double power = gain.scale * driver(gain.power);
-    e->to_air = (1.0 - gain.radiant_fraction) * power;
-    e++->by_emissivity = gain.radiant_fraction * power;
+    e.to_air = (1.0 - gain.radiant_fraction) * power;
+    e.by_emissivity = gain.radiant_fraction * power;
   }
 }
 
@@ -286,26 +294,26 @@ void Simulation::set_exchanges() {
 
 void Simulation::set_flows() {
   airflow_.solve(air_);
-  auto e = exchanges_.begin() + static_cast<std::ptrdiff_t>(zone_.windows.size());
-  for (std::size_t i = 0; i < airflow_.size(); ++i, ++e) {
-    e->temperature = airflow_.outside(i);
-    e->conductance = air_heat * std::max(0.0, airflow_.flow(i));
+  for (std::size_t i = 0; i < airflow_.size(); ++i) {
+    Exchange& e = exchanges_[first_.opening + i];
+    e.temperature = airflow_.outside(i);
+    e.conductance = air_heat * std::max(0.0, airflow_.flow(i));
   }
 }
 
 // Exact for a power that is constant over the sub-step; the mean emission is what the zone receives.
 void Simulation::set_heaters() {
-  auto e = exchanges_.begin() + static_cast<std::ptrdiff_t>(zone_.windows.size() + zone_.openings.size() +
-                                                            zone_.infiltrations.size());
-  for (HeaterState& state : heaters_) {
+  for (std::size_t i = 0; i < heaters_.size(); ++i) {
+    HeaterState& state = heaters_[i];
+    Exchange& e = exchanges_[first_.heater + i];
     const double power = driver(state.heater->power);
     const double before = state.emitted;
     state.emitted = state.lag > 0.0 ? power + (before - power) * std::exp(-substep_ / state.lag) : power;
     const double kept = state.lag * (state.emitted - before) / substep_;
     const double fraction = state.heater->radiant_fraction;
-    e->to_air = (1.0 - fraction) * (power - kept);
-    e->by_emissivity = fraction * (power - kept);
-    e++->kept = kept;
+    e.to_air = (1.0 - fraction) * (power - kept);
+    e.by_emissivity = fraction * (power - kept);
+    e.kept = kept;
   }
 }
 

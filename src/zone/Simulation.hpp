@@ -53,6 +53,11 @@ class Simulation {
     double energy = 0.0;         // J, since the balance was begun
   };
 
+  /// Number of the first exchange of each kind; the others follow it in the order of the zone's.
+  struct FirstExchanges {
+    std::size_t window = 0, opening = 0, infiltration = 0, heater = 0, supply = 0, coupling = 0, gain = 0;
+  };
+
   using Lanes = WallSolver::Lanes;
 
   /// Walls that are solved side by side, with their shares of radiant heat, what their outer sides bring with
@@ -127,6 +132,7 @@ class Simulation {
   double air_ = 0.0;              // degC, at the present time
   std::vector<WallGroup> walls_;  // in the order of the zone's
   std::vector<Exchange> exchanges_;
+  FirstExchanges first_;
   std::vector<HeaterState> heaters_;
   Airflow airflow_;
   RoomMatrix room_;

@@ -159,3 +159,34 @@ test_that("the initial offset of the walls is forgotten at the walls' own pace, 
   expect_true(all(difference > 0) && all(diff(difference[10:96]) < 0))
   expect_lt(difference[96], 0.2 * max(difference))
 })
+
+test_that("the engine reads every field of the table, and refuses a component or an exposure that it does not know", {
+  drivers <- cbind(Te = c(5, 6), P = 100, V = 3, Wd = 90)
+  components <- list(
+    zone_wall("w", 10, zone_layer(0.1, 1, 1e6), outside = "Te", sun = "P", sky = "P", wind_speed = "V",
+              wind_direction = "Wd", wind_film = 0.5),
+    zone_window("w", 2, "Te", sun = "P"), zone_opening("o", 0.1, "Te"), zone_crack("c", 0.001, 1, "Te"),
+    zone_infiltration("i", 0.5, "Te"), zone_heater("h", "P"), zone_supply("s", "V", "Te"), zone_coupling("c", 5, "Te"),
+    zone_gain("g", "P"))
+  fields <- amiss:::zone_fields
+  expect_setequal(vapply(components, `[[`, "", "type"), setdiff(names(fields), c("layer", "zone")))
+  run <- function(zone) {
+    amiss:::zone_simulate_(zone, list(), matrix(0, 1, 0), drivers, 900, numeric(), amiss:::zone_control,
+                           list(seed = 0, threads = 1))
+  }
+  for (component in components) {
+    one <- amiss:::index_zone(unclass(zone(component, volume = 40)), colnames(drivers))
+    expect_setequal(setdiff(names(component), c("type", "name")), names(fields[[component$type]]))
+    expect_true(all(is.finite(run(one))))
+    for (field in c("type", "name", names(fields[[component$type]]))) {
+      broken <- one
+      broken$components[[1]][[field]] <- NULL
+      expect_error(run(broken), info = paste(component$type, field))
+    }
+    one$components[[1]]$type <- "chimney"
+    expect_error(run(one), "unknown component 'chimney'")
+  }
+  opening <- amiss:::index_zone(unclass(zone(components[[3]], volume = 40)), colnames(drivers))
+  opening$components[[1]]$exposure <- "windy"
+  expect_error(run(opening), "unknown exposure 'windy'")
+})

@@ -1,0 +1,103 @@
+# Runs of a zone.
+
+zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours = 24)
+
+#' Simulate a zone
+#'
+#' @param zone A [zone()].
+#' @param values Matrix of M runs x P parameters with column names; every free parameter needs a column. `NULL` for a
+#'   zone without free parameters: one run.
+#' @param drivers Numeric matrix with column names, one row per interval: means over the interval.
+#' @param step_s Length of an interval, s.
+#' @param hold Air temperature (degC) to be prescribed in each interval, `NA` where it is free; `NULL` for none.
+#'   Holding the first intervals at the measurement lets the walls forget their unknown past.
+#' @param threads Number of threads; the result does not depend on it.
+#' @param control List of `max_substep_s` (s), `cells` (refinement of the walls), `spinup` (times that the leading
+#'   held rows are repeated first), `initial_hours` (of data that give the walls their first outside temperature).
+#' @return Matrix of mean air temperatures, degC: one row per interval, one column per run; `NaN` in a run that fails.
+#' @examples
+#' weather <- synthetic_weather(1, seed = 1)
+#' weather$RHP <- rolbs(nrow(weather), power = 100, seed = 1)
+#' values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = c(0.040, 0.048), insulation_c = 179,
+#'                 heater_radiant = 0.79)
+#' air <- simulate_zone(paper_box("M2"), values, as.matrix(weather[-1]), step_s = 900)
+#' dim(air)
+#' @export
+simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, threads = 1L, control = list()) {
+  call <- rlang::current_env()
+  parameters <- names(zone_parameters(zone))
+  if (is.null(values)) values <- matrix(0, 1, 0)
+  check_input(checkmate::check_matrix(values, mode = "numeric", any.missing = FALSE, min.rows = 1), "values")
+  check_values(colnames(values), parameters, call)
+  check_named_columns(values, "values", parameters, call)
+  check_drivers(zone, drivers, call)
+  check_input(checkmate::check_number(step_s, lower = 1e-3, finite = TRUE), "step_s")
+  threads <- check_threads(threads)
+  if (is.null(hold)) hold <- numeric()
+  check_input(checkmate::check_numeric(hold), "hold")
+  if (!length(hold) %in% c(0, nrow(drivers)) || any(is.infinite(hold))) {
+    abort_input(c("{.arg hold} must have one finite number or NA per row of the drivers; got {length(hold)} values.",
+                  i = "The drivers have {nrow(drivers)} rows."))
+  }
+  control <- check_zone_control(control, call)
+  check_zone_size(zone, nrow(values), nrow(drivers), step_s, control, call)
+  # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between
+  # them.
+  fields <- free_fields(unclass(zone))
+  extremes <- vapply(parameters, function(p) range(values[, p]), numeric(2))
+  for (i in seq_len(if (nrow(values) > 1) 2 else 1)) resolve_zone(zone, fields, extremes[i, ], call)
+  storage.mode(drivers) <- "double"
+  call_engine(zone_simulate_(index_zone(unclass(zone), colnames(drivers)), lapply(fields, `[[`, "path"),
+                             field_values(fields, values),
+                             drivers, step_s, as.numeric(hold), control, engine_context(0, threads)), call)
+}
+
+check_drivers <- function(zone, drivers, call) {
+  verdict <- checkmate::check_matrix(drivers, mode = "numeric", min.rows = 1, col.names = "unique")
+  check_input(verdict, "drivers", call = call)
+  needed <- zone_boundary(zone)
+  absent <- setdiff(needed, colnames(drivers))
+  if (length(absent) > 0) {
+    abort_input(c("The zone needs columns that {.arg drivers} does not have: {.val {absent}}.",
+                  i = "Columns given: {.val {colnames(drivers)}}."), call = call)
+  }
+  gaps <- needed[!apply(is.finite(drivers[, needed, drop = FALSE]), 2, all)]
+  if (length(gaps) > 0) {
+    abort_input(c("{.arg drivers} has missing or infinite values in {.val {gaps}}.",
+                  i = "The simulator needs every driver in every interval: fill the gaps first."), call = call)
+  }
+}
+
+check_zone_control <- function(control, call) {
+  control <- merge_control(zone_control, control, call = call)
+  for (option in c("max_substep_s", "cells", "initial_hours")) {
+    check_input(checkmate::check_number(control[[option]], lower = 1e-3, upper = 1e9), paste0("control$", option),
+                call = call)
+  }
+  check_input(checkmate::check_count(control$spinup), "control$spinup", call = call)
+  control
+}
+
+# The engine's form: names of columns become 0-based indices, -1 for none.
+index_zone <- function(zone, columns) {
+  zone$components <- lapply(zone$components, function(x) {
+    for (field in column_fields(x)) {
+      x[[field]] <- if (is.null(x[[field]])) -1L else match(x[[field]], columns) - 1L
+    }
+    if (!is.null(x$azimuth) && !is_free(x$azimuth)) x$azimuth <- as.numeric(x$azimuth)
+    x
+  })
+  zone
+}
+
+#' @export
+free_parameters.amiss_zone <- function(simulator) zone_parameters(simulator)
+
+#' @export
+driver_names.amiss_zone <- function(simulator) zone_boundary(simulator)
+
+#' @export
+simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+  check_run_dots(...)
+  simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
+}
