@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "ais_helpers.hpp"
-#include "engine/ais/ImportanceSample.hpp"
+#include "engine/ais/PopulationMonteCarlo.hpp"
 #include "engine/ais/Sampler.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 #include "engine/random/transform.hpp"
@@ -52,7 +52,7 @@ TEST(SampleAis, ImportanceSampleGrowsUntilEnoughDrawsAreEffective) {
 }
 
 // A mixture that gives a fiftieth of its mass to a lobe that holds a fifth of the posterior.
-TEST(CloserMixture, ALobeGainsItsShareOfThePosterior) {
+TEST(PopulationMonteCarlo, ALobeGainsItsShareOfThePosterior) {
   const VectorXd here = Eigen::Vector2d(-0.5, 0.0), there = Eigen::Vector2d(1.2, 0.0);
   const double scale = 0.5;
   const auto log_lobe = [&](const VectorXd& x, const VectorXd& at) {
@@ -68,9 +68,10 @@ TEST(CloserMixture, ALobeGainsItsShareOfThePosterior) {
   const SkewedMixture poor(
       SkewMap(), StudentTMixture({StudentT(here, root, 5.0), StudentT(there, root, 5.0)}, {0.98, 0.02}));
   Stream stream(11, 7, 5);
-  long evaluations = 5;
-  const SkewedMixture close = closer_mixture(target, poor, {}, {200}, seeded(11), stream, evaluations);
-  EXPECT_EQ(evaluations, 805);
+  const Context context = seeded(11);
+  PopulationMonteCarlo population(target, context, stream);
+  const SkewedMixture close = population.closer(poor, {200});
+  EXPECT_EQ(population.evaluations(), 800);
   int in_lobe = 0;
   const int n = 4000;
   for (int i = 0; i < n; ++i) in_lobe += close.draw(stream)[0] > 0.25;
@@ -87,14 +88,15 @@ TEST(CloserMixture, ALobeGainsItsShareOfThePosterior) {
   EXPECT_LT(std::abs(after.log_evidence), 4.0 * after.se);  // the posterior above is normalised
 }
 
-TEST(CloserMixture, StaysWhereTheLikelihoodIsZero) {
+TEST(PopulationMonteCarlo, StaysWhereTheLikelihoodIsZero) {
   const FunctionTarget nothing(2, [](const VectorXd&) { return -kInfinity; });
   const SkewedMixture mixture(
       SkewMap(), StudentTMixture({StudentT(VectorXd::Zero(2), MatrixXd::Identity(2, 2), 5.0)}, {1.0}));
   Stream stream(12, 7, 5);
-  long evaluations = 0;
-  const SkewedMixture same = closer_mixture(nothing, mixture, {}, {100}, seeded(12), stream, evaluations);
-  EXPECT_EQ(evaluations, 100);
+  const Context context = seeded(12);
+  PopulationMonteCarlo population(nothing, context, stream);
+  const SkewedMixture same = population.closer(mixture, {100});
+  EXPECT_EQ(population.evaluations(), 100);
   EXPECT_EQ(same.log_density(VectorXd::Ones(2)), mixture.log_density(VectorXd::Ones(2)));
 }
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "engine/ais/AnnealedRun.hpp"
-#include "engine/ais/ImportanceSample.hpp"
+#include "engine/ais/PopulationMonteCarlo.hpp"
 #include "engine/ais/StandardNormal.hpp"
 #include "engine/random/purposes.hpp"
 
@@ -51,13 +51,13 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
                       AnnealedRun& annealed, AisResult& result) {
   Stream stream(context.seed, kImportance, 0);
   annealed.gather(result.draws, result.log_likelihood, result.weights);
-  const StudentTMixture mixture = fit_elliptic(result.draws, result.weights, options, stream);
-  DrawPool pool;
-  pool.add(result.draws, result.weights);
-  const SkewedMixture close = options.skewed ? pool.fit(options.max_components, kBridgeDof, stream)
-                                             : SkewedMixture(SkewMap(), mixture);
-  ImportanceSample sample =
-      importance_sample(target, mixture, std::move(pool), options, context, stream, result.evaluations);
+  PopulationMonteCarlo population(target, context, stream);
+  const StudentTMixture mixture = population.fit_elliptic(result.draws, result.weights, options);
+  population.add(result.draws, result.weights);
+  const SkewedMixture close =
+      options.skewed ? population.fit(options.max_components, kBridgeDof) : SkewedMixture(SkewMap(), mixture);
+  ImportanceSample sample = population.sample(mixture, options);
+  result.evaluations += population.evaluations();
   if (sample.ess > 0) {
     result.second = sample.log_evidence;
     result.second_se = sample.se;

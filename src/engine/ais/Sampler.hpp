@@ -42,8 +42,9 @@ struct AisResult {
 /// by Metropolis and Hastings. An importance sample from a Student-t mixture fitted to the draws is the
 /// second estimator; where no mixture comes close, a second annealed run from the mixture to the posterior
 /// ("bridged") is. The importance sample is reported where there is one, else the annealed run that reaches a
-/// standard error at less cost; more groups or draws are added until the standard error is as asked. The
-/// other estimator has to agree.
+/// standard error at less cost; more groups or draws are added until the standard error is as asked. Where
+/// the other annealed run lies well above, a third, from a mixture fitted to the draws of both, is reported.
+/// The other estimator may lie below the one reported, not above.
 AisResult sample_ais(const Target& target, const Distribution& reference, const AisOptions& options,
                      const Context& context);
 AisResult sample_ais(const Target& target, const AisOptions& options, const Context& context);

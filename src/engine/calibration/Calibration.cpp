@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "engine/ais/CloserReference.hpp"
-#include "engine/ais/ImportanceSample.hpp"
+#include "engine/ais/PopulationMonteCarlo.hpp"
 #include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/spread_draws.hpp"
 #include "engine/calibration/ParameterModes.hpp"
@@ -94,10 +94,12 @@ namespace {
 AisResult sample_once(const CalibrationTarget& target, const AisOptions& options, const Context& context) {
   long spent = 0;
   const CloserReference reference = closer_reference(target, options, context, spent);
-  const MatrixXd population = sample_population(target, reference, options, context.fork(kPopulation), spent);
+  const MatrixXd draws = sample_population(target, reference, options, context.fork(kPopulation), spent);
   Stream stream(context.seed, kCloser, 0);
-  const SkewedMixture mixture =
-      closer_mixture(target, population, {kRoundDraws * target.dimension(), kRounds}, context, stream, spent);
+  PopulationMonteCarlo population(target, context, stream);
+  population.add(draws);
+  const SkewedMixture mixture = population.closer({kRoundDraws * target.dimension(), kRounds});
+  spent += population.evaluations();
   AisOptions skewed = options;
   skewed.skewed = true;
   const Context last = context.fork(kPosterior);

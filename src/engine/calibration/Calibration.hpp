@@ -27,7 +27,7 @@ struct Calibration {
 /// Samples the joint posterior. It is annealed from where error and discrepancy lie when the simulator is a
 /// Gaussian (first over the priors, then about the mode that this leads to), times the modes of the
 /// parameters there (ParameterModes), mixed defensively with the prior; then from the mixture to which those
-/// draws lead (closer_mixture()).
+/// draws lead (PopulationMonteCarlo).
 AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& options,
                            const Context& context);
 

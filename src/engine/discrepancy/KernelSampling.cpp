@@ -7,7 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "engine/ais/ImportanceSample.hpp"
+#include "engine/ais/PopulationMonteCarlo.hpp"
 #include "engine/ais/Sampler.hpp"
 #include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/spread_draws.hpp"
@@ -151,16 +151,22 @@ SkewedMixture sample_stage(const KernelModel& model, const AisOptions& options,
                            const KernelSamplingOptions& sampling, const Context& context, long& evaluations) {
   const Context thinned = context.fork(kThinned);
   Stream stream(thinned.seed, kStage, 0);
-  const KernelTarget target(model);
-  if (model.size() <= sampling.coarsest)
-    return closer_mixture(
-        target, sample_population(target, StandardNormal(target.dimension()), options, thinned, evaluations),
-        {kRoundDraws}, thinned, stream, evaluations);
+  const auto closer = [&](const Target& target, const MatrixXd& draws) {
+    PopulationMonteCarlo population(target, thinned, stream);
+    population.add(draws);
+    SkewedMixture mixture = population.closer({kRoundDraws});
+    evaluations += population.evaluations();
+    return mixture;
+  };
+  if (model.size() <= sampling.coarsest) {
+    const KernelTarget target(model);
+    const StandardNormal prior(target.dimension());
+    return closer(target, sample_population(target, prior, options, thinned, evaluations));
+  }
   const SkewedMixture before =
       sample_stage(model.thinned(sampling.thinning), options, sampling, thinned, evaluations);
   const ApproximateTarget approximate(model, before, kCoarser * sampling.tolerance, context, stream);
-  const MatrixXd draws = sample_population(approximate, before, options, thinned, evaluations);
-  return closer_mixture(approximate, draws, {kRoundDraws}, thinned, stream, evaluations);
+  return closer(approximate, sample_population(approximate, before, options, thinned, evaluations));
 }
 
 }  // namespace

@@ -1,0 +1,109 @@
+#include "engine/ais/PopulationMonteCarlo.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace amiss {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kImportanceDof = 8.0;  // of the mixtures of importance samples
+constexpr double kNegligible = 1e-3;    // share of the weight that the draws left out have at most
+
+}  // namespace
+
+void DrawPool::add(const MatrixXd& draws, const VectorXd& weights) {
+  // Truncated (Ionides 2008), so that no single draw decides on the mixture; those that together weigh next
+  // to nothing are left out.
+  VectorXd kept = weights.cwiseMin(1.0 / std::sqrt(static_cast<double>(weights.size())));
+  kept *= kept.sum() / kept.squaredNorm();
+  const double least = kNegligible * kept.sum() / static_cast<double>(kept.size());
+  const Index before = x_.cols(), added = (kept.array() > least).count();
+  x_.conservativeResize(draws.rows(), before + added);
+  weights_.conservativeResize(before + added);
+  for (Index i = 0, at = before; i < draws.cols(); ++i) {
+    if (!(kept[i] > least)) continue;
+    x_.col(at) = draws.col(i);
+    weights_[at++] = kept[i];
+  }
+}
+
+SkewedMixture DrawPool::fit(int max_components, double dof, Stream& stream) const {
+  return SkewedMixture::fit(x_, weights_ / weights_.sum(), max_components, dof, stream);
+}
+
+void PopulationMonteCarlo::add(const MatrixXd& draws) {
+  const Index n = draws.cols();
+  add(draws, VectorXd::Constant(n, 1.0 / static_cast<double>(n)));
+}
+
+void PopulationMonteCarlo::extend(ImportanceSample& sample, const SkewedMixture& mixture, Index draws) {
+  sample.extend(target_, mixture, draws, context_, stream_);
+  evaluations_ += draws;
+}
+
+SkewedMixture PopulationMonteCarlo::closer(SkewedMixture mixture, const CloserOptions& options) {
+  for (int round = 0; round < options.rounds; ++round) {
+    ImportanceSample sample;
+    extend(sample, mixture, options.draws);
+    if (!(sample.ess > 0)) break;
+    pool_.add(sample.x, sample.weights);
+    mixture = fit(options.max_components, options.dof);
+  }
+  return mixture;
+}
+
+SkewedMixture PopulationMonteCarlo::closer(const CloserOptions& options) {
+  return closer(fit(options.max_components, options.dof), options);
+}
+
+StudentTMixture PopulationMonteCarlo::fit_elliptic(const MatrixXd& x, const VectorXd& weights,
+                                                   const AisOptions& options) {
+  return StudentTMixture::fit(x, weights, options.max_components, kImportanceDof, stream_);
+}
+
+// A mixture that comes closer to the posterior, fitted to a weighted sample of it and, if it may be skewed,
+// to all samples before it.
+SkewedMixture PopulationMonteCarlo::refit(const ImportanceSample& sample, const AisOptions& options) {
+  if (!options.skewed) return SkewedMixture(SkewMap(), fit_elliptic(sample.x, sample.weights, options));
+  if (sample.ess > 0) pool_.add(sample.x, sample.weights);  // else the record is impossible at every draw
+  return fit(options.max_components, kImportanceDof);
+}
+
+ImportanceSample PopulationMonteCarlo::sample(const StudentTMixture& first, const AisOptions& options) {
+  constexpr int kRounds = 4;
+  constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
+  constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
+  constexpr Index kMost = 16;       // times the draws asked for, at most, for the sake of precision
+  constexpr Index kLeastAdded = 100;
+  const Index n = options.importance_draws;
+  SkewedMixture mixture(SkewMap(), first);
+  ImportanceSample sample;
+  const auto add = [&](Index draws) { extend(sample, mixture, draws); };
+  const auto good = [&] { return sample.ess >= kGood * static_cast<double>(sample.size()); };
+  const Index few = options.refit_draws > 0 ? std::min<Index>(options.refit_draws, n) : n;
+  add(few);
+  if (few < n && !(sample.ess > kUsable)) add(n - few);
+  const auto lacking = [&] {  // draws needed over those there are
+    return std::max(std::pow(sample.se / options.precision, 2), options.effective_draws / sample.ess);
+  };
+  for (int round = 1; round < kRounds && (options.skewed || sample.ess > kUsable); ++round) {
+    mixture = refit(sample, options);
+    sample = ImportanceSample();
+    add(n);
+    while (good() && lacking() > 1.0 && sample.size() < kMost * n) {
+      const double more = 1.1 * (lacking() - 1.0) * static_cast<double>(sample.size());
+      add(std::clamp<Index>(static_cast<Index>(more), kLeastAdded, n));
+    }
+    if (good()) break;
+  }
+  if (!good()) sample.ess = 0.0;
+  return sample;
+}
+
+}  // namespace amiss
