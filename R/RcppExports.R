@@ -57,8 +57,8 @@ fictitious_condition_ <- function(n, seed) {
     .Call(`_amiss_fictitious_condition_`, n, seed)
 }
 
-paper_discrepancy_ <- function(data, priors, draws) {
-    .Call(`_amiss_paper_discrepancy_`, data, priors, draws)
+paper_discrepancy_ <- function(data, priors, draws, context) {
+    .Call(`_amiss_paper_discrepancy_`, data, priors, draws, context)
 }
 
 zone_simulate_ <- function(zone, paths, values, drivers, step_s, hold, control, context) {

@@ -3,8 +3,7 @@
 #' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean of its parameters,
 #' and the whole response to the boundary conditions that the model lacks, with a 95 % band.
 #'
-#' Of a calibration as in the paper the discrepancy is that of equation 8, at the same time step; its band takes the
-#' fictitious condition, which explains nothing, for constant.
+#' Of a calibration as in the paper the discrepancy is that of equation 8, at the same time step.
 #'
 #' @param fit A calibration ([calibrate()], [calibrate_paper()]).
 #' @return An object of class `amiss_discrepancy`: `series`, a data frame with the columns `time`, `observed`,
@@ -50,41 +49,17 @@ new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
                  target = m$target, unit = m$unit), class = "amiss_discrepancy")
 }
 
-# Mean and variance over posterior draws of the hyper-parameters, by the law of total variance. With P the projection
-# outside the simulation space and B = A^-1 - A^-1 K (K'A^-1 K)^-1 K'A^-1, the covariance of H v' given a draw is
-# (P - B / lambda) / lambda.
-paper_discrepancy <- function(fit, draws = 24) {
+# Mean and variance over posterior draws of the hyper-parameters, by the law of total variance.
+paper_discrepancy <- function(fit, draws = 24, threads = 1) {
   hyper <- fit$hyperparameters
   picked <- systematic_draws(hyper$weights, draws)
-  means <- paper_discrepancy_(paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
-                              list(alpha = hyper$alpha[picked, , drop = FALSE], t2 = hyper$t2[picked],
-                                   lambda = hyper$lambda[picked]))
-  x <- scaled_conditions(fit$measurements, fit$rows)
-  basis <- qr.Q(qr(fit$emulator$basis$vectors))
-  within <- vapply(picked, function(i) {
-    conditional_variance(x, basis, hyper$alpha[i, ], hyper$t2[i], hyper$lambda[i], fit$priors$unit)
-  }, numeric(nrow(x)))
-  mean <- rowMeans(means)
-  sd <- sqrt(rowMeans(within) + rowMeans((means - mean)^2))
+  of <- call_engine(paper_discrepancy_(
+    paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
+    list(alpha = hyper$alpha[picked, , drop = FALSE], t2 = hyper$t2[picked], lambda = hyper$lambda[picked]),
+    engine_context(fit$seed, threads)))
+  mean <- rowMeans(of$mean)
+  sd <- sqrt(rowMeans(of$variance) + rowMeans((of$mean - mean)^2))
   new_discrepancy(fit, mean, mean - 1.96 * sd, mean + 1.96 * sd)
-}
-
-# Columns of each condition over the largest of their ranges.
-scaled_conditions <- function(measurements, rows) {
-  x <- measurements$boundary[rows, , drop = FALSE]
-  width <- tapply(apply(x, 2, function(v) diff(range(v))), measurements$condition, max)[measurements$condition]
-  structure(sweep(x, 2, width, "/"), condition = measurements$condition)
-}
-
-conditional_variance <- function(x, basis, alpha, t2, lambda, unit = 1) {
-  decay <- -4 * log(pmax(alpha[attr(x, "condition")], .Machine$double.xmin))
-  left <- x %*% diag(2 * decay, ncol(x)) %*% t(x)
-  squares <- 0.5 * diag(left)
-  covariance <- unit^2 * (1 - t2) / t2 * exp(left - outer(squares, squares, "+"))
-  inverse <- chol2inv(chol(covariance + diag(1 / lambda, nrow(x))))
-  weighted <- inverse %*% basis
-  outside <- diag(inverse) - rowSums((weighted %*% solve(crossprod(basis, weighted))) * weighted)
-  pmax(0, 1 - rowSums(basis^2) - outside / lambda) / lambda
 }
 
 # Mean of the simulator's runs at posterior draws; by the emulator where there are none.

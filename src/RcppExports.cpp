@@ -206,15 +206,16 @@ BEGIN_RCPP
 END_RCPP
 }
 // paper_discrepancy_
-Eigen::MatrixXd paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws);
-RcppExport SEXP _amiss_paper_discrepancy_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP) {
+Rcpp::List paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws, const Rcpp::List& context);
+RcppExport SEXP _amiss_paper_discrepancy_(SEXP dataSEXP, SEXP priorsSEXP, SEXP drawsSEXP, SEXP contextSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type draws(drawsSEXP);
-    rcpp_result_gen = Rcpp::wrap(paper_discrepancy_(data, priors, draws));
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
+    rcpp_result_gen = Rcpp::wrap(paper_discrepancy_(data, priors, draws, context));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -267,7 +268,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
-    {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 3},
+    {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 4},
     {"_amiss_zone_simulate_", (DL_FUNC) &_amiss_zone_simulate_, 8},
     {"_amiss_zone_balance_", (DL_FUNC) &_amiss_zone_balance_, 5},
     {NULL, NULL, 0}

@@ -3,6 +3,7 @@
 
 #include "engine/attribution/VarianceIndex.hpp"
 #include "engine/calibration/PaperFit.hpp"
+#include "engine/discrepancy/LowRankKernel.hpp"
 #include "export_convert.h"
 
 using namespace amiss;  // NOLINT
@@ -47,12 +48,44 @@ Rcpp::List list_draws(const std::vector<KernelParameters>& draws, int conditions
   return Rcpp::List::create(Rcpp::_["alpha"] = alpha, Rcpp::_["t2"] = t2, Rcpp::_["lambda"] = lambda);
 }
 
+std::vector<KernelParameters> make_draws(const Rcpp::List& draws, double unit) {
+  const MatrixXd alpha = Rcpp::as<MatrixXd>(draws["alpha"]);
+  const VectorXd t2 = Rcpp::as<VectorXd>(draws["t2"]), lambda = Rcpp::as<VectorXd>(draws["lambda"]);
+  std::vector<KernelParameters> out(static_cast<std::size_t>(alpha.rows()));
+  for (Eigen::Index i = 0; i < alpha.rows(); ++i) {
+    KernelParameters& p = out[static_cast<std::size_t>(i)];
+    p.decay = -4.0 * alpha.row(i).transpose().array().log();
+    p.amplitude = unit * unit * ((1.0 - t2[i]) / t2[i]);
+    p.lambda = lambda[i];
+  }
+  return out;
+}
+
 Rcpp::List list_approximation(const KernelSample& sample) {
   using Rcpp::_;
   return Rcpp::List::create(
       _["largest_error"] = sample.largest_error, _["correction"] = sample.correction,
       _["values"] = Rcpp::IntegerVector::create(
           _["earlier"] = sample.coarse, _["skeleton"] = sample.by_skeleton, _["direct"] = sample.direct));
+}
+
+PaperOptions paper_options(const Rcpp::List& control) {
+  return {convert::ais_options(control["ais"]), Rcpp::as<double>(control["tolerance"]),
+          Rcpp::as<bool>(control["shared_lambda"])};
+}
+
+Rcpp::List list_inside(const PaperFit& fit) {
+  Rcpp::List inside = convert::ais_list(fit.inside);
+  inside["unit"] = fit.unit;
+  inside["lambda"] = fit.lambda;
+  return inside;
+}
+
+Rcpp::List list_outside(const PaperFit& fit, const KernelModel& model) {
+  Rcpp::List outside = convert::ais_list(fit.outside.posterior);
+  outside["hyperparameters"] = list_draws(fit.draws, model.conditions(), model.priors().unit);
+  outside["approximation"] = list_approximation(fit.outside);
+  return outside;
 }
 
 Rcpp::List list_index(const VarianceIndex& index) {
@@ -78,20 +111,14 @@ Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, co
   const Context context = convert::context(context_list);
   const KernelData kernel = make_kernel_data(data);
   const KernelModel model(kernel, make_kernel_priors(priors));
-  const PaperOptions options{convert::ais_options(control["ais"]), Rcpp::as<double>(control["tolerance"]),
-                             Rcpp::as<bool>(control["shared_lambda"])};
-  const PaperFit fit = calibrate_paper(model, PaperCalibration(kernel.y, kernel.basis),
-                                       Emulator(convert::emulator_state(emulator_list)), options, context);
+  const PaperFit fit =
+      calibrate_paper(model, PaperCalibration(kernel.y, kernel.basis),
+                      Emulator(convert::emulator_state(emulator_list)), paper_options(control), context);
   const VarianceIndex index = variance_index(model, fit.draws, fit.outside.posterior.weights,
                                              Rcpp::as<double>(control["probability"]), context);
-  Rcpp::List outside = convert::ais_list(fit.outside.posterior), inside = convert::ais_list(fit.inside);
-  outside["hyperparameters"] = list_draws(fit.draws, model.conditions(), model.priors().unit);
-  outside["approximation"] = list_approximation(fit.outside);
-  inside["unit"] = fit.unit;
-  inside["lambda"] = fit.lambda;
   using Rcpp::_;
-  return Rcpp::List::create(_["inside"] = inside, _["outside"] = outside, _["index"] = list_index(index),
-                            _["log_jacobian"] = fit.log_jacobian);
+  return Rcpp::List::create(_["inside"] = list_inside(fit), _["outside"] = list_outside(fit, model),
+                            _["index"] = list_index(index), _["log_jacobian"] = fit.log_jacobian);
 }
 
 // The fictitious condition x_0 of (6).
@@ -100,21 +127,18 @@ Eigen::VectorXd fictitious_condition_(int n, double seed) {
   return fictitious_condition(n, static_cast<std::uint64_t>(seed));
 }
 
-// Posterior mean of the discrepancy (N x draws, equation 8) for draws of the hyper-parameters of (6).
+// Posterior mean and variance of the discrepancy (N x draws, equation 8) for draws of the hyper-parameters of
+// (6).
 // [[Rcpp::export]]
-Eigen::MatrixXd paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors,
-                                   const Rcpp::List& draws) {
+Rcpp::List paper_discrepancy_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& draws,
+                              const Rcpp::List& context) {
   const KernelModel model(make_kernel_data(data), make_kernel_priors(priors));
-  const double unit = model.priors().unit;
-  const MatrixXd alpha = Rcpp::as<MatrixXd>(draws["alpha"]);
-  const VectorXd t2 = Rcpp::as<VectorXd>(draws["t2"]), lambda = Rcpp::as<VectorXd>(draws["lambda"]);
-  MatrixXd out(model.size(), alpha.rows());
-  for (Eigen::Index i = 0; i < alpha.rows(); ++i) {
-    KernelParameters p;
-    p.decay = -4.0 * alpha.row(i).transpose().array().log();
-    p.amplitude = unit * unit * ((1.0 - t2[i]) / t2[i]);
-    p.lambda = lambda[i];
-    out.col(i) = model.discrepancy(p);
+  const std::vector<KernelDiscrepancy> found =
+      discrepancies(model, make_draws(draws, model.priors().unit), convert::context(context));
+  MatrixXd mean(model.size(), found.size()), variance(model.size(), found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    mean.col(static_cast<Eigen::Index>(i)) = found[i].mean;
+    variance.col(static_cast<Eigen::Index>(i)) = found[i].variance;
   }
-  return out;
+  return Rcpp::List::create(Rcpp::_["mean"] = mean, Rcpp::_["variance"] = variance);
 }

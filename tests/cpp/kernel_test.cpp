@@ -241,5 +241,34 @@ TEST(KernelTarget, NumberingAndOrderLeaveTheSampledEvidenceUnchanged) {
   EXPECT_LT(relabelled_difference(KernelTarget(a), KernelTarget(b)), 1e-8);
 }
 
+TEST(LowRankKernel, DiscrepancyIsTheDenseOneWithinItsTolerance) {
+  const KernelModel model = make_model(700);
+  const double tolerance = 1e-3;
+  for (const KernelParameters& p : make_points()) {
+    const KernelDiscrepancy dense = model.discrepancy(p);
+    const auto low = low_rank_discrepancy(model, p, tolerance, 700);
+    ASSERT_TRUE(low);
+    const double left = (model.in_given_order(model.outside()) - dense.mean).norm();  // |w|
+    EXPECT_LT((low->mean - dense.mean).norm(), tolerance * left);
+    EXPECT_LT((low->variance - dense.variance).cwiseAbs().maxCoeff(), tolerance / p.lambda);
+    EXPECT_GT(dense.variance.maxCoeff(), 10 * tolerance / p.lambda);
+  }
+  EXPECT_FALSE(low_rank_discrepancy(model, make_points()[1], 1e-6, 10));
+}
+
+TEST(LowRankKernel, DiscrepanciesOfSeveralDrawsDoNotHangOnTheThreads) {
+  const KernelModel model = make_model(700);
+  Context two;
+  two.threads = 2;
+  const auto one = discrepancies(model, make_points(), Context()),
+             other = discrepancies(model, make_points(), two);
+  ASSERT_EQ(one.size(), 4u);
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i].mean, other[i].mean);
+    EXPECT_EQ(one[i].variance, other[i].variance);
+    EXPECT_LT((one[i].mean - model.discrepancy(make_points()[i]).mean).norm(), 0.01 * one[i].mean.norm());
+  }
+}
+
 }  // namespace
 }  // namespace amiss

@@ -160,15 +160,17 @@ TEST(KernelModel, MemoryUsedBeforeChangesNothing) {
   }
 }
 
-TEST(KernelModel, DiscrepancyIsTheDenseConditionalMean) {
+TEST(KernelModel, DiscrepancyIsTheDenseConditional) {
   const KernelData data = make_data();
   const KernelModel model = make_model(data);
   const MatrixXd h = complement(data.basis);
   for (const KernelParameters& p : make_points()) {
     const MatrixXd zeta = h.transpose() * dense_kernel(data, p) * h;
     const MatrixXd seen = zeta + MatrixXd::Identity(h.cols(), h.cols()) / p.lambda;
-    const VectorXd expected = h * zeta * seen.ldlt().solve(h.transpose() * data.y);
-    EXPECT_LT((model.discrepancy(p) - expected).cwiseAbs().maxCoeff(), 1e-9);
+    const MatrixXd covariance = h * (zeta - zeta * seen.ldlt().solve(zeta)) * h.transpose();
+    const KernelDiscrepancy own = model.discrepancy(p);
+    EXPECT_LT((own.mean - h * zeta * seen.ldlt().solve(h.transpose() * data.y)).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT((own.variance - covariance.diagonal()).cwiseAbs().maxCoeff(), 1e-9);
   }
 }
 

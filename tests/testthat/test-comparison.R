@@ -164,7 +164,7 @@ test_that("an interrupted comparison goes on where it stopped, with the same bit
   expect_identical(tidy(both, "criteria"), tidy(compared, "criteria"))
 })
 
-test_that("the paper's discrepancy over time has the mean of the engine and the variance of the formula", {
+test_that("the paper's discrepancy over time lies outside the simulation space, with the variance of the formula", {
   fit <- compared$models$blind$fit
   d <- discrepancy(fit)
   expect_s3_class(d, "amiss_discrepancy")
@@ -172,7 +172,10 @@ test_that("the paper's discrepancy over time has the mean of the engine and the 
   expect_lt(max(abs(crossprod(fit$emulator$basis$vectors, d$series$discrepancy))),
             1e-6 * max(abs(fit$emulator$basis$vectors)) * nrow(d$series))
   # Brute force with H formed: covariance of H v' is H'ZH - H'ZH (H'AH)^-1 H'ZH.
-  x <- scaled_conditions(fit$measurements, fit$rows)
+  m <- fit$measurements
+  x <- m$boundary[fit$rows, , drop = FALSE]
+  width <- tapply(apply(x, 2, function(v) diff(range(v))), m$condition, max)[m$condition]
+  x <- structure(sweep(x, 2, width, "/"), condition = m$condition)
   basis <- qr.Q(qr(fit$emulator$basis$vectors))
   alpha <- c(0.9, 0.5, 1)
   h <- complement(basis)
@@ -180,6 +183,8 @@ test_that("the paper's discrepancy over time has the mean of the engine and the 
   for (i in seq_len(nrow(x))) z[i, ] <- 4 * prod_kernel(x, i, alpha[attr(x, "condition")])
   inside <- t(h) %*% z %*% h
   covariance <- inside - inside %*% solve(inside + diag(0.1, nrow(inside)), inside)
-  expect_equal(conditional_variance(x, basis, alpha, t2 = 0.2, lambda = 10), diag(h %*% covariance %*% t(h)),
-               tolerance = 1e-8)
+  # The fictitious condition, the last, is constant.
+  own <- paper_discrepancy_(paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
+                            list(alpha = rbind(alpha), t2 = 0.2, lambda = 10), engine_context(1, 1))
+  expect_equal(own$variance[, 1], diag(h %*% covariance %*% t(h)), tolerance = 1e-8)
 })

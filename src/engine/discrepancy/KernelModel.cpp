@@ -248,19 +248,30 @@ double KernelModel::log_likelihood(const KernelParameters& parameters, Memory& m
   return -0.5 * (n * (kLogTwoPi - std::log(lambda)) + memory.log_det + lambda * memory.quadratic);
 }
 
+Eigen::VectorXd KernelModel::in_given_order(const VectorXd& by_row) const {
+  VectorXd given(size());
+  for (Index i = 0; i < size(); ++i) given[row_[static_cast<std::size_t>(i)]] = by_row[i];
+  return given;
+}
+
 // H'zeta H (H'AH)^-1 v = v - (H'BH)^-1 v, and H (H'BH)^-1 v = B^-1 (Hv - O beta), beta = (O'B^-1 O)^-1 O'B^-1
-// Hv.
-VectorXd KernelModel::discrepancy(const KernelParameters& parameters) const {
+// Hv. With B^-1 = L^-T L^-1 and W = L^-1 O, H (H'BH)^-1 H' = L^-T (I - W (W'W)^-1 W') L^-1.
+KernelDiscrepancy KernelModel::discrepancy(const KernelParameters& parameters) const {
   Memory work;
   if (!factorise(parameters, work))
     throw std::runtime_error("kernel: covariance of the discrepancy is not positive definite");
-  const Index q = orthonormal_.cols();
+  const Index n = size(), q = orthonormal_.cols();
   const VectorXd beta = work.root.transpose().triangularView<Eigen::Upper>().solve(work.project);
   VectorXd rest = work.half.col(q) - work.half.leftCols(q) * beta;
   work.b.triangularView<Eigen::Lower>().transpose().solveInPlace(rest);
-  VectorXd discrepancy(size());
-  for (Index i = 0; i < size(); ++i) discrepancy[row_[static_cast<std::size_t>(i)]] = outside_[i] - rest[i];
-  return discrepancy;
+  MatrixXd inverse = MatrixXd::Identity(n, n);
+  work.b.triangularView<Eigen::Lower>().solveInPlace(inverse);
+  MatrixXd within = work.half.leftCols(q).transpose() * inverse;
+  work.root.triangularView<Eigen::Lower>().solveInPlace(within);
+  const VectorXd unexplained = inverse.colwise().squaredNorm() - within.colwise().squaredNorm();
+  const VectorXd outside = VectorXd::Ones(n) - orthonormal_.rowwise().squaredNorm();
+  return {in_given_order(outside_ - rest),
+          in_given_order((outside - unexplained).cwiseMax(0.0) / parameters.lambda)};
 }
 
 KernelParameters KernelTarget::parameters(const VectorXd& x) const {

@@ -69,6 +69,12 @@ struct KernelParameters {
   double t2(double unit = 1.0) const { return 1.0 / (1.0 + amplitude / (unit * unit)); }
 };
 
+/// Posterior of the discrepancy over time, H v', v' = H'zeta H (H'AH)^-1 v (equation 8), given the
+/// hyper-parameters.
+struct KernelDiscrepancy {
+  Eigen::VectorXd mean, variance;  ///< N, in the order of the record
+};
+
 /// Discrepancy of the method's paper (equation 6): v = H'y, H the orthonormal complement of K,
 ///     v ~ N(0, H'AH),  A = zeta + I / lambda*,  zeta_ij = (1-t2)/t2 prod_s alpha_s^(4 (x_is - x_js)^2).
 /// Every condition is scaled to [0, 1]. The columns of one condition (sine and cosine) share alpha_s and one
@@ -110,8 +116,8 @@ class KernelModel {
   /// The same in memory that many values share.
   double log_likelihood(const KernelParameters& parameters, Memory& memory) const;
 
-  /// Posterior mean of the discrepancy over time, H v' (N), v' = H'zeta H (H'AH)^-1 v (equation 8).
-  Eigen::VectorXd discrepancy(const KernelParameters& parameters) const;
+  /// Its mean is H v', its variance the diagonal of (P - H (H'BH)^-1 H') / lambda*, B = lambda* A, P = HH'.
+  KernelDiscrepancy discrepancy(const KernelParameters& parameters) const;
 
   Eigen::Index size() const { return outside_.size(); }  ///< N
   int conditions() const { return conditions_; }         ///< S, without the fictitious one
@@ -120,6 +126,7 @@ class KernelModel {
   const std::vector<int>& condition() const { return condition_; }  ///< of each of columns(); x_0 is number S
   const Eigen::MatrixXd& orthonormal() const { return orthonormal_; }  ///< O, N x Q
   const Eigen::VectorXd& outside() const { return outside_; }          ///< H v = y - O O'y
+  Eigen::VectorXd in_given_order(const Eigen::VectorXd& by_row) const;
   /// The conditions in an order that hangs on their values alone, the fictitious one last.
   const std::vector<int>& order() const { return order_; }
 

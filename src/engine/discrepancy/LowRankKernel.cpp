@@ -7,6 +7,7 @@
 
 #include "engine/linalg/GaussianKernel.hpp"
 #include "engine/linalg/constants.hpp"
+#include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
 
@@ -21,7 +22,12 @@ constexpr int kExtensions = 3;  // of a factor whose certificate is not yet good
 // measured.
 constexpr double kCheap = 0.33;
 constexpr Index kSmall = 600;
-constexpr Index kRows = 1024;  // taken at a time
+constexpr Index kRows = 1024;       // taken at a time
+constexpr double kAccurate = 1e-3;  // share of the noise by which the discrepancy may be wrong
+
+Index cheap_rank(const KernelModel& model) {
+  return static_cast<Index>(kCheap * static_cast<double>(model.size()));
+}
 
 // Conditions times the root of their decays: zeta is a Gaussian kernel in them.
 MatrixXd scaled(const MatrixXd& columns, const std::vector<int>& condition, const VectorXd& decay) {
@@ -91,11 +97,41 @@ std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const 
   }
 }
 
+std::optional<KernelDiscrepancy> low_rank_discrepancy(const KernelModel& model, const KernelParameters& p,
+                                                      double tolerance, Index max_rank) {
+  const double ratio = p.amplitude * p.lambda;
+  PivotedCholesky cholesky(scaled(model.columns(), model.condition(), p.decay));
+  if (!(ratio <= KernelModel::largest_ratio) || !cholesky.extend(tolerance / ratio, max_rank))
+    return std::nullopt;
+  const MatrixXd& basis = model.orthonormal();
+  MatrixXd f = cholesky.root();
+  f.noalias() -= basis * (basis.transpose() * cholesky.root()).eval();
+  MatrixXd gram = MatrixXd::Identity(f.cols(), f.cols());
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(f.transpose(), ratio);
+  const Eigen::LLT<Eigen::Ref<MatrixXd>, Eigen::Lower> factor(gram);
+  const VectorXd mean = ratio * (f * factor.solve(f.transpose() * model.outside()));
+  factor.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(f);
+  return KernelDiscrepancy{model.in_given_order(mean),
+                           model.in_given_order(p.amplitude * f.rowwise().squaredNorm())};
+}
+
+std::vector<KernelDiscrepancy> discrepancies(const KernelModel& model,
+                                             const std::vector<KernelParameters>& draws,
+                                             const Context& context) {
+  std::vector<KernelDiscrepancy> out(draws.size());
+  parallel_for(static_cast<int>(draws.size()), context, [&](int k) {
+    const auto at = static_cast<std::size_t>(k);
+    std::optional<KernelDiscrepancy> found;
+    if (model.size() >= kSmall) found = low_rank_discrepancy(model, draws[at], kAccurate, cheap_rank(model));
+    out[at] = found ? std::move(*found) : model.discrepancy(draws[at]);
+  });
+  return out;
+}
+
 BoundedValue bounded_likelihood(const KernelModel& model, const KernelParameters& parameters,
                                 double tolerance, Certificate certificate, KernelModel::Memory& memory) {
-  const auto most = static_cast<Index>(kCheap * static_cast<double>(model.size()));
   if (model.size() >= kSmall) {
-    if (const auto value = low_rank_likelihood(model, parameters, tolerance, certificate, most))
+    if (const auto value = low_rank_likelihood(model, parameters, tolerance, certificate, cheap_rank(model)))
       return *value;
   }
   return {model.log_likelihood(parameters, memory), 0.0, 0.0};

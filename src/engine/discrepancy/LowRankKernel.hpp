@@ -2,6 +2,7 @@
 #include <optional>
 #include <vector>
 
+#include "engine/Context.hpp"
 #include "engine/discrepancy/KernelModel.hpp"
 #include "engine/linalg/GaussianKernel.hpp"
 #include "engine/linalg/Scratch.hpp"
@@ -35,6 +36,19 @@ std::optional<BoundedValue> low_rank_likelihood(const KernelModel& model, const 
 /// The same, or the dense value where the rank is so high that it costs less.
 BoundedValue bounded_likelihood(const KernelModel& model, const KernelParameters& parameters,
                                 double tolerance, Certificate certificate, KernelModel::Memory& memory);
+
+/// The discrepancy from the same factor: with F = PL and I + r F'F = MM',
+///     mean r F (MM')^-1 F'y,  variance amplitude * (sums of squares of the rows of F M^-T).
+/// What is left out makes the mean wrong by a vector of length at most r tr(E) |w|, and the variance by at
+/// most r tr(E) / lambda*: shares of what noise does, and at most `tolerance`.
+std::optional<KernelDiscrepancy> low_rank_discrepancy(const KernelModel& model,
+                                                      const KernelParameters& parameters, double tolerance,
+                                                      Eigen::Index max_rank);
+
+/// The discrepancy at each of several draws, by low rank or, where that costs more, dense.
+std::vector<KernelDiscrepancy> discrepancies(const KernelModel& model,
+                                             const std::vector<KernelParameters>& draws,
+                                             const Context& context);
 
 /// Log density (6) for many parameters at a cost that does not grow with N. Pivots I and the interpolation
 /// U = C_:I C_II^-1 are those of one rough kernel; for every smoother one C ~ U C_II U', and with G = (PU)'PU
