@@ -91,6 +91,50 @@ Rcpp::List list_sets(const std::vector<DroppedSet>& sets) {
 
 BetaShapes beta_shapes(const VectorXd& shapes) { return {shapes[0], shapes[1]}; }
 
+Basis read_basis(const Rcpp::List& list) {
+  Basis basis;
+  basis.vectors = Rcpp::as<MatrixXd>(list["vectors"]);
+  basis.coefficients = Rcpp::as<MatrixXd>(list["coefficients"]);
+  basis.singular_values = Rcpp::as<VectorXd>(list["singular_values"]);
+  basis.discarded_ss = list["discarded_ss"];
+  return basis;
+}
+
+EmulatorOptions emulator_options(const Rcpp::List& control) {
+  EmulatorOptions options;
+  options.search.starts = control["starts"];
+  options.search.searches = control["searches"];
+  options.search.max_evaluations = control["max_evaluations"];
+  options.search.forward = Rcpp::as<std::string>(control["selection"]) == "forward";
+  options.search.significance = control["significance"];
+  options.priors.s2 = beta_shapes(Rcpp::as<VectorXd>(control["s2"]));
+  options.priors.eta2 = beta_shapes(Rcpp::as<VectorXd>(control["eta2"]));
+  options.priors.beta = beta_shapes(Rcpp::as<VectorXd>(control["beta"]));
+  const VectorXd lambda = Rcpp::as<VectorXd>(control["lambda"]);
+  options.priors.lambda = {lambda[0], lambda[1]};
+  return options;
+}
+
+// What the attribution needs of a calibration.
+Calibration make_calibration(const Rcpp::List& fit) {
+  const Rcpp::List posterior = fit["posterior"];
+  Calibration calibration;
+  calibration.posterior = convert::ais_summary(posterior);
+  calibration.history = make_points(posterior);
+  calibration.kept = Rcpp::as<std::vector<Eigen::Index>>(fit["kept"]);
+  calibration.tangent = convert::simulator(fit["tangent"]);
+  return calibration;
+}
+
+AttributionOptions attribution_options(const Rcpp::List& control) {
+  AttributionOptions options;
+  options.ais = convert::ais_options(control["ais"]);
+  options.least = Rcpp::as<double>(control["least"]);
+  options.surrogates.surrogates = control["surrogates"];
+  options.surrogates.smallest_shift = control["smallest_shift"];
+  return options;
+}
+
 // One row for each step of the forward selection of each coefficient; numbers from 1.
 Rcpp::DataFrame selection_table(const Emulator& emulator) {
   std::vector<int> vector, step, parameter;
@@ -128,23 +172,8 @@ Rcpp::List make_basis_(const Eigen::MatrixXd& outputs, const Rcpp::List& control
 // [[Rcpp::export]]
 Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basis_list,
                            const Rcpp::List& control, const Rcpp::List& context) {
-  Basis basis;
-  basis.vectors = Rcpp::as<MatrixXd>(basis_list["vectors"]);
-  basis.coefficients = Rcpp::as<MatrixXd>(basis_list["coefficients"]);
-  basis.singular_values = Rcpp::as<VectorXd>(basis_list["singular_values"]);
-  basis.discarded_ss = basis_list["discarded_ss"];
-  EmulatorOptions options;
-  options.search.starts = control["starts"];
-  options.search.searches = control["searches"];
-  options.search.max_evaluations = control["max_evaluations"];
-  options.search.forward = Rcpp::as<std::string>(control["selection"]) == "forward";
-  options.search.significance = control["significance"];
-  options.priors.s2 = beta_shapes(Rcpp::as<VectorXd>(control["s2"]));
-  options.priors.eta2 = beta_shapes(Rcpp::as<VectorXd>(control["eta2"]));
-  options.priors.beta = beta_shapes(Rcpp::as<VectorXd>(control["beta"]));
-  const VectorXd lambda = Rcpp::as<VectorXd>(control["lambda"]);
-  options.priors.lambda = {lambda[0], lambda[1]};
-  const Emulator emulator = Emulator::train(inputs, basis, options, convert::context(context));
+  const Emulator emulator =
+      Emulator::train(inputs, read_basis(basis_list), emulator_options(control), convert::context(context));
   MatrixXd mean, variance;
   emulator.leave_one_out(mean, variance);
   const EmulatorState state = emulator.state();
@@ -199,18 +228,8 @@ Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rc
   const Context context = convert::context(context_list);
   const Emulator emulator(convert::emulator_state(emulator_list));
   const HistoryModel model(make_history_data(data), make_history_priors(priors), context);
-  const Rcpp::List posterior = fit["posterior"];
-  Calibration calibration;
-  calibration.posterior = convert::ais_summary(posterior);
-  calibration.history = make_points(posterior);
-  calibration.kept = Rcpp::as<std::vector<Eigen::Index>>(fit["kept"]);
-  calibration.tangent = convert::simulator(fit["tangent"]);
-  AttributionOptions options;
-  options.ais = convert::ais_options(control["ais"]);
-  options.least = Rcpp::as<double>(control["least"]);
-  options.surrogates.surrogates = control["surrogates"];
-  options.surrogates.smallest_shift = control["smallest_shift"];
-  const Attribution result = attribute(model, emulator, calibration, options, context);
+  const Attribution result =
+      attribute(model, emulator, make_calibration(fit), attribution_options(control), context);
   using Rcpp::_;
   return Rcpp::List::create(_["sets"] = list_sets(result.sets), _["statistic"] = result.test.statistic,
                             _["p_value"] = result.test.p_value, _["adjusted"] = result.test.adjusted,
