@@ -6,8 +6,7 @@
 #' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for each, how the chains
 #' move and how often. Then all is frozen and fresh, independent groups of chains give the estimate: unbiased, with an
 #' interval by bootstrap over the groups. A second estimator (an importance sample from a Student-t mixture fitted to
-#' the draws or, where none comes close, annealing from that mixture) must agree, and is reported where it is the more
-#' precise one. Groups or draws are added until the standard error is at most `precision`.
+#' the draws or, where none comes close, annealing from that mixture) must not lie above the one reported. Groups or draws are added until the standard error is at most `precision`.
 #'
 #' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
 #'   log-likelihood of each point; `-Inf` where it is zero.
@@ -21,8 +20,8 @@
 #'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned
 #'     records of [calibrate_paper()] 1; 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
-#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()] along the parameters,
-#'     where they follow a posterior that is curved at up to twice the cost). [ais()] makes them if it is given one;
+#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()] along the
+#'   parameters: they follow a curved posterior, at up to twice the cost). [ais()] makes them if it is given one;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
 #'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95

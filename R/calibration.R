@@ -17,7 +17,7 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #' the runs differ by much more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a free
 #' discrepancy says that the model is wrong where its parameters could hide it.
 #'
-#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior.
+#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior, or at `exact` if these are more.
 #' The emulator's error there, over the measurement error as the likelihood weighs it (autocorrelated as it was seen; if
 #' more was seen than stated, over the noise stated), is the check that counts: above a third, neither the posterior nor
 #' the evidence is trusted ([calibrate_refined()] then makes an emulator for the region and tries again). The

@@ -66,7 +66,7 @@ check_by_left_out <- function(fit) {
   error <- tcrossprod(fit$emulator$basis$vectors, loo$error[near, , drop = FALSE])
   error <- sqrt(error^2 + fit$emulator$basis$discarded_sd^2)
   new_check(fit, error, series_variance(fit$emulator$basis, loo$variance[near, , drop = FALSE]), 0,
-            "runs left out, those nearest to the posterior")
+            "left-out runs nearest to the posterior")
 }
 
 new_check <- function(fit, error, variance, failed, by, mean = NULL) {

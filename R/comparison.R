@@ -7,7 +7,7 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' Every model is simulated on one design seed, trained and calibrated on the same record. What comes out is the
 #' evidence with its interval, Bayes factors in the words of the paper's table 1, posterior probabilities (equal ones
 #' beforehand), what each model's discrepancy answers to, and its parameters. Beside them stand the criteria by which
-#' models are chosen today, so that one sees where they mislead.
+#' models are chosen in practice, so that one sees where they mislead.
 #'
 #' *The criteria.* The root mean squared error is that of the simulation averaged over the posterior, in calibration and
 #' on held-out rows. Likelihood, AIC, BIC and likelihood ratio are taken where the simulator itself (not its emulator)
@@ -32,8 +32,8 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`, `attribution`, `prediction`,
 #'   `scores`, `best` (the least-squares parameters) and, of a [zone()], draws of its `heat_loss` coefficient), and the
 #'   tables that `tidy()` gives:
-#'   * `"evidence"`: `log10_evidence` with its interval, `trusted`, `log10_bf` against the model that is next best, with
-#'     its interval and `word`, `log10_bf_first` against the first model of the list, posterior `probability`, and
+#'   * `"evidence"`: `log10_evidence` with its interval, `trusted`, `log10_bf` of the best model against
+#'   the second, of every other against the one ranked above it, with its interval and `word`, `log10_bf_first` against the first model of the list, posterior `probability`, and
 #'     `rank`;
 #'   * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`, `aic`, `bic`, `nested`,
 #'     `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`;

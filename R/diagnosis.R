@@ -54,7 +54,7 @@ print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   say_parts(parts)
 })
 
-# The first step's trials, best first, and the probability that is left to no change.
+# The first step's trials, best first.
 first_trials <- function(upgrade) {
   table <- upgrade$candidates[upgrade$candidates$from == upgrade$models[[1]]$name, ]
   table[order(-table$log10_bf), ]
@@ -116,8 +116,8 @@ cause_headline <- function(upgrade) {
     m <- adopted[[k]]
     switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
            likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
-           paste0("\"", m$mechanism,
-                  "\" fits too, but data held out do not gain by it: take it as a stand-in for something else."))
+           paste0("\"", m$mechanism, "\" fits", if (k > 1) " too",
+                  ", but data held out do not gain by it: take it as a stand-in for something else."))
   }, "")
   paste(told, collapse = " ")
 }
@@ -133,10 +133,10 @@ evidence_sentence <- function(row) {
           odds_interval(c(row$lower95, row$upper95)))
 }
 
-# Left out where both ends read the same.
+# Left out where both ends read the same and lie on one side.
 odds_interval <- function(interval) {
   ends <- power_of_ten(abs(interval))
-  if (ends[1] == ends[2]) return("")
+  if (ends[1] == ends[2] && prod(interval) >= 0) return("")
   told <- if (interval[1] >= 0) paste(ends, collapse = " to ")
   else if (interval[2] <= 0) paste(paste(rev(ends), collapse = " to "), "to 1 against")
   else paste(ends[1], "to 1 against, to", ends[2], "to 1 in favour")
@@ -148,8 +148,8 @@ sure_sentences <- function(upgrade) {
   trials <- first_trials(upgrade)
   best <- trials[1, ]
   needed <-
-    sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that leaves no",
-                  "doubt who gains."),
+    sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that lies",
+                  "wholly in its favour."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted_models(upgrade))) {
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
@@ -187,7 +187,7 @@ trust_sentence <- function(upgrade, best) {
   if (base$trusted && best$trusted) return("The numbers behind this can be trusted: the sampler passed its own checks.")
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
   why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
-  sprintf("The numbers are rough for %s%s: read the odds as an order of size. %s", listed(who), why,
+  sprintf("The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
           if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
           else "The decision may hang on it: more runs or chains would settle it.")
 }
@@ -259,18 +259,19 @@ step_sentence <- function(upgrade, model) {
   told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
   gain <- model$held_out_gain
   sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
-          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s the uncertainty of that change",
-                                                    told("validate"),
-                                                    if (gain$improves) "more than" else "not more than"))
+          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s", told("validate"),
+                                                    if (gain$improves) "a gain beyond its uncertainty"
+                                                    else if (gain$mean > 0) "a gain within its uncertainty"
+                                                    else "no gain"))
 }
 
 doubt_sentence <- function(model) {
-  if (length(model$doubts)) sprintf("Against %s speaks that %s.", model$mechanism, listed(model$doubts))
+  if (length(model$doubts)) sprintf("Against %s: %s.", model$mechanism, listed(model$doubts))
 }
 
 confounded_sentence <- function(model) {
   if (length(model$confounded_with)) {
-    sprintf("What %s does, %s could do in part as well (correlated beyond 0.4).", model$mechanism,
+    sprintf("A part of what %s does could also be done by %s (correlation beyond 0.4).", model$mechanism,
             listed(parameter_labels(model$fit, model$confounded_with)))
   }
 }

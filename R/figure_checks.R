@@ -11,7 +11,7 @@ check_words <- function(fits) {
   checks <- Filter(Negate(is.null), lapply(fits, `[[`, "check"))
   ratio <- vapply(checks, `[[`, 0, "ratio")
   if (!length(ratio)) return("The emulator was not checked by runs")
-  sprintf("In runs at the posterior the emulator's error is %s of the noise: %s", listed(unique(short(ratio))),
+  sprintf("Where the posterior lies, the emulator's error is %s of the noise: %s", listed(unique(short(ratio))),
           if (all(ratio <= largest_error_ratio)) "good enough" else "too much, more runs are needed")
 }
 
@@ -65,9 +65,9 @@ figure_sampler <- function(results) {
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, labeller = wrap_strips(2)) +
     stage_scales() + stage_lines() +
     figure_titles(title,
-                  paste("From the prior (0) to the posterior (1). Low values: chains that stand still, or few that",
+                  paste("From where the chains start (0) to the posterior (1). Low values: chains that stand still, or few that",
                                "carry the weight; more chains or moves would help.",
-                               estimate_words(results)), x = "weight of the measurements") +
+                               estimate_words(results)), x = "inverse temperature") +
     figure_theme()
   with_height(figure, 4.8)
 }

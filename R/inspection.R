@@ -17,7 +17,7 @@ upgrade_inspections <- function(upgrade) {
             edge_inspections(last$fit),
             remainder_inspection(last, upgrade$measurements),
             if (grepl("^the limit of", upgrade$stopped_because)) {
-              c(steps = "Further causes were not looked for: raise control$max_steps and go on from here.")
+              c(steps = "Further causes were not looked for: raise control$max_steps and run the loop again.")
             })
   if (length(told)) told
   else c(nothing = paste("Nothing that this record could settle is open. The next test is a record of another",
@@ -184,11 +184,11 @@ nearest_inspection <- function(upgrade) {
   best <- trials[which.max(trials$log10_bf), ]
   if (best$probability < rival_probability || best$log10_bf < 0.5) return(NULL)
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
-  c(nearest = sprintf(paste("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it,",
-                            "or a look for %s on site."),
+  new <- best$parameters[[1]]
+  c(nearest = sprintf("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it%s.",
                       best$mechanism, odds(best$log10_bf),
                       paste(listed(drivers), if (length(drivers) > 1) "change" else "changes"),
-                      called_for(best$parameters[[1]])))
+                      if (NROW(new)) sprintf(", or a look for %s on site", called_for(new)) else ""))
 }
 
 group_inspections <- function(attribution) {
@@ -210,8 +210,8 @@ answer_inspections <- function(upgrade, last) {
   told <- vapply(answers, function(name) {
     driven <- left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
     if (length(driven)) {
-      sprintf(paste("The error still answers to %s, and of what it drives %s %s tried but not adopted: look for",
-                    "another way in which %s acts."),
+      sprintf(paste("The error still answers to %s. Of the mechanisms that it drives, %s %s tried but not adopted:",
+                    "look for another way in which %s acts."),
               name, listed(driven), if (length(driven) > 1) "were" else "was", name)
     } else {
       sprintf(paste("The error still answers to %s, and no mechanism left in the catalogue is driven by it: think",
@@ -281,7 +281,7 @@ remainder_inspection <- function(model, measurements) {
                              short(left$ratio), noise)))
   }
   if (left$large) {
-    return(c(pattern = sprintf("In the error that remains, %s. %s", left$pattern$what, left$pattern$where)))
+    return(c(pattern = sprintf("The error that remains has a pattern: %s. %s", left$pattern$what, left$pattern$where)))
   }
   if (left$ratio < 0.6) {
     c(noise = sprintf(paste("The remaining error is only %s times the stated noise of %s: if the sensor is that",

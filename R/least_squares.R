@@ -1,4 +1,4 @@
-# What is done today: the parameters of least squared error, found with the simulator itself, and the criteria that
+# What practice does: the parameters of least squared error, found with the simulator itself, and the criteria that
 # follow from the likelihood there. Errors count as independent and normal, with one unknown variance, so that
 #     l = -n/2 (log(2 pi RSS / n) + 1),  AIC = 2k - 2l,  BIC = k log n - 2l,  k = parameters + 1,
 # as logLik() and AIC() of lm() have it.

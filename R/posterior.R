@@ -172,7 +172,7 @@ equal_draws <- function(fit, n, call = rlang::caller_env()) {
   fit$values[even_draws(fit, n)[with_seed(fit$seed, sample.int(n))], , drop = FALSE]
 }
 
-# Parameters of a calibration with their priors; `at_edge` where the median lies in the outer 5 % of the prior.
+# Parameters of a calibration with their priors; `at_edge` as edge_of_prior() has it.
 parameter_rows <- function(fit) {
   table <- parameter_table(fit)
   declared <- fit$emulator$parameters[table$name]
@@ -184,8 +184,8 @@ parameter_rows <- function(fit) {
         at_edge = unname(edge_of_prior(fit)[table$name]))
 }
 
-# TRUE for each parameter whose 95 % interval touches an end of its prior (in probability, within 1 %), where the prior
-# ends abruptly.
+# TRUE for each parameter whose 95 % interval comes within 1 % (in probability) of an end of its prior, with its median
+# in the outer tenth at that end.
 edge_of_prior <- function(fit) {
   unit <- posterior_unit(fit)
   stats::setNames(vapply(seq_len(ncol(unit)), function(p) {

@@ -25,7 +25,7 @@ calibration_words <- function(fit, only) {
        sure = c(sprintf("Sampler: %s.", sampler_said(fit)$verdict),
                 if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
        gain = gain_sentences(only),
-       remains = c(if (!is.null(left$pattern)) sprintf("In the error that remains, %s.", left$pattern$what),
+       remains = c(if (!is.null(left$pattern)) sprintf("The error that remains has a pattern: %s.", left$pattern$what),
                    if (!is.null(fit$reach)) sub("^(.)(.*)$", "\\U\\1\\E\\2.", reach_words(fit), perl = TRUE),
                    if (length(edge)) sprintf("At the edge of what was thought possible: %s.", listed(edge))
                    else "No parameter is at the edge of its range."),

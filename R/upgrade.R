@@ -17,9 +17,9 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the
 #' parameters, two thirds of all, and compared with the present model calibrated in the same way; then in full, with the
-#' other runs made where the coarse posterior lies ([refine_ensemble()]) and the emulator checked by runs of the
-#' simulator and refined ([calibrate_refined()]), those that could come within `margin` of the best, if any could come
-#' within `margin` of being decisive: the coarse evidence is taken as uncertain by three standard errors and, if
+#' other runs made where the coarse posterior lies ([refine_ensemble()]; none where the coarse calibration was refined
+#' there already) and the emulator checked by runs of the simulator and refined ([calibrate_refined()]), those that could
+#' come within `margin` both of the best and of being decisive: the coarse evidence is taken as uncertain by three standard errors and, if
 #' `screening` asks for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their
 #' coarse Bayes factor; `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those calibrated in
 #' full.
@@ -312,8 +312,8 @@ added_parameters <- function(fit, parent) {
 stop_reason <- function(table, attribution, decisive) {
   significant <- significant_conditions(attribution$table)
   best <- which.max(table$log10_bf)
-  tail <- sprintf("no mechanism is decisive (best: %s, log10 Bayes factor %.1f, %.0f needed)", table$mechanism[best],
-                  table$log10_bf[best], decisive)
+  tail <- sprintf(paste("no mechanism is decisive (best: %s, log10 Bayes factor %.1f; %s or more and an interval above",
+                        "zero are needed)"), table$mechanism[best], table$log10_bf[best], format(decisive))
   if (length(significant)) paste0(tail, "; what answers to ", paste(significant, collapse = ", "),
                                   " remains unexplained") else paste0(tail, " and no boundary condition is significant")
 }

@@ -46,7 +46,7 @@ test_that("each doubt makes a mechanism likely", {
     u$models[[2]]$scores$calibrate[["rmse"]] <- 1.03 * u$models[[1]]$scores$calibrate[["rmse"]]
     u
   })
-  expect_doubt("what drives it is still answered to", function(u) {
+  expect_doubt("the error still answers to what drives it", function(u) {
     u$models[[2]]$attribution <- u$models[[1]]$attribution
     u
   })

@@ -33,8 +33,8 @@ struct Attribution {
 /// (Savage and Dickey). Where too few draws have it off, the posterior is sampled again without it.
 ///
 /// Conditions that say the same hide one another: each can be dropped alone. Among those that are dropped
-/// alone without harm the smallest set is sought that cannot be dropped together: a group. As many groups as
-/// there are, each from the conditions that the groups before it have left.
+/// alone without harm a set is sought that cannot be dropped together, nor be made smaller: a group. As many
+/// groups as there are, each from the conditions that the groups before it have left.
 Attribution attribute(const HistoryModel& model, const Emulator& emulator, const Calibration& calibration,
                       const AttributionOptions& options, const Context& context);
 
