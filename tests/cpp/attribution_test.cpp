@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -15,7 +14,6 @@ namespace {
 using namespace test;
 
 constexpr Index kN = 120;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // AR(1) series with coefficient 0.8.
 VectorXd autocorrelated(Index n, unsigned seed) {

@@ -1,10 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 
-#include "engine/ais/StandardNormal.hpp"
 #include "engine/calibration/Calibration.hpp"
 #include "engine/calibration/ParameterModes.hpp"
 #include "engine/calibration/ResponseEvidence.hpp"
@@ -19,7 +17,7 @@ namespace {
 using namespace test;
 
 constexpr Index kN = 30;
-constexpr double kNoise = 0.9, kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNoise = 0.9;
 
 // Two coefficients of very different size, smooth in the parameters; hyper-parameters as given.
 Emulator make_emulator(Index n_inputs, double log_nugget = -5.0) {
@@ -196,21 +194,6 @@ TEST(ConditionsBut, AreAllOthers) {
   EXPECT_EQ(conditions_but(model, {}), (std::vector<int>{0, 1}));
   EXPECT_EQ(conditions_but(model, {0}), (std::vector<int>{1}));
   EXPECT_TRUE(conditions_but(model, {1, 0}).empty());
-}
-
-// Log evidence of a target of two coordinates: trapezoidal rule over prior times likelihood, accurate to
-// rounding for a smooth integrand.
-double evidence_by_quadrature(const CalibrationTarget& target) {
-  const int m = 400;
-  const double h = 16.0 / m;
-  VectorXd log_terms((m + 1) * (m + 1));
-  MatrixXd row(2, m + 1);
-  for (int i = 0; i <= m; ++i) {
-    for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
-    const VectorXd ll = target.log_likelihood(row);
-    for (int j = 0; j <= m; ++j) log_terms[i * (m + 1) + j] = ll[j] + StandardNormal::at(row.col(j))[0];
-  }
-  return log_sum_exp(log_terms) + 2.0 * std::log(h);
 }
 
 void expect_likelihoods_of(const CalibrationTarget& target, const AisResult& result) {
