@@ -1,15 +1,11 @@
 #pragma once
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "engine/ais/Sampler.hpp"
 #include "helpers.hpp"
 
 namespace amiss {
 namespace test {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 inline Context seeded(std::uint64_t seed, int threads = 1) {
   Context context;

@@ -2,13 +2,16 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
 #include <vector>
 
+#include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/Target.hpp"
 #include "engine/error/ErrorModel.hpp"
 #include "engine/linalg/Eigen.hpp"
 #include "engine/linalg/constants.hpp"
+#include "engine/linalg/log_sum_exp.hpp"
 
 /// Independent, dense and slow computations that the tests compare the engine with.
 namespace amiss::test {
@@ -16,6 +19,8 @@ namespace amiss::test {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Standard normal numbers that do not come from the engine's own streams.
 inline MatrixXd normal_matrix(Index rows, Index columns, unsigned seed) {
@@ -118,5 +123,19 @@ class FunctionTarget : public Target {
   Index dimension_;
   std::function<double(const VectorXd&)> f_;
 };
+
+/// Log evidence of a target of two coordinates: trapezoidal rule over prior times likelihood, accurate to
+/// rounding for a smooth integrand.
+inline double evidence_by_quadrature(const Target& target) {
+  const int m = 400;
+  const double h = 16.0 / m;
+  VectorXd log_terms((m + 1) * (m + 1));
+  MatrixXd row(2, m + 1);
+  for (int i = 0; i <= m; ++i) {
+    for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
+    log_terms.segment(i * (m + 1), m + 1) = target.log_likelihood(row) + StandardNormal::at(row);
+  }
+  return log_sum_exp(log_terms) + 2.0 * std::log(h);
+}
 
 }  // namespace amiss::test

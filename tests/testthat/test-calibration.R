@@ -1,10 +1,22 @@
+# The calibration of the linear world, made once for this file.
+plain <- new.env()
+
+plain_fit <- function() {
+  if (is.null(plain$fit)) plain$fit <- linear_fit()
+  plain$fit
+}
+
 test_that("calibration finds the parameters and says so", {
-  fit <- linear_fit()
+  fit <- plain_fit()
   table <- tidy(fit)
+  expect_equal(table$term, c("offset", "gain"))
   expect_true(all(table$conf.low < c(20, 0.4) & table$conf.high > c(20, 0.4)))
   expect_true(fit$trust$trusted)
   expect_equal(sd(residuals(fit)), 0.1, tolerance = 0.15)  # of 240 values: standard error 5 %
 })
+
+# Of each fit, in decades.
+decades <- function(fits, of) vapply(fits, of, 0) / log(10)
 
 test_that("the evidence does not hang on the number of basis vectors", {
   m <- bent_measurements()
@@ -15,33 +27,39 @@ test_that("the evidence does not hang on the number of basis vectors", {
   })
   # Three vectors leave out a sixth of the noise, four next to nothing. What is left is the sampler's error,
   # 0.02 decades; 0.3 is a third of what changes a word. A split of the record at these vectors moved it by decades.
-  own <- function(of) vapply(fits, of, 0) / log(10)
-  expect_lt(diff(range(own(function(f) f$log_evidence))), 0.3)
-  expect_lt(diff(range(own(function(f) f$posterior$log_evidence))), 0.3)
-  expect_lt(max(own(function(f) f$standard_error)), 0.05)
-  # A linear simulator has two vectors; what the others hold is rounding.
+  expect_lt(diff(range(decades(fits, function(f) f$log_evidence))), 0.3)
+  expect_lt(diff(range(decades(fits, function(f) f$posterior$log_evidence))), 0.3)
+  expect_lt(max(decades(fits, function(f) f$standard_error)), 0.05)
+})
+
+# A linear simulator has two vectors; what the others hold is rounding.
+test_that("basis vectors of rounding leave the evidence as it is", {
   linear <- simulate_design(linear_simulator(), linear_measurements(), runs = 30, seed = 3)
   fits <- lapply(c(2, 8), function(q) {
     emulator <- train_emulator(linear, linear_measurements(),
                                list(max_vectors = q, explained = 1, noise_fraction = 1e-9))
     calibrate(emulator, linear_measurements(), quick_ais, seed = 3)
   })
-  expect_lt(diff(range(own(function(f) f$log_evidence))), 0.3)
+  expect_lt(diff(range(decades(fits, function(f) f$log_evidence))), 0.3)
 })
 
 test_that("the reach is a distribution over the numbers given", {
-  fit <- linear_fit()
+  fit <- plain_fit()
   expect_named(fit$reach, c("13", "300", "Inf"))
   expect_equal(sum(fit$reach), 1)
   # Nothing lacks, so that nothing is said of where it is.
   expect_true(all(abs(fit$reach - 1 / 3) < 0.1))
   expect_match(printed(fit), "stays open")
-  emulator <- fit$emulator
-  free <- calibrate(emulator, fit$measurements, c(quick_ais, list(reach = Inf)), seed = 3)
+})
+
+test_that("a single reach is taken and said", {
+  at_reach <- function(reach) {
+    calibrate(plain_fit()$emulator, plain_fit()$measurements, c(quick_ais, list(reach = reach)), seed = 3)
+  }
+  free <- at_reach(Inf)
   expect_equal(free$reach, c("Inf" = 1))
   expect_match(printed(free), "the discrepancy is free")
-  held <- calibrate(emulator, fit$measurements, c(quick_ais, list(reach = 13)), seed = 3)
-  expect_match(printed(held), "held at 13")
+  expect_match(printed(at_reach(13)), "held at 13")
 })
 
 test_that("a model that is wrong where its parameters could hide it has a free discrepancy", {
@@ -65,11 +83,12 @@ test_that("the reach has the probabilities that separate calibrations give it", 
   expected <- exp(of_each - max(of_each)) / sum(exp(of_each - max(of_each)))
   # Four standard errors of the evidences, and of shares of the effective draws.
   error <- sqrt(expected * (1 - expected) / fit$posterior$ess + (2 * expected * (1 - expected) * max(se))^2)
+  expect_length(expected, 3)
   expect_true(all(abs(fit$reach - expected) < 4 * error + 1e-3))
 })
 
 test_that("what the reach says is put into words", {
-  fit <- linear_fit()
+  fit <- plain_fit()
   fit$reach[] <- c(0.9, 0.08, 0.02)
   expect_match(printed(fit), "keeps out of what the parameters can do .probability 0.98.")
 })
@@ -96,34 +115,34 @@ test_that("validation rows are never touched by calibration", {
 
 test_that("the evidence does not depend on the unit of a boundary condition", {
   data <- linear_data()
-  a <- linear_fit(linear_measurements(data))
-  other <- data
-  other$Gv <- other$Gv / 1000
-  expect_equal(linear_fit(linear_measurements(other))$log_evidence, a$log_evidence, tolerance = 1e-6)
+  data$Gv <- data$Gv / 1000
+  expect_equal(linear_fit(linear_measurements(data))$log_evidence, plain_fit()$log_evidence, tolerance = 1e-6)
 })
 
-test_that("the unit of the basis and the order of the conditions do not matter", {
-  m <- linear_measurements()
-  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
-  fit <- calibrate(emulator, m, quick_ais, seed = 3)
+test_that("the unit of the basis does not matter", {
+  fit <- plain_fit()
   # Powers of two round nothing; what other factors change in the last digit, chains amplify (test-paper.R), but to far
   # less than the standard error, 0.05.
   for (factor in c(2^10, 2^-10, 1000)) {
-    other <- calibrate(rescaled(emulator, factor), m, quick_ais, seed = 3)
+    other <- calibrate(rescaled(fit$emulator, factor), fit$measurements, quick_ais, seed = 3)
     expect_lt(abs(other$log_evidence - fit$log_evidence), if (factor == 1000) 5e-3 else 1e-8)
     expect_lt(abs(other$posterior$log_evidence - fit$posterior$log_evidence), if (factor == 1000) 5e-3 else 1e-8)
     expect_equal(other$reach, fit$reach, tolerance = if (factor == 1000) 1e-2 else 1e-8)
     expect_equal(coef(other), coef(fit), tolerance = if (factor == 1000) 1e-3 else 1e-8)
   }
-  # Another order gives each condition other random numbers: the likelihood is the same (tests/cpp), the evidence within
-  # its error.
-  turned <- calibrate(emulator, linear_measurements(boundary = ~ Gv + Te), quick_ais, seed = 3)
+})
+
+# Another order gives each condition other random numbers: the likelihood is the same (tests/cpp), the evidence within
+# its error.
+test_that("the order of the conditions does not matter", {
+  fit <- plain_fit()
+  turned <- calibrate(fit$emulator, linear_measurements(boundary = ~ Gv + Te), quick_ais, seed = 3)
   expect_lt(abs(turned$log_evidence - fit$log_evidence), 4 * sqrt(turned$standard_error^2 + fit$standard_error^2))
 })
 
 test_that("options are checked", {
-  m <- linear_measurements()
-  emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
+  m <- plain_fit()$measurements
+  emulator <- plain_fit()$emulator
   expect_error(calibrate(emulator, m, list(chains = 3)), "unknown option", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1), "control\\$ais\\$chains` = 1 cannot",
                class = "amiss_error_input")
@@ -133,8 +152,11 @@ test_that("options are checked", {
   expect_error(calibrate(emulator, m, list(reach = c(13, 13))), "reach", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(check = -1)), "control\\$check", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(exact = 0.5)), "control\\$exact", class = "amiss_error_input")
+})
+
+test_that("an emulator of another record is refused", {
   shorter <- linear_measurements(linear_data()[1:100, ])
-  expect_error(calibrate(emulator, shorter), "240 steps.*100", class = "amiss_error_input")
+  expect_error(calibrate(plain_fit()$emulator, shorter), "240 steps.*100", class = "amiss_error_input")
 })
 
 test_that("a record with no more rows than the basis has vectors is refused", {
@@ -152,10 +174,13 @@ test_that("a record with no more rows than the basis has vectors is refused", {
 })
 
 test_that("a Bayes factor needs one record", {
-  a <- linear_fit()
+  a <- plain_fit()
   b <- linear_fit(linear_measurements(linear_data(seed = 12)))
   expect_error(bayes_factor(a, b), "different records", class = "amiss_error_input")
   expect_equal(bayes_factor(a, a)$log10_bf, 0)
+})
+
+test_that("evidence is put into words by the interval that it lies in", {
   expect_equal(amiss:::evidence_word(c(-1, 0.2, 0.7, 1.5, 3), rep(8, 5)),
                c("undecided", "weak", "substantial", "strong", "decisive"))
   expect_equal(amiss:::evidence_word(-3, -1), "negative")

@@ -1,130 +1,28 @@
 #include <gtest/gtest.h>
 
-#include <boost/math/distributions/cauchy.hpp>
-#include <boost/math/distributions/gamma.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <limits>
 #include <stdexcept>
 
-#include "engine/ais/Sampler.hpp"
-#include "engine/discrepancy/FilterBank.hpp"
-#include "engine/discrepancy/HistoryTarget.hpp"
-#include "engine/linalg/log_sum_exp.hpp"
-#include "helpers.hpp"
+#include "engine/discrepancy/HistoryModel.hpp"
+#include "history_helpers.hpp"
 
 namespace amiss {
 namespace {
 
 using namespace test;
 
-constexpr Index kN = 40, kQ = 3;
-constexpr double kNoise = 0.7, kInfinity = std::numeric_limits<double>::infinity();
-const VectorXd kTimes = Eigen::Vector2d(0.6, 4.0);
-
-// Columns of the basis of sizes 1 to 5000; the simulator moves by |K L| between 2 and 40, which the reaches
-// below take for much, little or nothing.
-HistoryData make_data() {
-  HistoryData data;
-  data.axis = uneven_axis(kN, {22});
-  data.basis = normal_matrix(kN, kQ, 41);
-  data.basis.col(0) *= 5000.0;
-  data.basis.col(2).setOnes();
-  data.moves = data.basis * (Eigen::Vector3d(1e-3, 0.4, 2.0).asDiagonal() * normal_matrix(kQ, 2, 49));
-  data.responses = 3.0 * normal_matrix(kN, 5, 42);
-  data.responses.col(1).array() += 10.0;
-  data.condition = {0, 0, 1, 2, 2};
-  data.y =
-      data.basis * Eigen::Vector3d(0.002, 1.0, 20.0) + 0.4 * data.responses.col(2) + normal_vector(kN, 43);
-  return data;
-}
-
-HistoryPriors make_priors() {
-  HistoryPriors priors;
-  priors.noise_sd = kNoise;
-  priors.noise_shape = 5.0;
-  priors.amplitude = 1.4;
-  priors.error = {kTimes, Eigen::Vector3d(0.0, 0.5, 3.0)};
-  priors.reach = {0.5, 60.0, kInfinity};
-  return priors;
-}
-
-HistoryModel make_model(const HistoryData& data = make_data()) {
-  return HistoryModel(data, make_priors(), Context());
-}
-
-constexpr int kSettings = 27;  // nine errors for each of three reaches
 const VectorXd kT = Eigen::Vector3d(0.8, 2.5, 0.1);
 constexpr double kVariance = 0.6;
-const VectorXd kMean = Eigen::Vector3d(0.0015, 1.1, 19.0), kSpread = Eigen::Vector3d(1e-7, 0.4, 0.0);
 
 HistoryParameters at(int setting, const VectorXd& t = kT) { return {setting, kVariance, t}; }
-
-// Columns centred and scaled to unit population variance.
-MatrixXd standardised(const HistoryData& data) {
-  MatrixXd phi = data.responses.rowwise() - data.responses.colwise().mean();
-  for (Index j = 0; j < phi.cols(); ++j) phi.col(j) *= std::sqrt(kN / phi.col(j).squaredNorm());
-  return phi;
-}
-
-// (I + (E E' / (kappa sigma_0^2))^2)^-1 phi, E = K L, with N x N matrices. Its condition is 1e8: in double
-// precision this side would be the less accurate one.
-MatrixXd out_of_reach(const HistoryData& data, double reach, const MatrixXd& phi) {
-  if (std::isinf(reach)) return phi;
-  using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-  const LongMatrix moves = data.moves.cast<long double>();
-  const LongMatrix a = moves * moves.transpose() / static_cast<long double>(reach * kNoise * kNoise);
-  const LongMatrix inverted = LongMatrix::Identity(kN, kN) + a * a;
-  return inverted.ldlt().solve(phi.cast<long double>()).cast<double>();
-}
-
-MatrixXd dense_psi(const HistoryData& data, int setting) {
-  return out_of_reach(data, make_priors().reach[static_cast<std::size_t>(setting / 9)], standardised(data));
-}
-
-// Variances t_s / p_s of the coefficients of the filter columns.
-VectorXd prior_variances(const HistoryData& data, const VectorXd& t) {
-  VectorXd variances(data.responses.cols());
-  for (Index j = 0; j < variances.size(); ++j) {
-    const int s = data.condition[static_cast<std::size_t>(j)];
-    variances[j] = t[s] / static_cast<double>(std::count(data.condition.begin(), data.condition.end(), s));
-  }
-  return variances;
-}
-
-// Of error and discrepancy.
-MatrixXd dense_covariance(const HistoryData& data, const HistoryParameters& p) {
-  const MatrixXd psi = dense_psi(data, p.setting);
-  return p.variance * error_covariance(data.axis, kTimes, make_priors().error.setting(p.setting % 9)) +
-         psi * prior_variances(data, p.t).asDiagonal() * psi.transpose();
-}
-
-// log density of y for coefficients N(mean, covariance).
-double dense_density(const HistoryData& data, const HistoryParameters& p, const VectorXd& mean,
-                     const MatrixXd& covariance) {
-  return log_normal_density(data.y, data.basis * mean,
-                            dense_covariance(data, p) + data.basis * covariance * data.basis.transpose());
-}
-
-double dense_density(const HistoryData& data, const HistoryParameters& p) {
-  return dense_density(data, p, kMean, kSpread.asDiagonal());
-}
 
 double log_likelihood(const HistoryModel& model, const HistoryParameters& p) {
   return model.log_likelihood(p, kMean, kSpread);
 }
 
-// A covariance of coefficients that are far from independent.
-GaussianSimulator make_simulator() {
-  return {kMean, Eigen::Vector3d(3e-4, 0.6, 0.3).asDiagonal() * normal_matrix(kQ, 2, 48)};
-}
-
 WhitenedData seen_by(const HistoryModel& model, int setting, const GaussianSimulator& simulator) {
   return model.whitened(setting).in_terms_of(simulator.mean - model.reference(), simulator.root);
 }
-
-// The densities here lie between -40 and -200; 1e-8 is what rounding in covariances with eigenvalues from 0.1
-// to 1e5 leaves of them.
-constexpr double kRounding = 1e-8;
 
 TEST(HistoryModel, LikelihoodIsTheDenseNormalDensityOfTheMeasurement) {
   const HistoryData data = make_data();
@@ -500,196 +398,6 @@ TEST(HistoryModel, RefusesPriorsWithoutMeaning) {
   refuses([](HistoryPriors& priors) { priors.reach = {}; });
   refuses([](HistoryPriors& priors) { priors.reach = {1.0, 0.0}; });
   refuses([](HistoryPriors& priors) { priors.reach = {std::numeric_limits<double>::quiet_NaN()}; });
-}
-
-TEST(HistoryCoordinates, MapToThePriorsQuantiles) {
-  HistoryPriors priors = make_priors();
-  priors.discarded_variance = 0.03;
-  const HistoryModel model(make_data(), priors, Context());
-  const HistoryCoordinates coordinates(model, {0, 2});
-  ASSERT_EQ(coordinates.dimension(), 1 + 2 + 1 + 2);
-  // lambda* ~ Gamma(a*, rate a* sd^2); sqrt(t) ~ half-Cauchy(amplitude).
-  const boost::math::gamma_distribution<> precision(
-      priors.noise_shape, 1 / (priors.noise_shape * priors.noise_sd * priors.noise_sd));
-  const boost::math::cauchy cauchy(0.0, priors.amplitude);
-  const boost::math::normal normal;
-  for (double u : {0.03, 0.5, 0.9, 0.99}) {
-    const HistoryParameters point = coordinates.parameters(VectorXd::Constant(6, quantile(normal, u)));
-    EXPECT_NEAR(cdf(precision, 1.0 / (point.variance - 0.03)), u, 1e-9);  // iterations of the quantile
-    // With probability 1 - inclusion t = 0; else the half-Cauchy distribution.
-    const double in_slab = (u - (1 - priors.inclusion)) / priors.inclusion;
-    for (int s : {0, 2})
-      EXPECT_NEAR(2 * cdf(cauchy, std::sqrt(point.t[s])) - 1, std::max(0.0, in_slab), 1e-9) << s;
-    EXPECT_EQ(point.t[1], 0.0);
-  }
-  // The likelihood is continuous where the slab begins: t rises from zero.
-  const double edge = quantile(normal, 1 - priors.inclusion);
-  EXPECT_LT(coordinates.parameters(VectorXd::Constant(6, edge + 1e-6)).t[0], 1e-8);
-}
-
-TEST(HistoryCoordinates, ErrorComponentsAndReachChooseTheirOwnLevels) {
-  const HistoryModel model = make_model();
-  const HistoryCoordinates coordinates(model, {});
-  const double third[] = {-1.0, 0.0, 1.0};  // within the lower, middle and upper third of N(0, 1)
-  const HistoryPriors priors = make_priors();
-  const VectorXd& ratios = priors.error.ratios;
-  for (int a = 0; a < 3; ++a) {
-    for (int b = 0; b < 3; ++b) {
-      for (int k = 0; k < 3; ++k) {
-        const int setting =
-            coordinates.parameters(Eigen::Vector4d(0.2, third[a], third[b], third[k])).setting;
-        EXPECT_EQ(priors.error.setting(model.error_of(setting)), Eigen::Vector2d(ratios[a], ratios[b]));
-        EXPECT_EQ(model.reach_of(setting), priors.reach[static_cast<std::size_t>(k)]);
-      }
-    }
-  }
-  // Phi rounds to 1.
-  EXPECT_EQ(coordinates.parameters(Eigen::Vector4d(0.0, 40.0, 40.0, 40.0)).setting, kSettings - 1);
-}
-
-TEST(HistoryCoordinates, OneReachHasNoCoordinate) {
-  HistoryPriors priors = make_priors();
-  priors.reach = {60.0};
-  const HistoryModel model(make_data(), priors, Context());
-  EXPECT_EQ(HistoryCoordinates(model, {1}).dimension(), 1 + 2 + 1);
-}
-
-TEST(HistoryTarget, LikelihoodIsTheDenseOneAtTheMappedPoint) {
-  const HistoryData data = make_data();
-  const HistoryModel model = make_model(data);
-  const GaussianSimulator simulator = make_simulator();
-  const HistoryTarget target(model, {1}, simulator);
-  const MatrixXd x = normal_matrix(target.dimension(), 6, 44);
-  const VectorXd values = target.log_likelihood(x);
-  for (Index i = 0; i < x.cols(); ++i)
-    EXPECT_NEAR(values[i],
-                dense_density(data, target.parameters(x.col(i)), simulator.mean,
-                              simulator.root * simulator.root.transpose()),
-                kRounding * (1 + std::abs(values[i])));
-}
-
-TEST(HistoryTarget, GradientIsTheDerivative) {
-  HistoryPriors priors = make_priors();
-  priors.discarded_variance = 0.2;  // some of the noise, so that its part in the variance is seen
-  const HistoryModel model(make_data(), priors, Context());
-  const HistoryTarget target(model, {0, 2}, make_simulator());
-  const Index d = target.dimension();
-  for (unsigned seed = 1; seed <= 6; ++seed) {
-    // The first condition in its slab, the second in the slab or the spike; away from the jumps of the grid.
-    VectorXd x = 0.7 * normal_vector(d, 90 + seed);
-    x[d - 2] = 1.2 + 0.1 * seed;
-    MatrixXd gradient;
-    const VectorXd value = target.log_likelihood(x, gradient);
-    EXPECT_DOUBLE_EQ(value[0], target.log_likelihood(MatrixXd(x))[0]);
-    const VectorXd expected =
-        numerical_gradient([&](const VectorXd& v) { return target.log_likelihood(MatrixXd(v))[0]; }, x, 1e-6);
-    // Differences of 1e-6 of values near 100 carry 1e-8 of rounding.
-    for (Index i = 0; i < d; ++i)
-      EXPECT_NEAR(gradient(i, 0), expected[i], 1e-5 * (1 + std::abs(expected[i]))) << i;
-  }
-}
-
-TEST(HistoryTarget, ExtremeCoordinatesStayUsable) {
-  const HistoryModel model = make_model();
-  const HistoryTarget target(model, {0, 1, 2}, make_simulator());
-  for (double x : {-40.0, 40.0}) {
-    MatrixXd gradient;
-    EXPECT_FALSE(std::isnan(target.log_likelihood(MatrixXd::Constant(7, 1, x), gradient)[0])) << x;
-    EXPECT_FALSE(gradient.hasNaN()) << x;
-  }
-}
-
-// Coordinates: sigma and one condition.
-TEST(HistoryTarget, EvidenceEqualsQuadrature) {
-  HistoryPriors priors = make_priors();
-  priors.error = {};
-  priors.reach = {60.0};
-  const HistoryModel model(make_data(), priors, Context());
-  const HistoryTarget target(model, {1}, make_simulator());
-  // Trapezoidal rule over the prior N(0, I): accurate to rounding for a smooth integrand.
-  const int m = 400;
-  const double h = 16.0 / m;
-  VectorXd log_terms((m + 1) * (m + 1));
-  MatrixXd row(2, m + 1);
-  for (int i = 0; i <= m; ++i) {
-    for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
-    log_terms.segment(i * (m + 1), m + 1) =
-        target.log_likelihood(row) - 0.5 * row.colwise().squaredNorm().transpose();
-  }
-  const double truth = log_sum_exp(log_terms) - kLogTwoPi + 2.0 * std::log(h);
-  const AisResult result = sample_ais(target, {}, Context());
-  EXPECT_TRUE(result.trusted) << result.verdict;
-  // Four reported standard errors, and in any case less than matters to a Bayes factor.
-  EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.15));
-}
-
-TEST(HistoryTarget, NumberingOfTheConditionsLeavesTheSampledEvidenceUnchanged) {
-  const HistoryData data = make_data();
-  HistoryData other = data;  // order 2, 0, 1
-  other.responses << data.responses.rightCols(2), data.responses.leftCols(3);
-  other.condition = {0, 0, 1, 1, 2};
-  const HistoryModel a = make_model(data), b = make_model(other);
-  const HistoryTarget first(a, {0, 1, 2}, make_simulator()), second(b, {0, 1, 2}, make_simulator());
-  const VectorXd x = normal_vector(first.dimension(), 44);
-  const VectorXd t = first.parameters(x).t, u = second.parameters(x).t;
-  EXPECT_EQ(t[0], u[1]);
-  EXPECT_EQ(t[1], u[2]);
-  EXPECT_EQ(t[2], u[0]);
-  AisOptions options;
-  options.pilot_chains = 64;
-  options.groups = options.max_groups = 3;
-  // The same chains; only the order of the sums in the likelihood differs.
-  EXPECT_NEAR(sample_ais(first, options, Context()).log_evidence,
-              sample_ais(second, options, Context()).log_evidence, 1e-8);
-}
-
-TEST(FilterBank, RespondsToAStepExactly) {
-  const TimeAxis axis = uneven_axis(20, {});
-  VectorXd x = VectorXd::Zero(20);
-  x.tail(15).setConstant(2.0);
-  const FilterBank bank(x, {0}, Eigen::Vector3d(0.0, 0.7, 6.0), axis);
-  EXPECT_EQ(bank.responses.col(0), x);
-  // The value of step i holds since the step before.
-  for (Index i = 5; i < 20; ++i) {
-    const double since = axis.time[i] - axis.time[4];
-    EXPECT_NEAR(bank.responses(i, 1), 2 * (1 - std::exp(-since / 0.7)), 1e-12);
-    EXPECT_NEAR(bank.responses(i, 2), 2 * (1 - std::exp(-since / 6.0)), 1e-12);
-  }
-  EXPECT_EQ(bank.responses.topRows(5).cwiseAbs().maxCoeff(), 0.0);
-}
-
-TEST(FilterBank, StartsEverySegmentInEquilibrium) {
-  const TimeAxis axis = uneven_axis(20, {9});
-  VectorXd x = VectorXd::Constant(20, 5.0);
-  x.tail(11).setConstant(-3.0);
-  const FilterBank bank(x, {0}, VectorXd::Constant(1, 50.0), axis);
-  EXPECT_LT((bank.responses.col(0) - x).cwiseAbs().maxCoeff(), 1e-14);
-}
-
-TEST(FilterBank, SegmentsAreIndependent) {
-  const TimeAxis axis = uneven_axis(20, {9});
-  const VectorXd x = normal_vector(20, 45);
-  VectorXd other = x;
-  other.head(9) = normal_vector(9, 46);
-  const VectorXd times = Eigen::Vector2d(1.0, 8.0);
-  const MatrixXd a = FilterBank(x, {0}, times, axis).responses,
-                 b = FilterBank(other, {0}, times, axis).responses;
-  EXPECT_EQ(a.bottomRows(11), b.bottomRows(11));
-  EXPECT_NE(a.topRows(9), b.topRows(9));
-}
-
-TEST(FilterBank, ColumnsRunByBoundaryColumnThenTimeConstant) {
-  const TimeAxis axis = even_axis(10);
-  const MatrixXd x = normal_matrix(10, 3, 47);
-  const FilterBank bank(x, {0, 1, 1}, Eigen::Vector2d(0.0, 2.0), axis);
-  EXPECT_EQ(bank.condition, (std::vector<int>{0, 0, 1, 1, 1, 1}));
-  for (Index c = 0; c < 3; ++c) EXPECT_EQ(bank.responses.col(2 * c), x.col(c));
-}
-
-TEST(FilterBank, RefusesWrongLengthsAndNegativeTimes) {
-  const TimeAxis axis = even_axis(10);
-  EXPECT_THROW(FilterBank(VectorXd::Zero(9), {0}, VectorXd::Ones(1), axis), std::invalid_argument);
-  EXPECT_THROW(FilterBank(VectorXd::Zero(10), {0}, -VectorXd::Ones(1), axis), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,0 +1,70 @@
+# What is read from a file of these lines, or bytes.
+read_lines <- function(..., bytes = charToRaw(paste0(c(...), "\n", collapse = ""))) {
+  path <- withr::local_tempfile(fileext = ".yml")
+  writeBin(bytes, path)
+  read_study_file(path)
+}
+
+refuse_lines <- function(pattern, ...) expect_error(read_lines(...), pattern, class = "amiss_error_input")
+
+test_that("a study file is UTF-8, also after a byte order mark and with the line ends of Windows", {
+  expect_equal(read_lines(bytes = c(as.raw(c(0xef, 0xbb, 0xbf)), charToRaw("study: a\r\nunit: \u00b0C\r\n"))),
+               list(study = "a", unit = "\u00b0C"))
+})
+
+test_that("the line of a byte that is not UTF-8 is said", {
+  refuse_lines("line 2", bytes = c(charToRaw("a: 1\nb: "), as.raw(0xb0), charToRaw("C\n")))
+  refuse_lines("line 2", bytes = c(charToRaw("a: 1\nb: "), as.raw(0), charToRaw("C\n")))
+})
+
+test_that("a study file with tags is refused", {
+  refuse_lines("tag !expr", "a: !expr file.create('x')")
+  refuse_lines("tag !!python/object:x", "a: !!python/object:x {b: 1}")
+  refuse_lines("tag !foo", "a: [!foo 1, 2]")
+  refuse_lines("Tags cannot be declared", "%TAG !e! tag:x,2000:", "---", "a: !e!foo 1")
+})
+
+test_that("what looks like a tag in a comment or a text is none", {
+  expect_equal(read_lines("# see !this", "a: 'no !expr here'", "b: wait !important"),
+               list(a = "no !expr here", b = "wait !important"))
+})
+
+test_that("a study file is one document", {
+  refuse_lines("several documents", "a: 1", "---", "b: 2")
+  refuse_lines("several documents", "---", "a: 1", "...", "b: 2")
+  expect_equal(read_lines("# note", "---", "a: 1", "..."), list(a = 1L))
+})
+
+test_that("a study file that is nested too deep or grows too large is refused", {
+  refuse_lines("nested deeper", paste0("a: ", strrep("[", 20), strrep("]", 20)))
+  levels <- letters[2:9]
+  refuse_lines("more than", "a: &a [1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1]",
+               sprintf("%s: &%s [%s]", levels, levels,
+                       vapply(c("a", levels[-8]), function(l) paste(rep(paste0("*", l), 21), collapse = ","), "")))
+})
+
+test_that("only true and false are logical in a study file", {
+  expect_equal(read_lines("target: y", "a: [yes, no, on, off, n]", "b: true", "c: false"),
+               list(target = "y", a = c("yes", "no", "on", "off", "n"), b = TRUE, c = FALSE))
+})
+
+test_that("a title or a unit that is no text is refused", {
+  folder <- withr::local_tempdir()
+  expect_error(read_study(write_study_file(folder, title = 2024L), trust = TRUE), "title", class = "amiss_error_input")
+  expect_error(read_study(write_study_file(folder, unit = list(1, 2)), trust = TRUE), "unit",
+               class = "amiss_error_input")
+})
+
+test_that("a folder is no study file and no data", {
+  folder <- withr::local_tempdir()
+  expect_error(read_study_file(folder), "not a regular file", class = "amiss_error_input")
+  expect_error(read_study(write_study_file(folder, data = "."), trust = TRUE), "not a regular file",
+               class = "amiss_error_input")
+})
+
+test_that("a pipe is no study file", {
+  skip_on_os("windows")
+  pipe <- withr::local_tempfile()
+  system2("mkfifo", shQuote(pipe))
+  expect_error(read_study_file(pipe), "not a regular file", class = "amiss_error_input")
+})
