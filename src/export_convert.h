@@ -58,18 +58,18 @@ inline Rcpp::List ais_list(const AisResult& result) {
     ess[k] = result.ladder[k].ess;
   }
   using Rcpp::_;
-  Rcpp::List out =
-      Rcpp::List::create(_["log_evidence"] = result.log_evidence, _["standard_error"] = result.standard_error,
-                         _["interval"] = Rcpp::NumericVector::create(result.lower, result.upper),
-                         _["estimator"] = result.estimator,
-                         _["annealed"] = Rcpp::NumericVector::create(result.annealed, result.annealed_se),
-                         _["second"] = Rcpp::NumericVector::create(result.second, result.second_se),
-                         _["second_ess"] = result.second_ess, _["ess"] = result.ess,
-                         _["log_weight_variance"] = result.log_weight_variance,
-                         _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step, _["sweeps"] = sweeps,
-                                                               _["acceptance"] = acceptance, _["ess"] = ess),
-                         _["evaluations"] = static_cast<double>(result.evaluations),
-                         _["trusted"] = result.trusted, _["verdict"] = result.verdict);
+  Rcpp::List out = Rcpp::List::create(
+      _["log_evidence"] = result.log_evidence, _["standard_error"] = result.standard_error,
+      _["interval"] = Rcpp::NumericVector::create(result.lower, result.upper),
+      _["estimator"] = in_words(result.estimator),
+      _["annealed"] = Rcpp::NumericVector::create(result.annealed, result.annealed_se),
+      _["second"] = Rcpp::NumericVector::create(result.second, result.second_se),
+      _["second_ess"] = result.second_ess, _["ess"] = result.ess,
+      _["log_weight_variance"] = result.log_weight_variance,
+      _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step, _["sweeps"] = sweeps,
+                                            _["acceptance"] = acceptance, _["ess"] = ess),
+      _["evaluations"] = static_cast<double>(result.evaluations), _["trusted"] = trusted(result.outcome),
+      _["verdict"] = in_words(result.outcome));
   out["weights"] = result.weights;
   out["log_likelihood"] = result.log_likelihood;
   return out;
@@ -81,7 +81,8 @@ inline AisResult ais_summary(const Rcpp::List& list) {
   out.log_evidence = list["log_evidence"];
   out.standard_error = list["standard_error"];
   out.ess = list["ess"];
-  out.trusted = list["trusted"];
+  // Why it is not trusted does not matter to the attribution.
+  out.outcome = Rcpp::as<bool>(list["trusted"]) ? Outcome::consistent : Outcome::inconsistent;
   out.weights = Rcpp::as<Eigen::VectorXd>(list["weights"]);
   out.log_likelihood = Rcpp::as<Eigen::VectorXd>(list["log_likelihood"]);
   return out;

@@ -22,7 +22,7 @@ TEST(SampleAis, EvidenceOfLinearGaussianModels) {
   for (Index d : {3, 10}) {
     const LinearGaussian model(d, 0.3);
     const AisResult result = sample_ais(model.target(), {}, seeded(1));
-    EXPECT_TRUE(result.trusted) << result.verdict;
+    EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
     expect_evidence(result, model.log_evidence());
     EXPECT_LT(std::abs(result.annealed - model.log_evidence()), 4 * result.annealed_se + 0.05) << d;
     EXPECT_LT(std::abs(result.second - model.log_evidence()), 4 * result.second_se + 0.02) << d;
@@ -150,7 +150,7 @@ TEST(SampleAis, PlainAisWithoutResamplingIsRightOnAnEasyTarget) {
   options.ess_drop = 0.95;
   options.importance_draws = 0;
   const AisResult result = sample_ais(model.target(), options, seeded(8));
-  EXPECT_EQ(result.estimator, "annealed");
+  EXPECT_EQ(result.estimator, Estimator::annealed);
   EXPECT_TRUE(std::isnan(result.second));
   expect_evidence(result, model.log_evidence(), 0.3);
   EXPECT_GT(result.weights.maxCoeff(), result.weights.minCoeff());
@@ -172,7 +172,7 @@ TEST(SampleAis, TwoModesAreRightOrNotTrusted) {
   int trusted = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const AisResult result = sample_ais(target, {}, seeded(seed));
-    if (!result.trusted) continue;
+    if (!trusted(result.outcome)) continue;
     ++trusted;
     EXPECT_LT(std::abs(result.log_evidence - truth), 4 * result.standard_error + 0.05) << "seed " << seed;
   }
@@ -218,7 +218,7 @@ TEST(SampleAis, GroupsWithoutAChainAliveLeaveTheResultUsable) {
     }
     const double dead = (result.draws.row(0).transpose().array() < 1.88).select(result.weights, 0.0).sum();
     EXPECT_LT(dead, 1e-300);  // Eigen's exp(-infinity) is the smallest normal number, not zero
-    if (result.trusted) {
+    if (trusted(result.outcome)) {
       EXPECT_LT(std::abs(result.log_evidence - std::log(0.03)), 4 * result.standard_error);
     }
   }
@@ -233,9 +233,10 @@ TEST(SampleAis, NotANumberIsNeverTrusted) {
     options.importance_draws = 0;
     try {
       const AisResult result = sample_ais(small_region(), options, seeded(seed));
-      if (result.trusted) {
-        EXPECT_TRUE(std::isfinite(result.standard_error)) << "seed " << seed << ": " << result.verdict;
-        EXPECT_TRUE(std::isfinite(result.ess)) << "seed " << seed << ": " << result.verdict;
+      if (trusted(result.outcome)) {
+        EXPECT_TRUE(std::isfinite(result.standard_error))
+            << "seed " << seed << ": " << in_words(result.outcome);
+        EXPECT_TRUE(std::isfinite(result.ess)) << "seed " << seed << ": " << in_words(result.outcome);
       }
     } catch (const std::runtime_error&) {  // every group died: said plainly
     }
@@ -338,7 +339,7 @@ TEST(SampleAis, MoreImportanceDrawsAreAddedUntilTheStandardErrorIsAsAsked) {
   options.precision = 0.01;
   const LinearGaussian model(3, 0.3);
   const AisResult result = sample_ais(model.target(), options, seeded(22));
-  EXPECT_EQ(result.estimator, "importance");
+  EXPECT_EQ(result.estimator, Estimator::importance);
   EXPECT_LE(result.standard_error, 0.01);
   EXPECT_GE(sample_ais(model.target(), {}, seeded(22)).standard_error, result.standard_error);
   EXPECT_LT(std::abs(result.log_evidence - model.log_evidence()), 0.04);  // four standard errors

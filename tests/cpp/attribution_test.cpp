@@ -22,7 +22,7 @@ Calibration by_hand(const std::vector<std::pair<unsigned, double>>& draws, Index
     c.posterior.weights[static_cast<Index>(i)] = draws[i].second;
   }
   c.posterior.ess = 400.0;
-  c.posterior.trusted = true;
+  c.posterior.outcome = Outcome::consistent;
   return c;
 }
 

@@ -32,7 +32,7 @@ TEST(SamplePosterior, EvidenceEqualsQuadrature) {
     const HistoryModel model = make_model({}, data);
     const CalibrationTarget target(model, {}, emulator);
     const AisResult result = sample_posterior(target, {}, Context());
-    EXPECT_TRUE(result.trusted) << result.verdict;
+    EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
     // Four reported standard errors, and well below what matters to a Bayes factor.
     EXPECT_LT(std::abs(result.log_evidence - evidence_by_quadrature(target)),
               std::min(std::max(4 * result.standard_error, 0.02), 0.1))
@@ -48,8 +48,8 @@ TEST(SamplePosterior, IsTheOneAnnealedFromThePriorForLess) {
   options.precision = 0.05;
   const AisResult plain = sample_ais(target, options, Context());
   const AisResult closer = sample_posterior(target, options, Context());
-  EXPECT_TRUE(plain.trusted) << plain.verdict;
-  EXPECT_TRUE(closer.trusted) << closer.verdict;
+  EXPECT_TRUE(trusted(plain.outcome)) << in_words(plain.outcome);
+  EXPECT_TRUE(trusted(closer.outcome)) << in_words(closer.outcome);
   const double error = std::hypot(plain.standard_error, closer.standard_error);
   EXPECT_LT(error, 0.15);
   EXPECT_LT(std::abs(plain.log_evidence - closer.log_evidence), 4 * error);
@@ -104,7 +104,7 @@ TEST(Calibrate, DiscrepancyWhereTheParametersCouldMoveIsFree) {
   const VectorXd truth = 4.0 * record.response;
   const HistoryModel model = record.model(truth, emulator);
   const Calibration c = calibrate(model, emulator, {}, Context());
-  EXPECT_TRUE(c.posterior.trusted) << c.posterior.verdict;
+  EXPECT_TRUE(trusted(c.posterior.outcome)) << in_words(c.posterior.outcome);
   EXPECT_GT(c.reach[1], 0.99);
   const MatrixXd seen = model.data().responses * c.coefficients - model.data().moves * c.withheld;
   // The simulator takes its share of what lies along it: a standard deviation of 0.6 of 4.
@@ -117,7 +117,7 @@ TEST(Calibrate, DiscrepancyThatKeepsOutOfTheParametersWayDoesNotReachFar) {
   const VectorXd truth = 2.4 * record.across;
   const HistoryModel model = record.model(truth, emulator);
   const Calibration c = calibrate(model, emulator, {}, Context());
-  EXPECT_TRUE(c.posterior.trusted) << c.posterior.verdict;
+  EXPECT_TRUE(trusted(c.posterior.outcome)) << in_words(c.posterior.outcome);
   EXPECT_GT(c.reach[0], 0.99);
   const MatrixXd seen = model.data().responses * c.coefficients - model.data().moves * c.withheld;
   // Noise of 0.5 leaves one coefficient of 60 values an error of a fortieth of 2.4.

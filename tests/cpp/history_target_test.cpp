@@ -119,7 +119,7 @@ TEST(HistoryTarget, EvidenceEqualsQuadrature) {
   const HistoryTarget target(model, {1}, make_simulator());
   const double truth = evidence_by_quadrature(target);
   const AisResult result = sample_ais(target, {}, Context());
-  EXPECT_TRUE(result.trusted) << result.verdict;
+  EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
   // Four reported standard errors, and in any case less than matters to a Bayes factor.
   EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.15));
 }

@@ -30,7 +30,7 @@ TEST(SampleAis, SkewedMixturesComeCloserToOneSidedPosteriors) {
   double share[2];
   for (int k = 0; k < 2; ++k) {
     const AisResult result = sample_ais(one_sided(d), k == 0 ? plain : skewed, seeded(4));
-    ASSERT_EQ(result.estimator, "importance");
+    ASSERT_EQ(result.estimator, Estimator::importance);
     expect_evidence(result, -static_cast<double>(d) * std::log(2.0));
     share[k] = result.ess / static_cast<double>(result.draws.cols());
   }
@@ -43,7 +43,7 @@ TEST(SampleAis, ImportanceSampleGrowsUntilEnoughDrawsAreEffective) {
   options.refit_draws = 200;
   options.effective_draws = 1500;
   const AisResult result = sample_ais(one_sided(6), options, seeded(5));
-  ASSERT_EQ(result.estimator, "importance");
+  ASSERT_EQ(result.estimator, Estimator::importance);
   EXPECT_GE(result.ess, 1500);
   EXPECT_LT(result.draws.cols(), 8000);  // no more than are needed at an effective share of a fifth
   expect_evidence(result, -6.0 * std::log(2.0));

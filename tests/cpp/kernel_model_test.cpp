@@ -245,7 +245,7 @@ TEST(KernelTarget, EvidenceOverOneFreeParameterEqualsQuadrature) {
     const double truth = quadrature(at);
     const FunctionTarget one(1, [&](const VectorXd& x) { return at(x[0]); });
     const AisResult result = sample_ais(one, {}, Context());
-    EXPECT_TRUE(result.trusted) << result.verdict;
+    EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
     EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.1)) << free;
   }
 }

@@ -180,7 +180,7 @@ TEST(KernelSampling, EvidenceIsThatOfTheDenseSampler) {
   AisOptions options;
   const AisResult dense = sample_ais(KernelTarget(model), options, Context());
   const KernelSample fast = sample_kernel(model, options, {}, Context());
-  EXPECT_TRUE(fast.posterior.trusted) << fast.posterior.verdict;
+  EXPECT_TRUE(trusted(fast.posterior.outcome)) << in_words(fast.posterior.outcome);
   EXPECT_NEAR(fast.posterior.log_evidence, dense.log_evidence,
               4 * std::hypot(fast.posterior.standard_error, dense.standard_error));
   EXPECT_LT(fast.largest_error, 0.1);

@@ -143,7 +143,7 @@ TEST(PaperCalibrationTarget, EvidenceEqualsQuadrature) {
   const PaperCalibrationTarget target(inside, emulator, {0.3, 6.0}, true);
   const double truth = evidence_by_quadrature(target);
   const AisResult result = sample_ais(target, {}, Context());
-  EXPECT_TRUE(result.trusted) << result.verdict;
+  EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
   EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.1));
 }
 

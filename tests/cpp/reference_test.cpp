@@ -95,7 +95,7 @@ TEST(SampleAis, AWrongReferenceDoesNotMoveTheEvidence) {
   const CloserReference wrong(
       {StudentTMixture({StudentT(model.mean().array() + 2.0, 0.1 * MatrixXd::Identity(3, 3), 8.0)}, {1.0})});
   const AisResult result = sample_ais(model.target(), wrong, {}, seeded(26));
-  EXPECT_TRUE(result.trusted) << result.verdict;
+  EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
   expect_evidence(result, model.log_evidence());
 }
 
@@ -128,7 +128,7 @@ TEST(SampleAis, EvidenceAndLikelihoodsAreTheTargetsWhateverTheReference) {
     for (bool gradient : {true, false}) {
       options.gradient = gradient;
       const AisResult result = sample_ais(target, *reference, options, seeded(28));
-      ASSERT_EQ(result.estimator, "annealed");
+      ASSERT_EQ(result.estimator, Estimator::annealed);
       expect_evidence(result, model.log_evidence(), 0.4);
       EXPECT_EQ(result.log_likelihood, target.log_likelihood(result.draws));
       // Some hundred effective draws: four of their standard errors, the posterior standardised.

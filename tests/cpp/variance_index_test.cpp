@@ -102,7 +102,7 @@ TEST(VarianceIndex, PlantedEffectIsSignificantAndFirst) {
   AisOptions options;
   options.importance_draws = 400;
   const AisResult result = sample_ais(target, options, Context());
-  EXPECT_TRUE(result.trusted) << result.verdict;
+  EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
   std::vector<KernelParameters> draws;
   for (Index i = 0; i < result.draws.cols(); ++i) draws.push_back(target.parameters(result.draws.col(i)));
   const VarianceIndex index = variance_index(model, draws, result.weights, 0.95, Context());

@@ -22,8 +22,8 @@ namespace {
 constexpr double kDoubt = 2.0;                       // standard errors by which another estimate lies above
 constexpr double kBridgeDof = 8.0, kThirdDof = 5.0;  // of the mixtures that further runs start from
 
-void report(AisResult& result, const std::string& name, double log_evidence, const Spread& spread) {
-  result.estimator = name;
+void report(AisResult& result, Estimator estimator, double log_evidence, const Spread& spread) {
+  result.estimator = estimator;
   result.log_evidence = log_evidence;
   result.standard_error = spread.se;
   result.lower = spread.lower;
@@ -35,13 +35,13 @@ void report(AisResult& result, ImportanceSample sample) {
   result.draws = std::move(sample.x);
   result.log_likelihood = std::move(sample.ll);
   result.weights = std::move(sample.weights);
-  report(result, "importance", sample.log_evidence,
+  report(result, Estimator::importance, sample.log_evidence,
          {sample.se, sample.log_evidence - 1.96 * sample.se, sample.log_evidence + 1.96 * sample.se});
 }
 
-void report(AisResult& result, const std::string& name, const AnnealedRun& run) {
+void report(AisResult& result, Estimator estimator, const AnnealedRun& run) {
   run.gather(result.draws, result.log_likelihood, result.weights);
-  report(result, name, run.log_evidence(), run.spread());
+  report(result, estimator, run.log_evidence(), run.spread());
 }
 
 // The second estimator, and the report of the better one: the importance sample or, where no mixture comes
@@ -70,7 +70,7 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
     from_close = std::make_unique<AnnealedRun>(AnnealingPath{target, close}, options, context, kBridged);
   } catch (const std::runtime_error&) {  // the record is impossible wherever the mixture has its mass
     annealed.refine();
-    report(result, "annealed", annealed);
+    report(result, Estimator::annealed, annealed);
     result.second = -std::numeric_limits<double>::infinity();
     return;
   }
@@ -80,9 +80,9 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   result.evaluations += bridged.evaluations();
   result.second = bridged.log_evidence();
   result.second_se = bridged.spread().se;
-  report(result, "bridged", bridged);
+  report(result, Estimator::bridged, bridged);
   result.second_ess = result.ess;
-  if (!shorter) report(result, "annealed", annealed);
+  if (!shorter) report(result, Estimator::annealed, annealed);
 
   // The estimate that is not reported lies above the other: it has seen what that one missed, or is loose. A
   // third run, from a mixture fitted to the draws of both, decides.
@@ -102,7 +102,7 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   AnnealedRun third({target, joined}, options, context, kThird);
   third.refine();
   result.evaluations += third.evaluations();
-  report(result, "bridged", third);
+  report(result, Estimator::bridged, third);
   result.second_ess = result.ess;
 }
 
@@ -110,33 +110,53 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
 // / k) and easily too small. Another estimate below the one reported is no objection to it; one above says
 // that the one reported misses part of the posterior.
 bool consistent(const AisResult& result) {
-  const double other = result.estimator == "annealed" ? result.second : result.annealed;
+  const double other = result.estimator == Estimator::annealed ? result.second : result.annealed;
   return other - result.log_evidence < 3.5 * std::hypot(result.annealed_se, result.second_se) + 0.1;
 }
 
-void judge(AisResult& result, const AisOptions& options) {
+Outcome judge(const AisResult& result, const AisOptions& options) {
   double least = 1.0;
   for (const auto& level : result.ladder) least = std::min(least, level.acceptance);
-  const bool few = !(result.ess >= 0.02 * static_cast<double>(result.draws.cols()));
-  result.trusted = false;
-  result.stuck = few || !(least >= 0.02);
-  if (!(least >= 0.02)) {
-    result.verdict = "not trusted: the chains hardly move at some temperature";
-  } else if (few) {
-    result.verdict = "not trusted: a few chains carry all the weight";
-  } else if (!(result.standard_error <= 1.0)) {
-    result.verdict = "not trusted: the standard error exceeds one nat";
-  } else if (options.importance_draws > 0 && !consistent(result)) {
-    result.verdict = "not trusted: the other estimator has seen part of the posterior that this one misses";
-  } else {
-    result.trusted = true;
-    result.verdict = options.importance_draws > 0
-                         ? "trusted: chains move, weights are even and the two estimators are consistent"
-                         : "trusted: chains move and weights are even";
-  }
+  if (!(least >= 0.02)) return Outcome::hardly_moves;
+  if (!(result.ess >= 0.02 * static_cast<double>(result.draws.cols()))) return Outcome::few_chains;
+  if (!(result.standard_error <= 1.0)) return Outcome::imprecise;
+  if (options.importance_draws == 0) return Outcome::uncompared;
+  return consistent(result) ? Outcome::consistent : Outcome::inconsistent;
 }
 
 }  // namespace
+
+const char* in_words(Estimator estimator) {
+  switch (estimator) {
+    case Estimator::annealed:
+      return "annealed";
+    case Estimator::importance:
+      return "importance";
+    case Estimator::bridged:
+      return "bridged";
+  }
+  return "";
+}
+
+const char* in_words(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::hardly_moves:
+      return "not trusted: the chains hardly move at some temperature";
+    case Outcome::few_chains:
+      return "not trusted: a few chains carry all the weight";
+    case Outcome::imprecise:
+      return "not trusted: the standard error exceeds one nat";
+    case Outcome::inconsistent:
+      return "not trusted: the other estimator has seen part of the posterior that this one misses";
+    case Outcome::approximate:
+      return "not trusted: the approximate kernel is off by more than a nat at some draws";
+    case Outcome::uncompared:
+      return "trusted: chains move and weights are even";
+    case Outcome::consistent:
+      return "trusted: chains move, weights are even and the two estimators are consistent";
+  }
+  return "";
+}
 
 MatrixXd sample_population(const Target& target, const Distribution& reference, const AisOptions& asked,
                            const Context& context, long& evaluations) {
@@ -159,7 +179,7 @@ AisResult sample_ais(const Target& target, const Distribution& reference, const 
   result.second = result.second_se = std::numeric_limits<double>::quiet_NaN();
   if (options.importance_draws == 0) {
     annealed.refine();
-    report(result, "annealed", annealed);
+    report(result, Estimator::annealed, annealed);
   } else {
     second_estimator(target, options, context, annealed, result);
   }
@@ -168,7 +188,7 @@ AisResult sample_ais(const Target& target, const Distribution& reference, const 
   result.annealed_se = annealed.spread().se;
   result.log_weight_variance = annealed.variance();
   result.ladder = annealed.ladder();
-  judge(result, options);
+  result.outcome = judge(result, options);
   return result;
 }
 

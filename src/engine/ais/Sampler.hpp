@@ -1,5 +1,4 @@
 #pragma once
-#include <string>
 #include <vector>
 
 #include "engine/Context.hpp"
@@ -10,12 +9,31 @@
 
 namespace amiss {
 
+/// What an evidence comes from.
+enum class Estimator { annealed, importance, bridged };
+
+/// What the sampler says of its own work. Only the last two can be trusted.
+enum class Outcome {
+  hardly_moves,  ///< the chains do, at some temperature
+  few_chains,    ///< carry all the weight
+  imprecise,     ///< standard error above one nat
+  inconsistent,  ///< the other estimator has seen part of the posterior that this one misses
+  approximate,   ///< the likelihood was approximated, and is off by more than a nat at some draws
+  uncompared,    ///< chains move and weights are even; no second estimator was asked for
+  consistent     ///< and so are the two estimators
+};
+inline bool trusted(Outcome outcome) { return outcome >= Outcome::uncompared; }
+/// Too little was seen of the posterior for its draws to say anything.
+inline bool stuck(Outcome outcome) { return outcome <= Outcome::few_chains; }
+const char* in_words(Estimator estimator);
+const char* in_words(Outcome outcome);  ///< one sentence
+
 /// Normalising constant and draws of a posterior.
 struct AisResult {
   double log_evidence = 0.0;        ///< of the estimator reported
   double standard_error = 0.0;      ///< of log_evidence
   double lower = 0.0, upper = 0.0;  ///< 95 % interval of log_evidence
-  std::string estimator;            ///< "annealed", "importance" or "bridged"
+  Estimator estimator = Estimator::annealed;
 
   double annealed = 0.0, annealed_se = 0.0;  ///< frozen annealed run; interval by bootstrap over groups
   double second = 0.0, second_se = 0.0;      ///< importance sample, or bridged run; NaN if left out
@@ -28,9 +46,7 @@ struct AisResult {
   Eigen::VectorXd log_likelihood;  ///< of the draws
   std::vector<Temperature> ladder;
   long evaluations = 0;  ///< of the likelihood, all stages
-  bool stuck = false;    ///< chains hardly moved, or few carry all the weight: the draws say little
-  bool trusted = false;
-  std::string verdict;  ///< why it can or cannot be trusted, one sentence
+  Outcome outcome = Outcome::few_chains;
 };
 
 /// Annealed importance sampling (Neal 2001) from a reference to prior x likelihood; without one, from the

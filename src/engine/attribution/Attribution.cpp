@@ -30,7 +30,7 @@ DroppedSet dropped_by_draws(const HistoryModel& model, const Calibration& calibr
   }
   DroppedSet out;
   const double prior_off = 1.0 - model.priors().inclusion;
-  out.trusted = posterior.trusted;
+  out.trusted = trusted(posterior.outcome);
   out.standard_error = std::numeric_limits<double>::infinity();
   out.lost = std::numeric_limits<double>::infinity();
   if (prior_off > 0) {
@@ -85,7 +85,7 @@ Attribution attribute(const HistoryModel& model, const Emulator& emulator, const
           sample_posterior(without, options.ais, context.fork(kWithout + out.sets.size()));
       dropped.lost = posterior.log_evidence - again.log_evidence;
       dropped.standard_error = std::hypot(posterior.standard_error, again.standard_error);
-      dropped.trusted = posterior.trusted && again.trusted;
+      dropped.trusted = trusted(posterior.outcome) && trusted(again.outcome);
     }
     out.sets.push_back(std::move(dropped));
   };

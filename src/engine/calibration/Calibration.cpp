@@ -119,10 +119,10 @@ AisResult sample_once(const CalibrationTarget& target, const AisOptions& options
 AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& options,
                            const Context& context) {
   AisResult result = sample_once(target, options, context);
-  if (!result.stuck) return result;
+  if (!stuck(result.outcome)) return result;
   AisResult again = sample_once(target, options, context.fork(kAgain));
   const long evaluations = result.evaluations + again.evaluations;
-  if (!again.stuck || again.log_evidence > result.log_evidence) result = std::move(again);
+  if (!stuck(again.outcome) || again.log_evidence > result.log_evidence) result = std::move(again);
   result.evaluations = evaluations;
   return result;
 }

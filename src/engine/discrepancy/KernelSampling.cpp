@@ -140,10 +140,7 @@ void certify(const KernelModel& model, const KernelTarget& target, const KernelS
   posterior.lower += sample.correction - 1.96 * se;
   posterior.upper += sample.correction + 1.96 * se;
   posterior.standard_error = std::hypot(posterior.standard_error, se);
-  if (!(sample.largest_error <= 1.0)) {
-    posterior.trusted = false;
-    posterior.verdict = "not trusted: the approximate kernel is off by more than a nat at some draws";
-  }
+  if (!(sample.largest_error <= 1.0)) posterior.outcome = Outcome::approximate;
 }
 
 // Where the posterior of this record lies, found by way of thinned ones.
