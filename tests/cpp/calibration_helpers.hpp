@@ -30,7 +30,8 @@ inline HistoryData make_data() {
   HistoryData data;
   data.axis = uneven_axis(kN, {14});
   data.basis.resize(kN, 2);
-  data.basis << 60.0 * normal_vector(kN, 82), VectorXd::Ones(kN);
+  data.basis.col(0) = 60.0 * normal_vector(kN, 82);
+  data.basis.col(1).setOnes();
   data.moves = data.basis * Eigen::Vector2d(0.006, 0.9).asDiagonal();
   data.responses = normal_matrix(kN, 3, 83);
   data.condition = {0, 0, 1};
