@@ -75,7 +75,7 @@ void Airflow::solve(double air) {
     low = std::min(low, state.drive);
     high = std::max(high, state.drive);
   }
-  pressure_ = std::clamp(pressure_, low, high);
+  pressure_ = std::min(std::max(pressure_, low), high);  // low is above high where no drive is a number
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const Balance balance = flows_at(pressure_, density);
     if (std::abs(balance.net) <= flow_tolerance * balance.throughput) return;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -19,6 +20,7 @@ const double base_ratio = (1.0 - gamma) / gamma;
 
 // A sub-step may be longer than asked by rounding, no more.
 constexpr double division_slack = 1e-9;
+constexpr double most_substeps = 1e8;  // of an interval
 
 void check_data(const Eigen::Ref<const Eigen::MatrixXd>& drivers, double step_s,
                 const Eigen::Ref<const Eigen::VectorXd>& hold) {
@@ -31,6 +33,17 @@ void check_data(const Eigen::Ref<const Eigen::MatrixXd>& drivers, double step_s,
                                 std::to_string(drivers.rows()) + ") or none; got " +
                                 std::to_string(hold.size()));
   }
+}
+
+int count_substeps(double step_s, double max_substep_s) {
+  const double wanted = std::ceil(step_s / max_substep_s - division_slack);
+  if (wanted > most_substeps) {
+    std::ostringstream message;
+    message << "options: max_substep_s = " << max_substep_s << " divides an interval of " << step_s
+            << " s into more than 1e8 steps; it must be longer";
+    throw std::invalid_argument(message.str());
+  }
+  return std::max(1, static_cast<int>(wanted));
 }
 
 }  // namespace
@@ -46,7 +59,7 @@ Run simulate(const Zone& zone, const Eigen::Ref<const Eigen::MatrixXd>& drivers,
 Simulation::Simulation(const Zone& zone, const Eigen::Ref<const Eigen::MatrixXd>& drivers, double step_s,
                        const Eigen::Ref<const Eigen::VectorXd>& hold, const Options& options)
     : zone_(zone), drivers_(drivers), hold_(hold), airflow_(zone.openings) {
-  n_substeps_ = std::max(1, static_cast<int>(std::ceil(step_s / options.max_substep_s - division_slack)));
+  n_substeps_ = count_substeps(step_s, options.max_substep_s);
   substep_ = step_s / n_substeps_;
   stage_weight_ = gamma * substep_;
   air_capacity_ = zone.air_capacity_factor * air_density(20.0) * air_heat * zone.volume;

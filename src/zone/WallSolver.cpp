@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
+#include <stdexcept>
 
 #include "zone/air.hpp"
 
@@ -11,13 +13,21 @@ namespace {
 // Of ordinary building materials (1e-7 to 1e-6 m2/s).
 constexpr double reference_diffusivity = 5e-7;
 constexpr double room_temperature = 293.15;
+constexpr double most_cells = 1e6;  // of a layer
 
 /// Cells of a layer: 3.5 sqrt(thickness / d), d the depth that heat diffuses within one interval. Thick
 /// layers get fewer cells per depth than thin ones, because slow changes are all that reaches their middle.
 /// Switched heating of 15-min intervals is then within 0.005 K of eight times as many cells.
 int count_cells(double thickness, double interval, double cells) {
   const double depth = std::sqrt(reference_diffusivity * interval);
-  return std::max(1, static_cast<int>(std::ceil(3.5 * cells * std::sqrt(thickness / depth))));
+  const double wanted = std::ceil(3.5 * cells * std::sqrt(thickness / depth));
+  if (!(wanted <= most_cells)) {
+    std::ostringstream message;
+    message << "a wall's layer of " << thickness << " m needs more than 1e6 cells at cells = " << cells
+            << " and intervals of " << interval << " s; the layer must be thinner or cells smaller";
+    throw std::invalid_argument(message.str());
+  }
+  return std::max(1, static_cast<int>(wanted));
 }
 
 /// Conductance (W/K) and capacity (J/K) of each cell of a wall, from inside to outside.

@@ -34,6 +34,7 @@ double incidence_angle(double wind_direction, double azimuth) {
 }
 
 double pressure_coefficient(Exposure exposure, double angle) {
+  if (std::isnan(angle)) return angle;  // it belongs to no node
   const Table& table = tables[static_cast<std::size_t>(exposure)];
   const double position = std::clamp(angle / node_width, 0.0, static_cast<double>(last_node));
   const int node = std::min(static_cast<int>(position), last_node - 1);

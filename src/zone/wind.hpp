@@ -13,7 +13,8 @@ double incidence_angle(double wind_direction, double azimuth);
 ///
 /// Tabulated every 22.5 degrees (ESP-r's pressure coefficient sets; Liddament 1986). Between the nodes a
 /// cubic Hermite with harmonic-mean slopes (Fritsch and Carlson 1980): once differentiable, no value outside
-/// those of the two nodes, and even about 0 and 180 degrees, so smooth around the whole circle.
+/// those of the two nodes, and even about 0 and 180 degrees, so smooth around the whole circle;
+/// NaN for an angle that is NaN.
 double pressure_coefficient(Exposure exposure, double angle);
 
 /// Air speed V (m/s) along a vertical facade for the film coefficient 2.8 + 3 V, from the wind speed (m/s)

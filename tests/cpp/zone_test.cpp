@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "engine/parallel/parallel_for.hpp"
 #include "zone/Airflow.hpp"
 #include "zone/Simulation.hpp"
 #include "zone/air.hpp"
@@ -519,6 +520,32 @@ TEST(Zone, NonFiniteDriverGivesAFailedRun) {
   EXPECT_TRUE(std::isnan(run.air[0]));
 }
 
+TEST(Zone, AWindFromNowhereGivesAFailedRun) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(pressure_coefficient(Exposure::exposed, nan)));
+  MatrixXd drivers = lively_drivers(10);
+  drivers(5, direction) = nan;
+  EXPECT_FALSE(simulate(everything(), drivers, 900.0, no_hold, {}).ok);
+  drivers.col(outdoor).setConstant(nan);
+  EXPECT_FALSE(simulate(everything(), drivers, 900.0, no_hold, {}).ok);
+}
+
+TEST(Zone, OneAndTwoThreadsGiveTheSameBits) {
+  const MatrixXd drivers = lively_drivers(96);
+  const auto runs = [&](int threads) {
+    MatrixXd air(drivers.rows(), 6);
+    Context context;
+    context.threads = threads;
+    parallel_for(6, context, [&](int i) {
+      Zone zone = everything();
+      zone.volume += i;
+      air.col(i) = simulate(zone, drivers, 900.0, no_hold, {}).air;
+    });
+    return air;
+  };
+  EXPECT_EQ(runs(1), runs(2));
+}
+
 void expect_message(const Zone& zone, const std::string& expected) {
   try {
     simulate(zone, constant_drivers(2, 0.0, 0.0), 900.0, no_hold, {});
@@ -547,6 +574,13 @@ TEST(Zone, ChecksOptionsAndData) {
   EXPECT_THROW(simulate(heated_zone(), drivers, 900.0, no_hold, options), std::invalid_argument);
   EXPECT_THROW(simulate(heated_zone(), drivers, -1.0, no_hold, {}), std::invalid_argument);
   EXPECT_THROW(simulate(heated_zone(), drivers, 900.0, VectorXd::Zero(3), {}), std::invalid_argument);
+  // What is too fine to be counted.
+  options = {};
+  options.max_substep_s = 1e-300;
+  EXPECT_THROW(simulate(heated_zone(), drivers, 900.0, no_hold, options), std::invalid_argument);
+  options = {};
+  options.cells = 1e300;
+  EXPECT_THROW(simulate(heated_zone(), drivers, 900.0, no_hold, options), std::invalid_argument);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "engine/linalg/constants.hpp"
+#include "engine/linalg/log_gamma.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 
 namespace amiss {
@@ -110,7 +111,7 @@ GaussianMixture fit_gaussian_mixture(const MatrixXd& x, const VectorXd& weights,
 StudentT::StudentT(VectorXd location, MatrixXd root, double dof)
     : location_(std::move(location)), root_(std::move(root)), dof_(dof) {
   const double d = static_cast<double>(location_.size());
-  log_constant_ = std::lgamma(0.5 * (dof_ + d)) - std::lgamma(0.5 * dof_) - 0.5 * d * std::log(dof_ * kPi) -
+  log_constant_ = log_gamma(0.5 * (dof_ + d)) - log_gamma(0.5 * dof_) - 0.5 * d * std::log(dof_ * kPi) -
                   root_.diagonal().array().log().sum();
   inverse_root_ = MatrixXd::Identity(root_.rows(), root_.rows());
   root_.triangularView<Eigen::Lower>().solveInPlace(inverse_root_);

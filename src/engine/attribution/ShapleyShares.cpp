@@ -5,6 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "engine/linalg/log_gamma.hpp"
 #include "engine/parallel/parallel_for.hpp"
 #include "engine/random/Stream.hpp"
 #include "engine/random/purposes.hpp"
@@ -23,7 +24,7 @@ Coalition bit(int player) { return Coalition{1} << player; }
 VectorXd over_coalitions(int n, const std::function<double(Coalition)>& value) {
   std::vector<double> weight(static_cast<std::size_t>(n)), known(std::size_t{1} << n);
   for (int c = 0; c < n; ++c)
-    weight[c] = std::exp(std::lgamma(c + 1.0) + std::lgamma(n - c) - std::lgamma(n + 1.0));
+    weight[c] = std::exp(log_gamma(c + 1.0) + log_gamma(n - c) - log_gamma(n + 1.0));
   for (Coalition a = 0; a < known.size(); ++a) known[a] = value(a);
   VectorXd values = VectorXd::Zero(n);
   for (Coalition a = 0; a < known.size(); ++a) {

@@ -9,6 +9,7 @@
 
 #include "engine/emulator/ModeSearch.hpp"
 #include "engine/linalg/GaussianKernel.hpp"
+#include "engine/linalg/log_gamma.hpp"
 #include "engine/linalg/triangular.hpp"
 
 namespace amiss {
@@ -43,7 +44,7 @@ double log_beta_density(const BetaShapes& prior, double t, double& slope) {
   const double log_x = t > 0 ? -std::log1p(std::exp(-t)) : t - std::log1p(std::exp(t));
   const double log_rest = log_x - t;  // log(1 - x)
   slope = (prior.a - 1) * std::exp(log_rest) - (prior.b - 1) * std::exp(log_x);
-  const double log_constant = std::lgamma(prior.a + prior.b) - std::lgamma(prior.a) - std::lgamma(prior.b);
+  const double log_constant = log_gamma(prior.a + prior.b) - log_gamma(prior.a) - log_gamma(prior.b);
   return log_constant + (prior.a - 1) * log_x + (prior.b - 1) * log_rest;
 }
 
