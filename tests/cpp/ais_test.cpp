@@ -169,14 +169,14 @@ TEST(SampleAis, TwoModesAreRightOrNotTrusted) {
   const MatrixXd wide = (1 + v) * MatrixXd::Identity(2, 2);
   const double truth = std::log(0.3 * std::exp(log_normal_density(first, VectorXd::Zero(2), wide)) +
                                 0.7 * std::exp(log_normal_density(second, VectorXd::Zero(2), wide)));
-  int trusted = 0;
+  int reliable = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const AisResult result = sample_ais(target, {}, seeded(seed));
     if (!trusted(result.outcome)) continue;
-    ++trusted;
+    ++reliable;
     EXPECT_LT(std::abs(result.log_evidence - truth), 4 * result.standard_error + 0.05) << "seed " << seed;
   }
-  EXPECT_GE(trusted, 5);  // this case is not hard enough to be refused most of the time
+  EXPECT_GE(reliable, 5);  // this case is not hard enough to be refused most of the time
 }
 
 TEST(SampleAis, LikelihoodOfZeroOnHalfTheSpace) {
