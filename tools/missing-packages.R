@@ -1,5 +1,5 @@
 # Prints, one a line, the R packages of DESCRIPTION that cannot be loaded or are too old.
-# Usage: Rscript missing-packages.R DESCRIPTION runtime|all|bench|site
+# Usage: Rscript missing-packages.R DESCRIPTION runtime|all|bench|site|fuzz|valgrind
 arguments <- commandArgs(trailingOnly = TRUE)
 runtime <- arguments[2] == "runtime"
 fields <- read.dcf(arguments[1], fields = c("Imports", "LinkingTo", "Suggests"))

@@ -345,6 +345,16 @@ TEST(SampleAis, MoreImportanceDrawsAreAddedUntilTheStandardErrorIsAsAsked) {
   EXPECT_LT(std::abs(result.log_evidence - model.log_evidence()), 0.04);  // four standard errors
 }
 
+TEST(SampleAis, NoMoreImportanceDrawsAreAddedAtOnceThanWereAsked) {
+  AisOptions options;
+  options.importance_draws = 50;
+  options.effective_draws = 1e300;  // never reached: sixteen times those asked for are the most
+  const LinearGaussian model(3, 0.3);
+  const AisResult result = sample_ais(model.target(), options, seeded(22));
+  EXPECT_EQ(result.estimator, "importance");
+  EXPECT_EQ(result.draws.cols(), 16 * 50);
+}
+
 TEST(SampleAis, ThePilotFindsHowManyMovesAreNeeded) {
   AisOptions options;
   options.importance_draws = 0;

@@ -78,6 +78,9 @@ TEST(ErrorOptions, RefusesImpossibleValues) {
   EXPECT_THROW((ErrorOptions{VectorXd::Zero(1), VectorXd::Ones(1)}.check()), std::invalid_argument);
   EXPECT_THROW((ErrorOptions{VectorXd::Ones(1), VectorXd::Constant(1, -1.0)}.check()), std::invalid_argument);
   EXPECT_THROW((ErrorOptions{VectorXd::Ones(1), VectorXd()}.check()), std::invalid_argument);
+  const VectorXd nan = VectorXd::Constant(1, std::numeric_limits<double>::quiet_NaN());
+  EXPECT_THROW((ErrorOptions{nan, VectorXd::Ones(1)}.check()), std::invalid_argument);
+  EXPECT_THROW((ErrorOptions{VectorXd::Ones(1), nan}.check()), std::invalid_argument);
   EXPECT_NO_THROW((ErrorOptions{kTimes, VectorXd::Zero(1)}.check()));
 }
 

@@ -53,10 +53,14 @@ TEST(FilterBank, ColumnsRunByBoundaryColumnThenTimeConstant) {
   for (Index c = 0; c < 3; ++c) EXPECT_EQ(bank.responses.col(2 * c), x.col(c));
 }
 
-TEST(FilterBank, RefusesWrongLengthsAndNegativeTimes) {
+TEST(FilterBank, RefusesWrongLengthsAndImpossibleTimes) {
   const TimeAxis axis = even_axis(10);
   EXPECT_THROW(FilterBank(VectorXd::Zero(9), {0}, VectorXd::Ones(1), axis), std::invalid_argument);
   EXPECT_THROW(FilterBank(VectorXd::Zero(10), {0}, -VectorXd::Ones(1), axis), std::invalid_argument);
+  for (double constant : {std::numeric_limits<double>::quiet_NaN(), kInfinity}) {
+    const VectorXd constants = VectorXd::Constant(1, constant);
+    EXPECT_THROW(FilterBank(VectorXd::Zero(10), {0}, constants, axis), std::invalid_argument);
+  }
 }
 
 }  // namespace

@@ -382,6 +382,11 @@ TEST(HistoryModel, RefusesDataThatDoNotFit) {
   refuses([](HistoryData& data) { data.basis = normal_matrix(kN, kN, 1); });
   refuses([](HistoryData& data) { data.basis.col(1).setZero(); });
   refuses([](HistoryData& data) { data.moves = MatrixXd::Ones(2, 2); });
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refuses([=](HistoryData& data) { data.y[3] = nan; });
+  refuses([](HistoryData& data) { data.basis(3, 1) = kInfinity; });
+  refuses([=](HistoryData& data) { data.responses(3, 1) = nan; });
+  refuses([=](HistoryData& data) { data.moves(3, 1) = nan; });
 }
 
 TEST(HistoryModel, RefusesPriorsWithoutMeaning) {
@@ -391,6 +396,11 @@ TEST(HistoryModel, RefusesPriorsWithoutMeaning) {
     EXPECT_THROW(HistoryModel(make_data(), priors, Context()), std::invalid_argument);
   };
   refuses([](HistoryPriors& priors) { priors.noise_sd = 0.0; });
+  refuses([](HistoryPriors& priors) { priors.noise_sd = kInfinity; });
+  refuses([](HistoryPriors& priors) { priors.noise_sd = 1e-200; });
+  refuses([](HistoryPriors& priors) { priors.noise_shape = kInfinity; });
+  refuses([](HistoryPriors& priors) { priors.discarded_variance = kInfinity; });
+  refuses([](HistoryPriors& priors) { priors.amplitude = kInfinity; });
   refuses([](HistoryPriors& priors) { priors.noise_shape = 0.0; });
   refuses([](HistoryPriors& priors) { priors.discarded_variance = -1.0; });
   refuses([](HistoryPriors& priors) { priors.inclusion = 0.0; });

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "engine/parallel/MemoryPool.hpp"
 #include "engine/parallel/parallel_for.hpp"
 
 namespace amiss {
@@ -138,6 +139,25 @@ TEST(ParallelFor, PollsOnTheCallingThreadOnly) {
   EXPECT_GT(polls, 0);
   EXPECT_FALSE(elsewhere);
   EXPECT_EQ(on_caller, 0);
+}
+
+TEST(MemoryPool, NoTwoTasksHaveTheSamePieceAtOnce) {
+  struct Piece {
+    int made = 0;
+    int value = 0;  // not atomic: the thread sanitizer sees two who write it at once
+  };
+  MemoryPool<Piece> pool;
+  std::atomic<int> fresh{0};
+  std::atomic<bool> shared{false};
+  parallel_for(200, with_threads(2), [&](int i) {
+    const MemoryPool<Piece>::Loan piece(pool);
+    if (++(*piece).made == 1) ++fresh;
+    (*piece).value = i;
+    if (i % 10 == 0) nap();
+    if ((*piece).value != i) shared = true;
+  });
+  EXPECT_FALSE(shared);
+  EXPECT_LE(fresh, 2);  // what is given back is lent again
 }
 
 }  // namespace

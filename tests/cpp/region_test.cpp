@@ -46,6 +46,7 @@ TEST(Region, RefusesWhatIsNoEllipsoid) {
   const VectorXd centre = VectorXd::Zero(2);
   EXPECT_THROW(Region(centre, MatrixXd::Identity(3, 3), 1.0), std::invalid_argument);
   EXPECT_THROW(Region(centre, MatrixXd::Zero(2, 2), 1.0), std::invalid_argument);
+  EXPECT_THROW(Region(centre, Eigen::Vector2d(1.0, 1e-310).asDiagonal(), 1.0), std::invalid_argument);
   EXPECT_THROW(Region(centre, MatrixXd::Identity(2, 2), 0.0), std::invalid_argument);
 }
 

@@ -80,7 +80,7 @@ ImportanceSample PopulationMonteCarlo::sample(const StudentTMixture& first, cons
   constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
   constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
   constexpr Index kMost = 16;       // times the draws asked for, at most, for the sake of precision
-  constexpr Index kLeastAdded = 100;
+  constexpr double kLeastAdded = 100.0;
   const Index n = options.importance_draws;
   SkewedMixture mixture(SkewMap(), first);
   ImportanceSample sample;
@@ -98,7 +98,8 @@ ImportanceSample PopulationMonteCarlo::sample(const StudentTMixture& first, cons
     add(n);
     while (good() && lacking() > 1.0 && sample.size() < kMost * n) {
       const double more = 1.1 * (lacking() - 1.0) * static_cast<double>(sample.size());
-      add(std::clamp<Index>(static_cast<Index>(more), kLeastAdded, n));
+      const double all = static_cast<double>(n);
+      add(static_cast<Index>(std::clamp(more, std::min(kLeastAdded, all), all)));
     }
     if (good()) break;
   }

@@ -13,8 +13,8 @@ FilterBank::FilterBank(const Eigen::Ref<const Eigen::MatrixXd>& x,
     throw std::invalid_argument("filter bank: boundary conditions and time differ in length");
   if (static_cast<Eigen::Index>(condition_of_column.size()) != x.cols())
     throw std::invalid_argument("filter bank: a condition is needed for each column");
-  if ((time_constants.array() < 0).any())
-    throw std::invalid_argument("filter bank: time constants must not be negative");
+  if (!time_constants.allFinite() || (time_constants.array() < 0).any())
+    throw std::invalid_argument("filter bank: time constants must be finite and not negative");
   const Eigen::Index filters = time_constants.size();
   responses.resize(x.rows(), x.cols() * filters);
   for (Eigen::Index c = 0; c < x.cols(); ++c) {

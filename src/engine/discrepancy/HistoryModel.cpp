@@ -86,13 +86,20 @@ void HistoryData::check() const {
     throw std::invalid_argument("history: a column of the basis is zero");
   if (moves.size() > 0 && moves.rows() != n)
     throw std::invalid_argument("history: the simulator's moves need one row for each of the record");
+  if (!y.allFinite() || !basis.allFinite() || !responses.allFinite() || !moves.allFinite())
+    throw std::invalid_argument("history: record, basis, responses and moves must be finite");
 }
 
 void HistoryPriors::check() const {
-  if (!(noise_sd > 0)) throw std::invalid_argument("history: noise_sd must be positive");
+  if (!(noise_sd > 0 && noise_sd * noise_sd > 0))
+    throw std::invalid_argument("history: noise_sd must be positive");
   if (!(noise_shape > 0)) throw std::invalid_argument("history: noise_shape must be positive");
   if (!(discarded_variance >= 0))
     throw std::invalid_argument("history: discarded_variance must not be negative");
+  if (!std::isfinite(noise_sd * noise_sd) || !std::isfinite(noise_shape) ||
+      !std::isfinite(discarded_variance) || !std::isfinite(amplitude))
+    throw std::invalid_argument(
+        "history: noise_sd, noise_shape, discarded_variance and amplitude must be finite");
   if (!(inclusion > 0 && inclusion <= 1))
     throw std::invalid_argument("history: inclusion must lie in (0, 1]");
   if (!(amplitude > 0)) throw std::invalid_argument("history: amplitude must be positive");
@@ -383,7 +390,7 @@ CoefficientLikelihood HistoryModel::given(const HistoryParameters& point) const 
   MatrixXd half(static_cast<Index>(factor.kept.size()), q);
   for (Index j = 0; j < half.rows(); ++j)
     half.row(j) = factor.root[j] * seen.gram.row(q + factor.kept[j]).head(q);
-  factor.lower.matrixL().solveInPlace(half);
+  if (half.size() > 0) factor.lower.matrixL().solveInPlace(half);  // Eigen looks at its first element
   const double squared = precision * precision;
   return {reference_, precision * seen.gram.topLeftCorner(q, q) - squared * (half.transpose() * half),
           precision * seen.cross.head(q) - squared * (half.transpose() * factor.half),

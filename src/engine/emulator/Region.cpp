@@ -19,7 +19,7 @@ Region::Region(VectorXd centre, MatrixXd root, double radius)
   if (!(radius > 0) || !std::isfinite(radius) || !centre_.allFinite() || !root_.allFinite())
     throw std::invalid_argument("region: centre, root and radius must be finite, the radius positive");
   factor_.compute(root_);
-  if (!(factor_.matrixLU().diagonal().cwiseAbs().minCoeff() > 0))
+  if (!(factor_.matrixLU().diagonal().cwiseAbs().minCoeff() > 0) || !factor_.inverse().allFinite())
     throw std::invalid_argument("region: the root is singular");
 }
 

@@ -32,9 +32,10 @@ Eigen::VectorXd ErrorOptions::setting(int g) const {
 }
 
 void ErrorOptions::check() const {
-  if ((correlation_times.array() <= 0).any())
-    throw std::invalid_argument("error: correlation times must be positive");
-  if ((ratios.array() < 0).any()) throw std::invalid_argument("error: variance ratios must not be negative");
+  if (!correlation_times.allFinite() || (correlation_times.array() <= 0).any())
+    throw std::invalid_argument("error: correlation times must be finite and positive");
+  if (!ratios.allFinite() || (ratios.array() < 0).any())
+    throw std::invalid_argument("error: variance ratios must be finite and not negative");
   if (correlation_times.size() > 0 && ratios.size() == 0)
     throw std::invalid_argument("error: no variance ratios given");
 }
