@@ -42,13 +42,12 @@ void ErrorOptions::check() const {
 
 Whitener::Whitener(const TimeAxis& axis, const Eigen::VectorXd& correlation_times,
                    const Eigen::VectorXd& ratios)
-    : new_segment_(axis.new_segment),
-      decay_(Eigen::MatrixXd::Zero(ratios.size(), axis.size())),
+    : decay_(Eigen::MatrixXd::Zero(ratios.size(), axis.size())),
       gain_(ratios.size(), axis.size()),
       scale_(axis.size()) {
   Eigen::MatrixXd covariance = ratios.asDiagonal();
   for (Eigen::Index i = 0; i < axis.size(); ++i) {
-    if (new_segment_[i]) {
+    if (axis.new_segment[i]) {
       covariance = ratios.asDiagonal();
     } else {
       const Eigen::ArrayXd decay = (-(axis.time[i] - axis.time[i - 1]) / correlation_times.array()).exp();

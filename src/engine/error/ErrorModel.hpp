@@ -42,8 +42,7 @@ class Whitener {
   double log_det() const { return log_det_; }  ///< log |W|
 
  private:
-  std::vector<bool> new_segment_;
-  Eigen::MatrixXd decay_;  // K x N: exp(-dt / correlation_time), from the value before
+  Eigen::MatrixXd decay_;  // K x N: exp(-dt / correlation_time) from the value before, 0 at a segment's first
   Eigen::MatrixXd gain_;   // K x N
   Eigen::VectorXd scale_;  // N: 1 / sd of the innovation
   double log_det_ = 0.0;
