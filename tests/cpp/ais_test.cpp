@@ -351,7 +351,7 @@ TEST(SampleAis, NoMoreImportanceDrawsAreAddedAtOnceThanWereAsked) {
   options.effective_draws = 1e300;  // never reached: sixteen times those asked for are the most
   const LinearGaussian model(3, 0.3);
   const AisResult result = sample_ais(model.target(), options, seeded(22));
-  EXPECT_EQ(result.estimator, "importance");
+  EXPECT_EQ(result.estimator, Estimator::importance);
   EXPECT_EQ(result.draws.cols(), 16 * 50);
 }
 
