@@ -61,7 +61,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::require(std::isfinite(result.log_evidence), "the evidence is a number");
     fuzz::require(result.draws.allFinite() && std::abs(result.weights.sum() - 1.0) < 1e-9,
                   "draws are weighted");
-    fuzz::require(!result.trusted || std::isfinite(result.standard_error), "what is trusted has an error");
+    fuzz::require(!trusted(result.outcome) || std::isfinite(result.standard_error),
+                  "what is trusted has an error");
   });
   return 0;
 }
