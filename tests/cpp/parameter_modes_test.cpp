@@ -75,7 +75,7 @@ TEST(ParameterModes, FindBothOfTwo) {
 
 TEST(ParameterModes, WithoutAModeThePriorStands) {
   HistoryData data = make_data();
-  data.y[3] = kInfinity;
+  data.y[3] = 1e200;  // its square is not finite
   const HistoryModel model = make_model({}, data);
   const Emulator emulator = make_emulator(2);
   const CalibrationTarget target(model, {}, emulator);
