@@ -6,7 +6,8 @@
 #' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for each, how the chains
 #' move and how often. Then all is frozen and fresh, independent groups of chains give the estimate: unbiased, with an
 #' interval by bootstrap over the groups. A second estimator (an importance sample from a Student-t mixture fitted to
-#' the draws or, where none comes close, annealing from that mixture) must not lie above the one reported. Groups or draws are added until the standard error is at most `precision`.
+#' the draws or, where none comes close, annealing from that mixture) must not lie above the one reported. Groups or
+#' draws are added until the standard error is at most `precision`.
 #'
 #' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
 #'   log-likelihood of each point; `-Inf` where it is zero.

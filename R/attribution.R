@@ -14,8 +14,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' shift is alike; nothing checks that.
 #'
 #' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those
-#' that can be dropped alone a set is sought that cannot be dropped together, nor be made smaller. Such a group is tested like a
-#' condition, and its members are named together: what they say cannot be told apart in this record.
+#' that can be dropped alone a set is sought that cannot be dropped together, nor be made smaller. Such a group is
+#' tested like a condition, and its members are named together: what they say cannot be told apart in this record.
 #'
 #' *Share.* A set of conditions takes a part of the misfit away, its sum of squares weighed by the covariance of error
 #' and simulator. The share of a condition is its Shapley value: what it adds to those before it, averaged over all

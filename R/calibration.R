@@ -17,14 +17,14 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #' the runs differ by much more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a free
 #' discrepancy says that the model is wrong where its parameters could hide it.
 #'
-#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior, or at `exact` if these are more.
-#' The emulator's error there, over the measurement error as the likelihood weighs it (autocorrelated as it was seen; if
-#' more was seen than stated, over the noise stated), is the check that counts: above a third, neither the posterior nor
-#' the evidence is trusted ([calibrate_refined()] then makes an emulator for the region and tries again). The
-#' likelihoods of `exact` such runs correct the evidence, so that it is the simulator's own; fewer than a tenth
-#' effective among them fail the check too, and so does more than a twentieth of the posterior in the outer tenth of the
-#' emulator's region. For an ensemble made elsewhere the check uses runs left out one by one, the fifth (at least 20)
-#' that lie nearest to the posterior.
+#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior,
+#' or at `exact` if these are more. The emulator's error there, over the measurement error as the likelihood weighs it
+#' (autocorrelated as it was seen; if more was seen than stated, over the noise stated), is the check that counts: above
+#' a third, neither the posterior nor the evidence is trusted ([calibrate_refined()] then makes an emulator for the
+#' region and tries again). The likelihoods of `exact` such runs correct the evidence, so that it is the simulator's
+#' own; fewer than a tenth effective among them fail the check too, and so does more than a twentieth of the posterior
+#' in the outer tenth of the emulator's region. For an ensemble made elsewhere the check uses runs left out one by one,
+#' the fifth (at least 20) that lie nearest to the posterior.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].

@@ -32,9 +32,9 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`, `attribution`, `prediction`,
 #'   `scores`, `best` (the least-squares parameters) and, of a [zone()], draws of its `heat_loss` coefficient), and the
 #'   tables that `tidy()` gives:
-#'   * `"evidence"`: `log10_evidence` with its interval, `trusted`, `log10_bf` of the best model against
-#'   the second, of every other against the one ranked above it, with its interval and `word`, `log10_bf_first` against the first model of the list, posterior `probability`, and
-#'     `rank`;
+#'   * `"evidence"`: `log10_evidence` with its interval, `trusted`, `log10_bf` of the best model against the second, of
+#'     every other against the one ranked above it, with its interval and `word`, `log10_bf_first` against the first
+#'     model of the list, posterior `probability`, and `rank`;
 #'   * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`, `aic`, `bic`, `nested`,
 #'     `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`;
 #'   * `"ranking"`: the rank of each model by each criterion;

@@ -65,9 +65,9 @@ figure_sampler <- function(results) {
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, labeller = wrap_strips(2)) +
     stage_scales() + stage_lines() +
     figure_titles(title,
-                  paste("From where the chains start (0) to the posterior (1). Low values: chains that stand still, or few that",
-                               "carry the weight; more chains or moves would help.",
-                               estimate_words(results)), x = "inverse temperature") +
+                  paste("From where the chains start (0) to the posterior (1). Low values: chains that stand still,",
+                        "or few that carry the weight; more chains or moves would help.",
+                        estimate_words(results)), x = "inverse temperature") +
     figure_theme()
   with_height(figure, 4.8)
 }

@@ -3,10 +3,11 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 
 #' Calibrate a simulator as in the paper
 #'
-#' The method of Monari (2022), its misprints corrected, beside the package's own ([calibrate()], [attribute_discrepancy()]): the
-#' parameters from the measurement's coefficients on the basis (equation 5), the discrepancy as a Gaussian process over
-#' the boundary conditions of the same time step (equation 6), both by annealed importance sampling, and the variance
-#' index of each condition. It knows neither the history of the conditions nor autocorrelated errors.
+#' The method of Monari (2022), its misprints corrected, beside the package's own ([calibrate()],
+#' [attribute_discrepancy()]): the parameters from the measurement's coefficients on the basis (equation 5), the
+#' discrepancy as a Gaussian process over the boundary conditions of the same time step (equation 6), both by annealed
+#' importance sampling, and the variance index of each condition. It knows neither the history of the conditions nor
+#' autocorrelated errors.
 #'
 #' *Evidence.* The product of the normalising constants of (5) and (6), with the Jacobian `|K'K|^(-1/2)`, is a density
 #' of the calibration record, so that models with different bases may be compared. The precision `lambda*` of the noise

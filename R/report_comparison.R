@@ -67,7 +67,8 @@ probability_sentences <- function(comparison) {
   if (nrow(table) < 2) return(NULL)
   table <- table[order(table$rank), ]
   near <- table[-1, ][table$probability[-1] >= 0.01, ]
-  if (nrow(near)) sprintf("All models were equally likely beforehand; besides the best, some probability is left to %s.",
+  if (nrow(near))
+    sprintf("All models were equally likely beforehand; besides the best, some probability is left to %s.",
                           listed(paste0(near$model, " (", percent(near$probability), ")")))
   else "All models were equally likely beforehand; none but the best keeps one per cent of the probability."
 }

@@ -18,11 +18,11 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the
 #' parameters, two thirds of all, and compared with the present model calibrated in the same way; then in full, with the
 #' other runs made where the coarse posterior lies ([refine_ensemble()]; none where the coarse calibration was refined
-#' there already) and the emulator checked by runs of the simulator and refined ([calibrate_refined()]), those that could
-#' come within `margin` both of the best and of being decisive: the coarse evidence is taken as uncertain by three standard errors and, if
-#' `screening` asks for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their
-#' coarse Bayes factor; `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those calibrated in
-#' full.
+#' there already) and the emulator checked by runs of the simulator and refined ([calibrate_refined()]), those that
+#' could come within `margin` both of the best and of being decisive: the coarse evidence is taken as uncertain by three
+#' standard errors and, if `screening` asks for a second estimator, by what annealing lags behind it. Candidates that
+#' stay behind keep their coarse Bayes factor; `candidates$judged_by` is `"screening"` for them, and `"calibration"` for
+#' those calibrated in full.
 #'
 #' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,

@@ -20,7 +20,8 @@ judge_models <- function(models, candidates, catalogue, measurements, control) {
       if (no_gain) "data held out do not gain by it",
       if (model$scores$calibrate[["rmse"]] > 1.02 * parent$scores$calibrate[["rmse"]])
         "the error in calibration rose with it",
-      if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary)) "the error still answers to what drives it",
+      if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
+        "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
       if (remains) "a good part of the error remains",
       if (k == 2 && drift_rivals(models, measurements, control)) "a drifting sensor would explain the error as well")

@@ -149,7 +149,8 @@ zone <- function(..., volume, air_capacity_factor = 1, initial_air = 20, initial
 
 new_zone <- function(components, extra, call = rlang::caller_env()) {
   if (!all(vapply(components, inherits, NA, "amiss_component"))) {
-    abort_input(c("A zone is composed of components.", i = "Give for example {.fn zone_wall}, {.fn zone_window}, {.fn zone_heater}."),
+    abort_input(c("A zone is composed of components.",
+                  i = "Give for example {.fn zone_wall}, {.fn zone_window}, {.fn zone_heater}."),
                 call = call)
   }
   names(components) <- vapply(components, `[[`, "", "name")
