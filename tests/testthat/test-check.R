@@ -124,13 +124,13 @@ test_that("runs made elsewhere are checked by those left out", {
   good <- elsewhere(60)
   expect_true(good$check$passed)
   expect_identical(good$check$runs, 20L)  # a fifth would be 12
-  expect_match(good$check$verdict, "by 20 runs left out, those nearest to the posterior", fixed = TRUE)
+  expect_match(good$check$verdict, "by 20 left-out runs nearest to the posterior", fixed = TRUE)
   expect_true(is.na(good$check$effective))
   expect_identical(good$log_evidence, good$posterior$log_evidence)
   expect_null(good$check$mean)
   bad <- elsewhere(6)
   expect_false(bad$check$passed)
-  expect_match(bad$trust$verdict, "by 6 runs left out.*not good enough")
+  expect_match(bad$trust$verdict, "by 6 left-out runs.*not good enough")
 })
 
 test_that("of a linear simulator the exact evidence is the emulated one", {

@@ -2,13 +2,14 @@
 # correlated by 0.95 and more: test-attribution.R. Fewer rows than basis vectors: test-calibration.R.
 skip_on_cran()  # second tier: tools/test --quick
 
-hard_fit <- function(f, ..., data = linear_data(96), noise = 0.1, runs = 30, truth) {
+hard_fit <- function(f, ..., data = linear_data(96), noise = 0.1, runs = 30, truth, seed = 1) {
   simulator <- function_simulator(f, ..., boundary = c("Te", "Gv"))
   if (!missing(truth)) {
     data$Ti <- f(truth, as.matrix(data[c("Te", "Gv")])) + noise * withr::with_seed(1, stats::rnorm(nrow(data)))
   }
   m <- linear_measurements(data, noise_sd = noise)
-  calibrate(suppressWarnings(train_emulator(simulate_design(simulator, m, runs, seed = 1), m)), m, quick_ais, seed = 1)
+  emulator <- suppressWarnings(train_emulator(simulate_design(simulator, m, runs, seed = 1), m))
+  calibrate(emulator, m, quick_ais, seed = seed)
 }
 
 share_where <- function(fit, condition) sum(fit$weights[condition(fit$values)])
@@ -20,14 +21,18 @@ test_that("a simulator that steps is known on its side of the step, or its emula
   if (!fit$trust$trusted) expect_match(fit$trust$verdict, "not good enough")
 })
 
-test_that("a posterior of two modes has both, each with its half", {
+# The effective size of the draws does not know how the mass is shared between modes that no chain goes between: the
+# share scatters more than that says, so that it is judged by its own scatter over seeds.
+test_that("a posterior of two modes has both in every sample, and each its half on average", {
   even <- function(values, drivers) 20 + (values[["a"]] - 0.5)^2 * drivers[, "Te"]
-  fit <- hard_fit(even, free("a", uniform(0, 1)), truth = c(a = 0.8))
-  expect_true(fit$trust$trusted)
-  share <- share_where(fit, function(values) values[, "a"] < 0.5)
-  expect_lt(abs(share - 0.5), 4 * sqrt(0.25 / fit$posterior$ess))
-  expect_lt(sqrt(0.25 / fit$posterior$ess), 0.06)
-  expect_gt(share_where(fit, function(values) abs(abs(values[, "a"] - 0.5) - 0.3) < 0.05), 0.9)
+  shares <- vapply(1:8, function(seed) {
+    fit <- hard_fit(even, free("a", uniform(0, 1)), truth = c(a = 0.8), seed = seed)
+    expect_gt(share_where(fit, function(values) abs(abs(values[, "a"] - 0.5) - 0.3) < 0.05), 0.9)
+    share_where(fit, function(values) values[, "a"] < 0.5)
+  }, 0)
+  expect_true(all(shares > 0.1 & shares < 0.9))
+  expect_lt(abs(mean(shares) - 0.5), 4 * sd(shares) / sqrt(8))
+  expect_lt(sd(shares), 0.2)
 })
 
 linear <- function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"]

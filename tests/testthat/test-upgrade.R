@@ -158,7 +158,7 @@ test_that("mechanisms may be other sets of given runs", {
   first <- upgrade$candidates[upgrade$candidates$from == "base", ]
   expect_gt(min(first$log10_bf), 2)
   for (model in upgrade$models) {
-    expect_match(model$fit$check$verdict, "runs left out")
+    expect_match(model$fit$check$verdict, "left-out runs")
     expect_true(model$fit$check$passed)
     expect_equal(sum(model$prediction$use == "validate"), 36)
     expect_true(all(is.finite(unlist(model$scores))))
