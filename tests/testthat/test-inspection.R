@@ -46,7 +46,7 @@ test_that("conditions that go together, answers without a mechanism and absent d
   attribution$table$group <- NA_character_
   upgrade$models[[1]]$attribution <- attribution
   answers <- about(inspected(upgrade), "answer")
-  expect_match(answers, "answers to Gv, and of what it drives sun was tried but not adopted", all = FALSE)
+  expect_match(answers, "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted", all = FALSE)
   attribution$table$group <- "Te or Gv"
   attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE, correlation = 0.97))
   upgrade$models[[1]]$attribution <- attribution
