@@ -22,7 +22,7 @@
 #'     records of [calibrate_paper()] 1; 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
 #'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()] along the
-#'   parameters: they follow a curved posterior, at up to twice the cost). [ais()] makes them if it is given one;
+#'     parameters: they follow a curved posterior, at up to twice the cost). [ais()] makes them if it is given one;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
 #'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95

@@ -50,13 +50,13 @@ new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
 }
 
 # Mean and variance over posterior draws of the hyper-parameters, by the law of total variance.
-paper_discrepancy <- function(fit, draws = 24, threads = 1) {
+paper_discrepancy <- function(fit, draws = 24) {
   hyper <- fit$hyperparameters
   picked <- systematic_draws(hyper$weights, draws)
   of <- call_engine(paper_discrepancy_(
     paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
     list(alpha = hyper$alpha[picked, , drop = FALSE], t2 = hyper$t2[picked], lambda = hyper$lambda[picked]),
-    engine_context(fit$seed, threads)))
+    engine_context(fit$seed, 1)))
   mean <- rowMeans(of$mean)
   sd <- sqrt(rowMeans(of$variance) + rowMeans((of$mean - mean)^2))
   new_discrepancy(fit, mean, mean - 1.96 * sd, mean + 1.96 * sd)
