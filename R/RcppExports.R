@@ -29,12 +29,16 @@ filter_bank_ <- function(x, time_constants, time, new_segment) {
     .Call(`_amiss_filter_bank_`, x, time_constants, time, new_segment)
 }
 
-calibrate_ <- function(data, priors, emulator_list, control, context_list) {
-    .Call(`_amiss_calibrate_`, data, priors, emulator_list, control, context_list)
+calibrate_ <- function(records, control, context_list) {
+    .Call(`_amiss_calibrate_`, records, control, context_list)
 }
 
-attribute_ <- function(data, priors, emulator_list, fit, control, context_list) {
-    .Call(`_amiss_attribute_`, data, priors, emulator_list, fit, control, context_list)
+attribute_ <- function(records, which, fit, control, context_list) {
+    .Call(`_amiss_attribute_`, records, which, fit, control, context_list)
+}
+
+drop_conditions_ <- function(records, fit, conditions, ais, context_list) {
+    .Call(`_amiss_drop_conditions_`, records, fit, conditions, ais, context_list)
 }
 
 tangent_posterior_ <- function(data, priors, x0, run, slopes, draws, ais, context) {

@@ -45,19 +45,32 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' attribute_discrepancy(fit, list(surrogates = 19), seed = 1)
 #' @export
-attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
+attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) UseMethod("attribute_discrepancy")
+
+#' @export
+attribute_discrepancy.default <- function(fit, control = NULL, seed = NULL, threads = 1) {
+  check_object(fit, c("amiss_calibration", "amiss_joint"), "fit")
+}
+
+#' @export
+attribute_discrepancy.amiss_calibration <- function(fit, control = NULL, seed = NULL, threads = 1) {
   check_object(fit, "amiss_calibration", "fit")
+  check_not_part(fit)
+  attribute_record(list(fit), 1, control, pick_seed(seed), check_threads(threads))
+}
+
+# Of records that were calibrated together, the discrepancy of one.
+attribute_record <- function(fits, which, control, seed, threads) {
+  fit <- fits[[which]]
   control <- fill_attribution_control(control, fit$control$ais, length(fit$measurements$conditions))
-  seed <- pick_seed(seed)
-  threads <- check_threads(threads)
-  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
-  draws <- list(posterior = fit$posterior, kept = fit$kept, tangent = fit$tangent)
+  records <- engine_records(fits)
+  draws <- engine_draws(fits)
   conditions <- fit$measurements$conditions
   alone <- seq_along(conditions)
   attributed <- function(least) {
     asked <- c(control, list(least = least * log(10)))
     result <- staged("attributing the discrepancy", call_engine(
-      attribute_(data, fit$priors, fit$emulator$processes, draws, asked, engine_context(seed, threads))))
+      attribute_(records, which, draws, asked, engine_context(seed, threads))))
     matters <- result$sets$lost / log(10) >= control$least_log10_bf
     c(result,
       list(significant = matters & result$adjusted <= control$level,
@@ -90,6 +103,13 @@ attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
                  surrogates = nrow(result$null_statistics),
                  statistic = result$statistic, null_statistics = result$null_statistics,
                  control = control, seed = seed), class = "amiss_attribution")
+}
+
+# A posterior of calibrate_sets() as the engine takes it.
+engine_draws <- function(fits) {
+  list(posterior = fits[[1]]$posterior, kept = fits[[1]]$kept, records = lapply(unname(fits), function(fit) {
+    c(fit$posterior[c("setting", "variance", "t")], list(tangent = fit$tangent))
+  }))
 }
 
 # Of two conditions that say the same, one may earn just enough to stay out of the search for groups, and yet no

@@ -70,24 +70,45 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
 # The calibration, and the runs of the simulator at its draws.
 calibrate_with_runs <- function(emulator, measurements, control, seed, threads, call = rlang::caller_env()) {
   threads <- check_threads(threads)
-  set <- calibration_setting(emulator, measurements, control, seed, call)
-  control <- set$control
-  data <- history_data(emulator, measurements, set$rows, control)
+  found <- calibrate_sets(list(calibration_setting(emulator, measurements, control, seed, call)), threads, call)
+  list(fit = found$fits[[1]], made = found$made[[1]])
+}
+
+# list(fits, made): calibrations of records that share the parameters of the same name, one for each set
+# (calibration_setting()), and the runs of each at its draws. All have the same draws and the evidence of all records.
+calibrate_sets <- function(sets, threads, call = rlang::caller_env()) {
+  records <- engine_records(sets)
   result <- tryCatch(
     staged("sampling the posterior", call_engine(
-      calibrate_(data, set$priors, emulator$processes, control, engine_context(set$seed, threads)))),
+      calibrate_(records, sets[[1]]$control, engine_context(sets[[1]]$seed, threads)))),
     amiss_error_numerical = function(e) {
-      check_noise_visible(emulator, measurements$noise_sd, e, call)
+      for (set in sets) check_noise_visible(set$emulator, set$measurements$noise_sd, e, call)
       rlang::cnd_signal(e)
     })
-  posterior <- result$posterior
-  fit <- new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept,
-                 coefficients = result$coefficients, withheld = result$withheld, tangent = result$tangent,
-                 centre = result$centre, scale = result$scale,
-                 reach = stats::setNames(result$reach, format(control$reach, trim = TRUE)))
-  checked <- checked_by_runs(fit, threads)
-  checked$fit$trust <- fit_trust(checked$fit)
+  fits <- Map(fit_of_record, sets, records, result$records, MoreArgs = list(result = result))
+  checked <- checked_by_runs(unname(fits), threads)
+  checked$fits <- lapply(checked$fits, function(fit) {
+    fit$trust <- fit_trust(fit)
+    fit
+  })
   checked
+}
+
+fit_of_record <- function(set, record, own, result) {
+  posterior <- c(result$posterior, own[c("setting", "variance", "t")])
+  posterior$unit <- posterior$unit[, record$parameters, drop = FALSE]
+  new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept, coefficients = own$coefficients,
+          withheld = own$withheld, tangent = own$tangent, centre = own$centre, scale = own$scale,
+          reach = stats::setNames(own$reach, format(set$control$reach, trim = TRUE)))
+}
+
+# Records as the engine takes them, their parameters numbered over all. `fits`: calibrations, or what they are made of.
+engine_records <- function(fits) {
+  numbered <- unique(unlist(lapply(fits, function(fit) names(fit$emulator$parameters))))
+  lapply(unname(fits), function(fit) {
+    list(data = history_data(fit$emulator, fit$measurements, fit$rows, fit$control), priors = fit$priors,
+         emulator = fit$emulator$processes, parameters = match(names(fit$emulator$parameters), numbered))
+  })
 }
 
 # A noise that is lost in the rounding of what the simulator moves is told as the reason of a failure.
@@ -177,8 +198,12 @@ fit_trust <- function(fit) {
 #' @export
 print.amiss_calibration <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Calibration} on {length(x$rows)} rows of {.val {x$measurements$name}}")
-  cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)},",
-                      "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
+  if (isTRUE(x$part)) {
+    cli::cli_text("one of several records that were calibrated together, {x$trust$verdict}")
+  } else {
+    cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)},",
+                        "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
+  }
   say_parameters(x, 6)
   cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
   cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))

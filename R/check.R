@@ -5,28 +5,32 @@ largest_error_ratio <- 1 / 3  # of the noise: above it the emulator is not good 
 least_effective <- 0.1        # share of the runs under their own likelihoods
 largest_border_share <- 0.05  # of the posterior in the outer tenth of the emulator's region
 
-# list(fit, made): the fit with its check, and the runs (NULL where none were made).
-checked_by_runs <- function(fit, threads) {
-  if (fit$control$check == 0) return(list(fit = fit, made = NULL))
-  if (is.null(fit$emulator$simulator)) {
-    fit$check <- check_by_left_out(fit)
-    return(list(fit = fit, made = NULL))
-  }
-  exact <- fit$control$exact %||% default_exact(fit)
-  made <- posterior_runs(fit, max(fit$control$check, exact), threads)
-  fit$check <- emulation_check(fit, made)
-  if (exact > 0) fit <- exact_evidence(fit, made, threads)
-  list(fit = fit, made = made)
+# list(fits, made): calibrations that have the same draws with their checks, and the runs of each (NULL where none were
+# made).
+checked_by_runs <- function(fits, threads) {
+  if (all(vapply(fits, function(fit) fit$control$check, 0) == 0))
+    return(list(fits = fits, made = vector("list", length(fits))))
+  exact <- max(vapply(fits, function(fit) fit$control$exact %||% default_exact(fit), 0))
+  drawn <- even_draws(fits[[1]], max(exact, vapply(fits, function(fit) fit$control$check, 0)))
+  made <- lapply(fits, function(fit) if (!is.null(fit$emulator$simulator)) posterior_runs(fit, drawn, threads))
+  checked <- Map(function(fit, runs) {
+    fit$check <- if (is.null(runs)) check_by_left_out(fit) else emulation_check(fit, runs)
+    fit
+  }, fits, made)
+  if (exact > 0 && !any(vapply(made, is.null, NA))) checked <- exact_evidence(checked, made, threads)
+  list(fits = checked, made = made)
 }
 
 # The runs of the check serve the exact evidence; where they cost milliseconds, more are made for it.
-default_exact <- function(fit) if (inherits(fit$emulator$simulator,
-                                            "amiss_zone")) max(200, fit$control$check) else fit$control$check
+default_exact <- function(fit) {
+  if (is.null(fit$emulator$simulator)) return(0)
+  if (inherits(fit$emulator$simulator,
+               c("amiss_zone", "amiss_zone_flux"))) max(200, fit$control$check) else fit$control$check
+}
 
-# Runs of the simulator at n draws spread evenly over the posterior: list(draws, times, runs, failed), failed ones left
-# out. A draw of more weight than one of n is run once, and counts as often as it was drawn.
-posterior_runs <- function(fit, n, threads) {
-  drawn <- even_draws(fit, n)
+# Runs of the simulator at draws spread evenly over the posterior (even_draws()): list(draws, times, runs, failed),
+# failed ones left out. A draw of more weight than one of them is run once, and counts as often as it was drawn.
+posterior_runs <- function(fit, drawn, threads) {
   draws <- unique(drawn)
   times <- tabulate(match(drawn, draws))
   runs <- staged("check", suppress_run_warnings(simulate_measured(
@@ -118,33 +122,43 @@ error_ratios_of <- function(fit, draws) {
   matrix(vapply(parts, function(part) ratios[digit(part) + 1], numeric(length(draws))), length(draws))
 }
 
-# Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior; with the simulator itself nothing is
-# discarded.
-exact_evidence <- function(fit, made, threads) {
-  drawn <- made$draws
-  posterior <- fit$posterior
-  points <- list(setting = posterior$setting[drawn],
-                 variance = posterior$variance[drawn] - fit$priors$discarded_variance,
-                 t = posterior$t[drawn, , drop = FALSE])
+# Log-likelihood of runs (one a column) of a record, each at its draw; with the simulator itself nothing is discarded.
+run_log_likelihood <- function(fit, draws, runs, threads) {
+  points <- list(setting = fit$posterior$setting[draws],
+                 variance = fit$posterior$variance[draws] - fit$priors$discarded_variance,
+                 t = fit$posterior$t[draws, , drop = FALSE])
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
-  exact <- call_engine(run_likelihood_(data, fit$priors, points, made$runs, engine_context(fit$seed, threads)))
-  log_ratio <- rep(exact - posterior$log_likelihood[drawn], made$times)
+  call_engine(run_likelihood_(data, fit$priors, points, runs, engine_context(fit$seed, threads)))
+}
+
+# Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior, the likelihoods those of all records.
+exact_evidence <- function(fits, made, threads) {
+  drawn <- Reduce(intersect, lapply(made, `[[`, "draws"))
+  exact <- Reduce(`+`, Map(function(fit, m) {
+    run_log_likelihood(fit, drawn, m$runs[, match(drawn, m$draws), drop = FALSE], threads)
+  }, fits, made))
+  times <- made[[1]]$times[match(drawn, made[[1]]$draws)]
+  log_ratio <- rep(exact - fits[[1]]$posterior$log_likelihood[drawn], times)
   ratio <- exp(log_ratio - max(log_ratio))
   weights <- ratio / sum(ratio)
   n <- length(ratio)
   effective <- 1 / (n * sum(weights^2))
-  fit$check$effective <- effective
-  if (fit$check$passed && effective < least_effective) {
-    fit$check$passed <- FALSE
-    fit$check$verdict <- sprintf("%s, but few of these runs are as likely as it says (effective share %.2f)",
-                                 fit$check$verdict, effective)
-  }
   correction <- max(log_ratio) + log(mean(ratio))
   # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the upper half it is
   # that of lognormal ratios; how far the two are apart is part of the error.
   above <- pmax(log_ratio - stats::median(log_ratio), 0)
   lognormal <- stats::median(log_ratio) + mean(above^2)  # twice the mean square of one half, over two
   error <- sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2)
+  lapply(fits, corrected, effective = effective, correction = correction, error = error)
+}
+
+corrected <- function(fit, effective, correction, error) {
+  fit$check$effective <- effective
+  if (fit$check$passed && effective < least_effective) {
+    fit$check$passed <- FALSE
+    fit$check$verdict <- sprintf("%s, but few of these runs are as likely as it says (effective share %.2f)",
+                                 fit$check$verdict, effective)
+  }
   fit$check$correction <- correction
   fit$log_evidence <- fit$log_evidence + correction
   fit$standard_error <- sqrt(fit$standard_error^2 + error^2)

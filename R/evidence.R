@@ -26,13 +26,14 @@
 bayes_factor <- function(model, reference) {
   fits <- list(model = model, reference = reference)
   for (name in names(fits))
-    check_object(fits[[name]], "amiss_fit", name)
+    check_object(fits[[name]], c("amiss_fit", "amiss_joint"), name)
+  lapply(fits, check_not_part)
   if (!identical(class(model)[1], class(reference)[1])) {
     abort_input(
       c("{.arg model} and {.arg reference} were calibrated by different methods; their evidences cannot be compared.",
                   i = "Use {.fun calibrate} for both, or {.fun calibrate_paper}."))
   }
-  if (!identical(model$measurements$y[model$rows], reference$measurements$y[reference$rows])) {
+  if (!identical(calibrated_record(model), calibrated_record(reference))) {
     abort_input(c("The two models were calibrated on different records; their evidences cannot be compared.",
                   i = "Calibrate both on the same measurements."))
   }

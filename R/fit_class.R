@@ -11,6 +11,26 @@ new_fit <- function(class, set, posterior, total, ...) {
             class = c(class, "amiss_fit"))
 }
 
+# The record that a fit was made on; evidences of different ones cannot be compared.
+calibrated_record <- function(fit) UseMethod("calibrated_record")
+
+#' @export
+calibrated_record.amiss_fit <- function(fit) fit$measurements$y[fit$rows]
+
+# A fit of one of several records that were calibrated together: the evidence is not its own.
+as_part <- function(fit) {
+  fit$log_evidence <- fit$standard_error <- NA_real_
+  fit$interval <- c(NA_real_, NA_real_)
+  fit$part <- TRUE
+  fit
+}
+
+check_not_part <- function(fit, call = rlang::caller_env()) {
+  if (!isTRUE(fit$part)) return(invisible())
+  abort_input(c("This is one of several records that were calibrated together; by itself it has no evidence.",
+                i = "Use the whole of {.fun calibrate_jointly}, or calibrate the record alone."), call = call)
+}
+
 # The function that made a fit, and its options if none are given.
 calibrator <- function(fit) UseMethod("calibrator")
 default_control <- function(fit) UseMethod("default_control")

@@ -75,9 +75,10 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
                            settings$threads,
                            runs = regional_runs(first$ensemble$parameters, more), first = first)$fit
     } else if (more > 0 && is.null(first$ensemble$region)) {
-      fit_runs(refine_ensemble(with_checked_runs(first), first$fit, more, threads = settings$threads), settings)
+      fit_runs(refine_ensemble(with_checked_runs(first$ensemble, first$fit, first$made), first$fit, more,
+                               threads = settings$threads), settings)
     } else {
-      fit_runs(with_checked_runs(first), settings)
+      fit_runs(with_checked_runs(first$ensemble, first$fit, first$made), settings)
     }
     fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     fit

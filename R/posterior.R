@@ -20,10 +20,14 @@ weighted_quantile <- function(x, w, probs) {
   stats::approx(cumulative, x[order], probs, rule = 2, ties = "ordered")$y
 }
 
+# Those that the draws are of: of one record, or of several together.
+drawn_parameters <- function(fit) fit$parameters %||% fit$emulator$parameters
+
 parameter_table <- function(fit) {
-  rows <- lapply(names(fit$emulator$parameters), function(n) {
+  parameters <- drawn_parameters(fit)
+  rows <- lapply(names(parameters), function(n) {
     q <- weighted_quantile(fit$values[, n], fit$weights, c(0.5, 0.025, 0.975))
-    data.frame(name = n, unit = fit$emulator$parameters[[n]]$unit, median = q[1], lower95 = q[2], upper95 = q[3])
+    data.frame(name = n, unit = parameters[[n]]$unit, median = q[1], lower95 = q[2], upper95 = q[3])
   })
   do.call(rbind, rows)
 }
@@ -103,7 +107,7 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
   rlang::check_dots_empty()
   check_level(conf.level, "conf.level")
   ends <- stats::confint(x, level = conf.level)
-  declared <- x$emulator$parameters[rownames(ends)]
+  declared <- drawn_parameters(x)[rownames(ends)]
   data.frame(term = rownames(ends), label = vapply(declared, `[[`, "", "label"),
              unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
              std.error = unname(sqrt(diag(stats::vcov(x)))),

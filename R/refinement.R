@@ -57,7 +57,17 @@ lost <- 3                # error over noise from which an emulator does not even
 # is wanted of it.
 refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
                                  hopeless = function(fit) FALSE) {
-  runs <- runs %||% regional_runs(ensemble$parameters)
+  if (!is.null(first)) first <- list(ensembles = list(first$ensemble), fits = list(first$fit), made = list(first$made))
+  last <- refine_records(list(ensemble), list(measurements), rounds, control, seed, threads, runs, first,
+                         function(fits) hopeless(fits[[1]]))
+  list(ensemble = last$ensembles[[1]], fit = last$fits[[1]], made = last$made[[1]])
+}
+
+# The same of records that share parameters: list(ensembles, fits, made), one of each for each record. All fits say in
+# `rounds` and `runs_made` what was spent on all.
+refine_records <- function(ensembles, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
+                           hopeless = function(fits) FALSE) {
+  runs <- runs %||% max(vapply(ensembles, function(e) regional_runs(e$parameters), 0))
   runs_made <- 0
   round <- 0L
   # A round that did not do has shown that the simulator asks for more runs.
@@ -68,62 +78,87 @@ refine_until_checked <- function(ensemble, measurements, rounds, control, seed, 
   in_round <- function(code) {
     if (round > 0) staged(sprintf("round %d of at most %d", round, rounds), code) else code
   }
-  trained <- function(ensemble) in_round(train_emulator(ensemble, measurements, control$emulator, threads = threads))
-  calibrated <- function(ensemble, calibration, emulator = trained(ensemble)) {
-    force(emulator)
-    found <- tryCatch(in_round(calibrate_with_runs(emulator, measurements, calibration, seed, threads)),
-                    amiss_error_numerical = function(e) {
-      if (is.null(ensemble$region) || round >= rounds) rlang::cnd_signal(e)
+  trained <- function(ensembles) {
+    Map(function(ensemble, m) in_round(train_emulator(ensemble, m, control$emulator, threads = threads)), ensembles,
+        measurements)
+  }
+  settings <- function(emulators, calibration) {
+    Map(function(emulator, m) calibration_setting(emulator, m, calibration, seed), emulators, measurements)
+  }
+  has_region <- function(ensembles) !any(vapply(ensembles, function(e) is.null(e$region), NA))
+  calibrated <- function(ensembles, calibration, emulators = trained(ensembles)) {
+    force(emulators)
+    found <- tryCatch(in_round(calibrate_sets(settings(emulators, calibration), threads)),
+                      amiss_error_numerical = function(e) {
+      if (!has_region(ensembles) || round >= rounds) rlang::cnd_signal(e)
     })
     if (is.null(found)) {  # the posterior lies at the very end of the region
       next_round()
-      runs_made <<- runs_made + runs
-      set <- list(emulator = emulator, measurements = measurements)
-      wider <- in_round(regional_ensemble(ensemble, wider_region(ensemble$region), set, runs, threads))
+      runs_made <<- runs_made + runs * length(ensembles)
+      wider <- Map(function(ensemble, emulator, m) {
+        in_round(regional_ensemble(ensemble, wider_region(ensemble$region), emulator, m, runs, threads))
+      }, ensembles, emulators, measurements)
       return(calibrated(wider, calibration))
     }
-    runs_made <<- runs_made + length(found$made$draws) + sum(found$made$failed)
-    c(list(ensemble = ensemble), found)
+    for (made in found$made) runs_made <<- runs_made + length(made$draws) + sum(made$failed)
+    c(list(ensembles = ensembles), found)
   }
-  searched <- function(ensemble, set, centre = NULL) {
-    found <- in_round(staged("search by the simulator", searched_ensemble(ensemble, set, centre, runs, threads)))
+  searched <- function(ensembles, sets, centre = NULL) {
+    found <- in_round(staged("search by the simulator", searched_ensembles(ensembles, sets, centre, runs, threads)))
     runs_made <<- runs_made + found$runs
-    calibrated(found$ensemble, coarsely(control$calibration))
+    calibrated(found$ensembles, coarsely(control$calibration))
   }
   coarse <- FALSE
   result <- first
   if (is.null(result)) {
-    emulator <- trained(ensemble)
-    if (rounds > 0 && !is.null(ensemble$simulator) && too_coarse(emulator, measurements)) {
+    emulators <- trained(ensembles)
+    if (rounds > 0 && can_be_run(ensembles) && any(mapply(too_coarse, emulators, measurements))) {
       next_round()
       coarse <- TRUE
-      result <- searched(ensemble, calibration_setting(emulator, measurements, control$calibration, seed))
+      result <- searched(ensembles, settings(emulators, control$calibration))
     } else {
-      result <- calibrated(ensemble, control$calibration, emulator)
+      result <- calibrated(ensembles, control$calibration, emulators)
     }
   }
   repeat {
-    check <- result$fit$check
-    settled <- is.null(result$made) ||
-      (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= good_border)
-    if (!settled && round < rounds) {
-      if (hopeless(result$fit)) break
+    if (!all(mapply(settled, result$fits, result$made)) && round < rounds) {
+      if (hopeless(result$fits)) break
       # A coarse sampler is enough to see where the posterior lies, until the check passes.
       next_round()
-      wider <- with_checked_runs(result)
-      result <- if (check$ratio > lost) searched(wider, result$fit, posterior_centre(result$fit)) else {
-        runs_made <- runs_made + runs
-        calibrated(in_round(refine_ensemble(wider, result$fit, runs, threads)), coarsely(control$calibration))
+      wider <- Map(with_checked_runs, result$ensembles, result$fits, result$made)
+      result <- if (any(vapply(result$fits, function(fit) fit$check$ratio > lost, NA))) {
+        searched(wider, result$fits, joint_centre(result$fits))
+      } else {
+        runs_made <- runs_made + runs * length(wider)
+        calibrated(Map(function(e, fit) in_round(refine_ensemble(e, fit, runs, threads)), wider, result$fits),
+                   coarsely(control$calibration))
       }
       coarse <- TRUE
     } else if (coarse) {
-      result <- calibrated(with_checked_runs(result), control$calibration)
+      result <- calibrated(Map(with_checked_runs, result$ensembles, result$fits, result$made), control$calibration)
       coarse <- FALSE
     } else break
   }
-  result$fit$rounds <- round
-  result$fit$runs_made <- runs_made
+  result$fits <- lapply(result$fits, function(fit) {
+    fit$rounds <- round
+    fit$runs_made <- runs_made
+    fit
+  })
   result
+}
+
+# Whether a record asks for no more runs: its check passed with enough to spare, or nothing can be run.
+settled <- function(fit, made) {
+  check <- fit$check
+  is.null(made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= good_border)
+}
+
+can_be_run <- function(ensembles) !any(vapply(ensembles, function(e) is.null(e$simulator), NA))
+
+# The centre of a posterior of several records, by the names of their parameters.
+joint_centre <- function(fits) {
+  all <- do.call(c, lapply(fits, function(fit) stats::setNames(posterior_centre(fit), names(fit$emulator$parameters))))
+  all[!duplicated(names(all))]
 }
 
 # By the runs left out, an emulator over the priors is too coarse to sample from: the search on the simulator is
@@ -143,32 +178,39 @@ coarsely <- function(calibration) {
   calibration
 }
 
-# list(ensemble, runs): the ensemble of the region to which searches on the simulator lead, and the runs that they and
-# it took. They start from `centre`, if there is one, and over the priors also from their middle and from the run
-# nearest to the record. Where none gets anywhere, as error and discrepancy could not be sampled so far from the record,
-# the ensemble as it was.
-searched_ensemble <- function(ensemble, set, centre, runs, threads) {
+# list(ensembles, runs): the ensembles of the region to which searches on the simulator lead, and the runs that they
+# and it took. They start from `centre`, if there is one, and over the priors also from their middle and from the run
+# nearest to each record. Where none gets anywhere, as error and discrepancy could not be sampled so far from the
+# records, the ensembles as they were.
+searched_ensembles <- function(ensembles, sets, centre, runs, threads) {
+  all <- names(joint_parameters(sets))
   starts <- list(centre)
-  if (is.null(ensemble$region)) {
-    nearest <- which.min(colMeans((ensemble$outputs - set$measurements$y[set$rows])^2))
-    starts <- list(centre, numeric(length(ensemble$parameters)), to_normal(ensemble$unit[nearest, ]))
+  if (any(vapply(ensembles, function(e) is.null(e$region), NA))) {
+    nearest <- Map(function(ensemble, set) {
+      run <- which.min(colMeans((ensemble$outputs - set$measurements$y[set$rows])^2))
+      start <- stats::setNames(numeric(length(all)), all)
+      start[names(ensemble$parameters)] <- to_normal(ensemble$unit[run, ])
+      start
+    }, ensembles, sets)
+    starts <- c(list(centre, numeric(length(all))), unname(nearest))
   }
-  search <- function(start) tryCatch(search_mode(set, start, threads), amiss_error_numerical = function(e) NULL)
+  search <- function(start) tryCatch(search_mode(sets, start, threads), amiss_error_numerical = function(e) NULL)
   modes <- Filter(Negate(is.null), lapply(Filter(Negate(is.null), starts), search))
-  if (!length(modes)) return(list(ensemble = ensemble, runs = 0))
-  list(ensemble = regional_ensemble(ensemble, region_of_modes(modes), set, runs, threads),
-       runs = runs + sum(vapply(modes, `[[`, 0, "runs")))
+  if (!length(modes)) return(list(ensembles = ensembles, runs = 0))
+  regional <- Map(function(ensemble, set) {
+    region <- region_of_modes(modes, match(names(ensemble$parameters), all))
+    regional_ensemble(ensemble, region, set$emulator, set$measurements, runs, threads)
+  }, ensembles, sets)
+  list(ensembles = regional, runs = runs * length(ensembles) + sum(vapply(modes, `[[`, 0, "runs")))
 }
 
 # The ensemble with as many of the runs at posterior draws as the check asks for.
-with_checked_runs <- function(result) {
-  fit <- result$fit
-  made <- result$made
-  if (is.null(made)) return(result$ensemble)
+with_checked_runs <- function(ensemble, fit, made) {
+  if (is.null(made)) return(ensemble)
   n <- ncol(made$runs)
   kept <- unique(round(seq(1, n, length.out = min(n, max(1, fit$control$check)))))
   draws <- made$draws[kept]
-  join_runs(result$ensemble, posterior_unit(fit)[draws, , drop = FALSE], fit$values[draws, , drop = FALSE],
+  join_runs(ensemble, posterior_unit(fit)[draws, , drop = FALSE], fit$values[draws, , drop = FALSE],
             made$runs[, kept, drop = FALSE])
 }
 
@@ -222,20 +264,20 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
   }
   check_same_rows(ensemble$hours, fit$measurements)
   regional_ensemble(ensemble, posterior_region(fit, if (isTRUE(fit$check$border > largest_border_share)) 1.5 else 1),
-                    fit, runs, threads)
+                    fit$emulator, fit$measurements, runs, threads)
 }
 
-# The ensemble of a region of the parameters' space; `fit` knows the emulator over the priors.
-regional_ensemble <- function(ensemble, region, fit, runs, threads) {
+# The ensemble of a region of the parameters' space; `emulator` knows that over the priors.
+regional_ensemble <- function(ensemble, region, emulator, measurements, runs, threads) {
   unit <- region_design(region, runs, ensemble$seed)
   values <- unit_to_values(unit, ensemble$parameters)
-  outputs <- simulate_measured(ensemble$simulator, values, fit$measurements, "calibrate", threads)
+  outputs <- simulate_measured(ensemble$simulator, values, measurements, "calibrate", threads)
   # The last of the runs that lie inside: those of checks, where the posterior was seen last.
   inside <- utils::tail(which(in_region(region, ensemble$unit)), 40)
   new_ensemble(ensemble$parameters, rbind(ensemble$unit[inside, , drop = FALSE], unit),
                rbind(ensemble$values[inside, , drop = FALSE], values),
                cbind(ensemble$outputs[, inside, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
-               without_simulator(emulator_over_priors(fit$emulator)), hours = ensemble$hours)
+               without_simulator(emulator_over_priors(emulator)), hours = ensemble$hours)
 }
 
 # The ensemble with more runs, of its own region.

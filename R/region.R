@@ -24,13 +24,13 @@ wider_region <- function(region) {
 }
 
 # The ellipsoid that holds what search_mode() found from several starts: modes as good as the best, or places along a
-# ridge.
-region_of_modes <- function(modes) {
+# ridge. `own`: the coordinates that are asked for.
+region_of_modes <- function(modes, own) {
   value <- vapply(modes, `[[`, 0, "value")
   modes <- modes[value > max(value) - 10]
-  centres <- do.call(rbind, lapply(modes, `[[`, "centre"))
+  centres <- do.call(rbind, lapply(modes, function(mode) mode$centre[own]))
   centre <- colMeans(centres)
-  covariance <- Reduce(`+`, lapply(modes, `[[`, "covariance")) / length(modes) +
+  covariance <- Reduce(`+`, lapply(modes, function(mode) mode$covariance[own, own, drop = FALSE])) / length(modes) +
     crossprod(sweep(centres, 2, centre)) / length(modes)
   list(centre = centre, root = t(chol(covariance)), radius = 1.1 * sqrt(stats::qchisq(0.999, length(centre))))
 }

@@ -14,7 +14,9 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' @param threads Number of threads; the result does not depend on it.
 #' @param control List of `max_substep_s` (s), `cells` (refinement of the walls), `spinup` (times that the leading
 #'   held rows are repeated first), `initial_hours` (of data that give the walls their first outside temperature).
-#' @return Matrix of mean air temperatures, degC: one row per interval, one column per run; `NaN` in a run that fails.
+#' @param flux Name of a wall whose heat flux is wanted instead of the air temperature.
+#' @return Matrix of mean air temperatures, degC, or of mean heat fluxes at the inner surface of the wall, W/m2,
+#'   positive into the room: one row per interval, one column per run; `NaN` in a run that fails.
 #' @examples
 #' weather <- synthetic_weather(1, seed = 1)
 #' weather$RHP <- rolbs(nrow(weather), power = 100, seed = 1)
@@ -23,7 +25,8 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' air <- simulate_zone(paper_box("M2"), values, as.matrix(weather[-1]), step_s = 900)
 #' dim(air)
 #' @export
-simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, threads = 1L, control = list()) {
+simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, threads = 1L, control = list(),
+                          flux = NULL) {
   call <- rlang::current_env()
   parameters <- names(zone_parameters(zone))
   if (is.null(values)) values <- matrix(0, 1, 0)
@@ -40,6 +43,7 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
                   i = "The drivers have {nrow(drivers)} rows."))
   }
   control <- check_zone_control(control, call)
+  if (!is.null(flux)) control$flux_wall <- wall_number(zone, flux, call)
   check_zone_size(zone, nrow(values), nrow(drivers), step_s, control, call)
   # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between
   # them.
@@ -66,6 +70,17 @@ check_drivers <- function(zone, drivers, call) {
     abort_input(c("{.arg drivers} has missing or infinite values in {.val {gaps}}.",
                   i = "The simulator needs every driver in every interval: fill the gaps first."), call = call)
   }
+}
+
+# Number of a wall in the engine, from 0.
+wall_number <- function(zone, name, call = rlang::caller_env()) {
+  walls <- Filter(function(x) x$type == "wall", unclass(zone)$components)
+  names <- vapply(walls, `[[`, "", "name")
+  check_input(checkmate::check_string(name), "wall", "Give the name of one wall of the zone.", call = call)
+  if (!name %in% names) {
+    abort_input(c("The zone has no wall {.val {name}}.", i = "Its walls: {.val {names}}."), call = call)
+  }
+  match(name, names) - 1L
 }
 
 check_zone_control <- function(control, call) {
@@ -100,4 +115,48 @@ driver_names.amiss_zone <- function(simulator) zone_boundary(simulator)
 simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
   check_run_dots(...)
   simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
+}
+
+#' Heat flux into a wall of a zone
+#'
+#' The zone as a simulator of what a heat flux sensor on the inner surface of a wall measures, beside that of the air
+#' temperature: for a second record in [calibrate_jointly()].
+#'
+#' @param zone A [zone()].
+#' @param wall Name of the wall.
+#' @param air Column of the measured air temperature, degC: in rows that warm up the air is held at it, as the zone
+#'   itself is held at its target there.
+#' @return An object of class `amiss_zone_flux`: a simulator of the mean heat flux at the inner surface, W/m2, positive
+#'   into the room.
+#' @section Errors: `amiss_error_input` if the zone has no such wall.
+#' @examples
+#' room <- zone(zone_wall("facade", area = 12, zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5),
+#'                        outside = "Te"), volume = 40)
+#' zone_flux(room, "facade", air = "Ti")
+#' @export
+zone_flux <- function(zone, wall, air) {
+  check_object(zone, "amiss_zone", "zone")
+  wall_number(zone, wall)
+  check_input(checkmate::check_string(air, min.chars = 1), "air", "Give the name of one column.")
+  structure(list(name = paste("heat flux,", wall), zone = zone, wall = wall, air = air), class = "amiss_zone_flux")
+}
+
+#' @export
+print.amiss_zone_flux <- function(x, ...) on_stdout(x, {
+  cli::cli_text("{.strong Heat flux} into the room at the inner surface of {.val {x$wall}} of a zone")
+  cli::cli_bullets(c(">" = "next: {.fun simulate_jointly}"))
+})
+
+#' @export
+free_parameters.amiss_zone_flux <- function(simulator) zone_parameters(simulator$zone)
+
+#' @export
+driver_names.amiss_zone_flux <- function(simulator) union(zone_boundary(simulator$zone), simulator$air)
+
+#' @export
+simulate_runs.amiss_zone_flux <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+  check_run_dots(...)
+  air <- if (!is.null(hold)) ifelse(is.na(hold), NA, drivers[, simulator$air])
+  simulate_zone(simulator$zone, values, drivers, step_s = 3600 * step_h, hold = air, threads = threads,
+                flux = simulator$wall)
 }

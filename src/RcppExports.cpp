@@ -99,33 +99,45 @@ BEGIN_RCPP
 END_RCPP
 }
 // calibrate_
-Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& control, const Rcpp::List& context_list);
-RcppExport SEXP _amiss_calibrate_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
+Rcpp::List calibrate_(const Rcpp::List& records, const Rcpp::List& control, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_calibrate_(SEXP recordsSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type records(recordsSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
-    rcpp_result_gen = Rcpp::wrap(calibrate_(data, priors, emulator_list, control, context_list));
+    rcpp_result_gen = Rcpp::wrap(calibrate_(records, control, context_list));
     return rcpp_result_gen;
 END_RCPP
 }
 // attribute_
-Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& fit, const Rcpp::List& control, const Rcpp::List& context_list);
-RcppExport SEXP _amiss_attribute_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP fitSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
+Rcpp::List attribute_(const Rcpp::List& records, int which, const Rcpp::List& fit, const Rcpp::List& control, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_attribute_(SEXP recordsSEXP, SEXP whichSEXP, SEXP fitSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
-    Rcpp::traits::input_parameter< const Rcpp::List& >::type emulator_list(emulator_listSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type records(recordsSEXP);
+    Rcpp::traits::input_parameter< int >::type which(whichSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type fit(fitSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
-    rcpp_result_gen = Rcpp::wrap(attribute_(data, priors, emulator_list, fit, control, context_list));
+    rcpp_result_gen = Rcpp::wrap(attribute_(records, which, fit, control, context_list));
+    return rcpp_result_gen;
+END_RCPP
+}
+// drop_conditions_
+Rcpp::List drop_conditions_(const Rcpp::List& records, const Rcpp::List& fit, const Rcpp::List& conditions, const Rcpp::List& ais, const Rcpp::List& context_list);
+RcppExport SEXP _amiss_drop_conditions_(SEXP recordsSEXP, SEXP fitSEXP, SEXP conditionsSEXP, SEXP aisSEXP, SEXP context_listSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type records(recordsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type fit(fitSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type conditions(conditionsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type ais(aisSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context_list(context_listSEXP);
+    rcpp_result_gen = Rcpp::wrap(drop_conditions_(records, fit, conditions, ais, context_list));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -261,8 +273,9 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 4},
     {"_amiss_predict_emulator_", (DL_FUNC) &_amiss_predict_emulator_, 2},
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
-    {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 5},
-    {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 6},
+    {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 3},
+    {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
+    {"_amiss_drop_conditions_", (DL_FUNC) &_amiss_drop_conditions_, 5},
     {"_amiss_tangent_posterior_", (DL_FUNC) &_amiss_tangent_posterior_, 8},
     {"_amiss_response_evidence_", (DL_FUNC) &_amiss_response_evidence_, 6},
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},

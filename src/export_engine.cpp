@@ -1,6 +1,8 @@
 // Conversions between R and the engine: convert, call, convert. Nothing is computed here. Numbers are copied,
 // never mapped: sums depend in their last bit on how memory is aligned, and only memory of Eigen's is always
 // aligned alike.
+#include <deque>
+
 #include "export_convert.h"
 
 #include "engine/attribution/Attribution.hpp"
@@ -57,8 +59,9 @@ std::vector<HistoryParameters> make_points(const Rcpp::List& draws) {
   return points;
 }
 
-void add_points(Rcpp::List& out, const std::vector<HistoryParameters>& points, int conditions) {
+void add_points(Rcpp::List& out, const std::vector<HistoryParameters>& points) {
   const Eigen::Index n = static_cast<Eigen::Index>(points.size());
+  const Eigen::Index conditions = points.front().t.size();
   VectorXd variance(n);
   Rcpp::IntegerVector setting(n);
   MatrixXd t(n, conditions);
@@ -73,13 +76,13 @@ void add_points(Rcpp::List& out, const std::vector<HistoryParameters>& points, i
   out["t"] = t;
 }
 
-Rcpp::List list_sets(const std::vector<DroppedSet>& sets) {
+Rcpp::List list_sets(const std::vector<DroppedSet>& sets, std::size_t which) {
   const std::size_t n = sets.size();
   Rcpp::List conditions(n);
   Rcpp::NumericVector lost(n), standard_error(n);
   Rcpp::LogicalVector trusted(n);
   for (std::size_t k = 0; k < n; ++k) {
-    conditions[k] = Rcpp::wrap(sets[k].conditions);
+    conditions[k] = Rcpp::wrap(sets[k].conditions[which]);
     lost[k] = sets[k].lost;
     standard_error[k] = sets[k].standard_error;
     trusted[k] = sets[k].trusted;
@@ -115,14 +118,44 @@ EmulatorOptions emulator_options(const Rcpp::List& control) {
   return options;
 }
 
+// Records with the models and emulators that they point to: one for each list(data, priors, emulator,
+// parameters), these numbered from 1.
+struct Records {
+  std::deque<HistoryModel> models;
+  std::deque<Emulator> emulators;
+  std::vector<Record> records;
+
+  Records(const Rcpp::List& from, const Context& context) {
+    for (const Rcpp::List one : from) {
+      models.emplace_back(make_history_data(one["data"]), make_history_priors(one["priors"]), context);
+      emulators.emplace_back(convert::emulator_state(one["emulator"]));
+      records.push_back(whole_record(models.back(), emulators.back()));
+      records.back().parameters = Rcpp::as<std::vector<int>>(one["parameters"]);
+      for (int& parameter : records.back().parameters) --parameter;
+    }
+  }
+};
+
+Rcpp::List list_record(const RecordPosterior& record, const HistoryModel& model) {
+  using Rcpp::_;
+  Rcpp::List out = Rcpp::List::create(
+      _["coefficients"] = record.coefficients, _["withheld"] = record.withheld, _["reach"] = record.reach,
+      _["tangent"] = convert::simulator_list(record.tangent),
+      _["centre"] = VectorXd(model.centre().transpose()), _["scale"] = VectorXd(model.scale().transpose()));
+  add_points(out, record.history);
+  return out;
+}
+
 // What the attribution needs of a calibration.
 Calibration make_calibration(const Rcpp::List& fit) {
-  const Rcpp::List posterior = fit["posterior"];
   Calibration calibration;
-  calibration.posterior = convert::ais_summary(posterior);
-  calibration.history = make_points(posterior);
+  calibration.posterior = convert::ais_summary(fit["posterior"]);
   calibration.kept = Rcpp::as<std::vector<Eigen::Index>>(fit["kept"]);
-  calibration.tangent = convert::simulator(fit["tangent"]);
+  for (const Rcpp::List record : Rcpp::List(fit["records"])) {
+    calibration.records.emplace_back();
+    calibration.records.back().history = make_points(record);
+    calibration.records.back().tangent = convert::simulator(record["tangent"]);
+  }
   return calibration;
 }
 
@@ -200,40 +233,47 @@ Eigen::MatrixXd filter_bank_(const Eigen::MatrixXd& x, const Eigen::VectorXd& ti
       .responses;
 }
 
-// The joint posterior of parameters, error and discrepancy.
+// The joint posterior of parameters, errors and discrepancies of one or several records.
 // [[Rcpp::export]]
-Rcpp::List calibrate_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
-                      const Rcpp::List& control, const Rcpp::List& context_list) {
+Rcpp::List calibrate_(const Rcpp::List& records, const Rcpp::List& control, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const Emulator emulator(convert::emulator_state(emulator_list));
-  const HistoryModel model(make_history_data(data), make_history_priors(priors), context);
-  const CalibrationOptions options{convert::ais_options(control["ais"]),
-                                   Rcpp::as<int>(control["error_draws"])};
-  const Calibration result = calibrate(model, emulator, options, context);
-  Rcpp::List posterior = convert::ais_list(result.posterior);
-  add_points(posterior, result.history, model.conditions());
+  const Records from(records, context);
+  const Calibration result = calibrate(
+      from.records, {convert::ais_options(control["ais"]), Rcpp::as<int>(control["error_draws"])}, context);
+  Rcpp::List posterior = convert::ais_list(result.posterior), of_records(records.size());
   posterior["unit"] = result.unit;
+  for (std::size_t r = 0; r < from.records.size(); ++r)
+    of_records[r] = list_record(result.records[r], from.models[r]);
   using Rcpp::_;
   return Rcpp::List::create(_["posterior"] = posterior, _["kept"] = Rcpp::wrap(result.kept),
-                            _["coefficients"] = result.coefficients, _["withheld"] = result.withheld,
-                            _["reach"] = result.reach, _["tangent"] = convert::simulator_list(result.tangent),
-                            _["centre"] = VectorXd(model.centre().transpose()),
-                            _["scale"] = VectorXd(model.scale().transpose()));
+                            _["records"] = of_records);
 }
 
-// Which conditions drive the discrepancy, given a posterior of calibrate_().
+// Which conditions drive the discrepancy of record `which` (from 1), given a posterior of calibrate_().
 // [[Rcpp::export]]
-Rcpp::List attribute_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list,
-                      const Rcpp::List& fit, const Rcpp::List& control, const Rcpp::List& context_list) {
+Rcpp::List attribute_(const Rcpp::List& records, int which, const Rcpp::List& fit, const Rcpp::List& control,
+                      const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const Emulator emulator(convert::emulator_state(emulator_list));
-  const HistoryModel model(make_history_data(data), make_history_priors(priors), context);
+  const Records from(records, context);
+  const auto own = static_cast<std::size_t>(which - 1);
   const Attribution result =
-      attribute(model, emulator, make_calibration(fit), attribution_options(control), context);
+      attribute(from.records, own, make_calibration(fit), attribution_options(control), context);
   using Rcpp::_;
-  return Rcpp::List::create(_["sets"] = list_sets(result.sets), _["statistic"] = result.test.statistic,
+  return Rcpp::List::create(_["sets"] = list_sets(result.sets, own), _["statistic"] = result.test.statistic,
                             _["p_value"] = result.test.p_value, _["adjusted"] = result.test.adjusted,
                             _["null_statistics"] = result.test.null_statistics, _["shares"] = result.shares);
+}
+
+// The evidence that a posterior of calibrate_() loses without conditions of each record (numbered from 0).
+// [[Rcpp::export]]
+Rcpp::List drop_conditions_(const Rcpp::List& records, const Rcpp::List& fit, const Rcpp::List& conditions,
+                            const Rcpp::List& ais, const Rcpp::List& context_list) {
+  const Context context = convert::context(context_list);
+  const DroppedSet dropped = drop(Records(records, context).records, make_calibration(fit),
+                                  Rcpp::as<ConditionSet>(conditions), convert::ais_options(ais), context);
+  using Rcpp::_;
+  return Rcpp::List::create(_["lost"] = dropped.lost, _["standard_error"] = dropped.standard_error,
+                            _["trusted"] = dropped.trusted);
 }
 
 // The posterior under the line that touches the simulator at x0.
@@ -246,8 +286,7 @@ Rcpp::List tangent_posterior_(const Rcpp::List& data, const Rcpp::List& priors, 
                         convert::ais_options(ais), convert::context(context));
   Rcpp::List out =
       Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
-  const Eigen::Index conditions = result.history.front().t.size();
-  add_points(out, result.history, static_cast<int>(conditions));
+  add_points(out, result.history);
   return out;
 }
 

@@ -151,13 +151,15 @@ Options read_options(const Rcpp::List& from) {
   options.cells = number(from, "cells");
   options.spinup = Rcpp::as<int>(from["spinup"]);
   options.initial_hours = number(from, "initial_hours");
+  if (from.containsElementNamed("flux_wall")) options.flux_wall = Rcpp::as<int>(from["flux_wall"]);
   return options;
 }
 
 }  // namespace
 
-// N x M mean air temperatures of one zone, whose free fields have the values of a row of `values` (M x
-// fields) in each run. `paths`: where each field stands in the nested list, from 1.
+// N x M mean air temperatures of one zone, or heat fluxes of its wall `control$flux_wall` (from 0), whose
+// free fields have the values of a row of `values` (M x fields) in each run. `paths`: where each field stands
+// in the nested list, from 1.
 // [[Rcpp::export]]
 Eigen::MatrixXd zone_simulate_(Rcpp::List zone, Rcpp::List paths, Eigen::MatrixXd values,
                                Eigen::MatrixXd drivers, double step_s, Eigen::VectorXd hold,
@@ -166,11 +168,12 @@ Eigen::MatrixXd zone_simulate_(Rcpp::List zone, Rcpp::List paths, Eigen::MatrixX
   const std::vector<Zone> zones = read_zones(zone, paths, values);
   for (const Zone& read : zones) read.check(drivers.cols());
   options.check();
-  Eigen::MatrixXd air(drivers.rows(), values.rows());
+  Eigen::MatrixXd output(drivers.rows(), values.rows());
   amiss::parallel_for(static_cast<int>(zones.size()), amiss::convert::context(context), [&](int run) {
-    air.col(run) = simulate(zones[static_cast<std::size_t>(run)], drivers, step_s, hold, options).air;
+    const Run result = simulate(zones[static_cast<std::size_t>(run)], drivers, step_s, hold, options);
+    output.col(run) = options.flux_wall < 0 ? result.air : result.flux;
   });
-  return air;
+  return output;
 }
 
 // One run with its energy balance: list(air, through (named, J), hold, stored (named, J)).

@@ -20,8 +20,12 @@ struct EnergyBalance {
 
 /// Result of simulate().
 struct Run {
-  bool ok = true;         ///< false if a temperature was not finite; `air` is then NaN throughout
-  Eigen::VectorXd air;    ///< mean air temperature of every interval, degC
+  bool ok = true;       ///< false if a temperature was not finite; `air` and `flux` are then NaN throughout
+  Eigen::VectorXd air;  ///< mean air temperature of every interval, degC
+  /// Mean heat flux at the inner surface of Options::flux_wall in every interval, W/m2, positive into the
+  /// room: what the wall gives to air and surfaces less the radiation that it absorbs there. Of size 0 if
+  /// there is no such wall.
+  Eigen::VectorXd flux;
   EnergyBalance balance;  ///< of the whole run, without the spin-up
 };
 

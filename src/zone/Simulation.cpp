@@ -58,7 +58,12 @@ Run simulate(const Zone& zone, const Eigen::Ref<const Eigen::MatrixXd>& drivers,
 
 Simulation::Simulation(const Zone& zone, const Eigen::Ref<const Eigen::MatrixXd>& drivers, double step_s,
                        const Eigen::Ref<const Eigen::VectorXd>& hold, const Options& options)
-    : zone_(zone), drivers_(drivers), hold_(hold), airflow_(zone.openings) {
+    : zone_(zone), drivers_(drivers), hold_(hold), airflow_(zone.openings), flux_wall_(options.flux_wall) {
+  if (flux_wall_ < -1 || flux_wall_ >= static_cast<int>(zone.walls.size())) {
+    throw std::invalid_argument("options: flux_wall must be the number of one of the " +
+                                std::to_string(zone.walls.size()) + " walls or -1; got " +
+                                std::to_string(flux_wall_));
+  }
   n_substeps_ = count_substeps(step_s, options.max_substep_s);
   substep_ = step_s / n_substeps_;
   stage_weight_ = gamma * substep_;
@@ -72,11 +77,21 @@ Simulation::Simulation(const Zone& zone, const Eigen::Ref<const Eigen::MatrixXd>
 Run Simulation::run() {
   Run result;
   result.air.resize(drivers_.rows());
+  if (flux_wall_ >= 0) result.flux.resize(drivers_.rows());
   begin_balance();
-  for (row_ = 0; row_ < drivers_.rows(); ++row_) result.air[row_] = advance_interval();
+  for (row_ = 0; row_ < drivers_.rows(); ++row_) {
+    const double before = flux_wall_ >= 0 ? lost_inwards(flux_wall_) : 0.0;
+    result.air[row_] = advance_interval();
+    if (flux_wall_ < 0) continue;
+    const double area = zone_.walls[static_cast<std::size_t>(flux_wall_)].area;
+    result.flux[row_] = (lost_inwards(flux_wall_) - before) / (area * substep_ * n_substeps_);
+  }
   result.balance = balance();
   result.ok = result.air.allFinite();
-  if (!result.ok) result.air.setConstant(std::numeric_limits<double>::quiet_NaN());
+  if (!result.ok) {
+    result.air.setConstant(std::numeric_limits<double>::quiet_NaN());
+    result.flux.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
   return result;
 }
 
@@ -191,6 +206,14 @@ double Simulation::stored_walls() const {
   double stored = 0.0;
   for (const WallGroup& group : walls_) stored += group.solver.stored();
   return stored;
+}
+
+// Heat that left a wall by its inner surface since the balance was begun, less a constant, J: what came
+// through the outer one and is not stored.
+double Simulation::lost_inwards(int wall) const {
+  const WallGroup& group = walls_[static_cast<std::size_t>(wall / WallSolver::kLanes)];
+  const int lane = wall % WallSolver::kLanes;
+  return group.energy[lane] - group.solver.stored_in(lane);
 }
 
 double Simulation::stored_heaters() const {

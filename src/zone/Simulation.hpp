@@ -20,7 +20,8 @@ namespace amiss::zone {
 /// over
 ///                 that interval; where it is NaN the air is free. Holding the first rows lets the walls
 ///                 forget their unknown past.
-/// @return         mean air temperature of every interval, and the energy balance.
+/// @return         mean air temperature of every interval, the flux that was asked for, and the energy
+/// balance.
 ///
 /// Start: air at the first number of `hold`, else at `zone.initial_air`; walls in steady state between that,
 /// plus `zone.initial_wall_offset`,
@@ -105,6 +106,7 @@ class Simulation {
   void begin_balance();
   EnergyBalance balance() const;
   double stored_walls() const;
+  double lost_inwards(int wall) const;
   double stored_heaters() const;
 
   double advance_interval();
@@ -135,6 +137,7 @@ class Simulation {
   FirstExchanges first_;
   std::vector<HeaterState> heaters_;
   Airflow airflow_;
+  int flux_wall_;
   RoomMatrix room_;
   Load load_;
   bool surfaces_emit_ = false;

@@ -59,6 +59,7 @@ class WallSolver {
 
   /// Heat stored relative to 0 degC, J.
   double stored() const { return (capacity_ * state_).sum(); }
+  double stored_in(int lane) const { return (capacity_.row(lane) * state_.row(lane)).sum(); }
 
  private:
   using Nodes = Eigen::Array<double, kLanes, Eigen::Dynamic>;

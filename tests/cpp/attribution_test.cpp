@@ -14,11 +14,12 @@ using namespace test;
 // A posterior of draws with the conditions that are on in each (a bit for each) and their weights.
 Calibration by_hand(const std::vector<std::pair<unsigned, double>>& draws, Index conditions) {
   Calibration c;
+  c.records.resize(1);
   c.posterior.weights.resize(static_cast<Index>(draws.size()));
   for (std::size_t i = 0; i < draws.size(); ++i) {
     HistoryParameters p{0, 1.0, VectorXd::Zero(conditions)};
     for (Index s = 0; s < conditions; ++s) p.t[s] = ((draws[i].first >> s) & 1) != 0 ? 0.7 : 0.0;
-    c.history.push_back(p);
+    c.records[0].history.push_back(p);
     c.posterior.weights[static_cast<Index>(i)] = draws[i].second;
   }
   c.posterior.ess = 400.0;
@@ -40,6 +41,16 @@ HistoryModel model_of(Index conditions, double inclusion = 0.2) {
   return HistoryModel(data, priors, Context());
 }
 
+// The same where there is one record.
+DroppedSet dropped_by_draws(const HistoryModel& model, const Calibration& calibration, std::vector<int> set) {
+  return amiss::dropped_by_draws({Record{&model, {}, nullptr, {}}}, calibration, {std::move(set)});
+}
+
+std::vector<std::vector<int>> find_groups(const HistoryModel& model, const Calibration& calibration,
+                                          const std::vector<DroppedSet>& singles, double least) {
+  return amiss::find_groups({Record{&model, {}, nullptr, {}}}, 0, calibration, singles, least);
+}
+
 TEST(DroppedByDraws, IsTheRatioOfSavageAndDickey) {
   const HistoryModel model = model_of(3);
   const Calibration c = by_hand({{0b001, 0.5}, {0b011, 0.3}, {0b010, 0.15}, {0b000, 0.05}}, 3);
@@ -50,7 +61,7 @@ TEST(DroppedByDraws, IsTheRatioOfSavageAndDickey) {
   EXPECT_NEAR(second.lost, std::log(0.8 / 0.55), 1e-12);
   EXPECT_NEAR(third.lost, std::log(0.8), 1e-12);  // a condition that says nothing costs its prior
   EXPECT_NEAR(both.lost, std::log(0.64 / 0.05), 1e-12);
-  EXPECT_EQ(both.conditions, (std::vector<int>{1, 0}));
+  EXPECT_EQ(both.conditions, (ConditionSet{{1, 0}}));
   // d log p = sd(p) / p, sd(p) = sqrt(p (1 - p) / 400).
   EXPECT_NEAR(first.standard_error, std::sqrt(0.2 * 0.8 / 400) / 0.2, 1e-12);
   EXPECT_NEAR(third.standard_error, 0.0, 1e-7);  // the weights add up to 1 within rounding
@@ -126,6 +137,8 @@ struct Copied {
 
   explicit Copied(double effect) : emulator(make_emulator()), model(make(effect, emulator)) {}
 
+  std::vector<Record> records() const { return {whole_record(model, emulator)}; }
+
   static Emulator make_emulator() {
     EmulatorState state;
     state.inputs = VectorXd::LinSpaced(12, 0.0, 1.0);
@@ -154,18 +167,18 @@ struct Copied {
 
 TEST(Attribute, ATrueConditionAndItsCopyAreNamedTogether) {
   const Copied record(1.0);
-  const Calibration calibration = calibrate(record.model, record.emulator, {}, Context());
+  const Calibration calibration = calibrate(record.records(), {}, Context());
   AttributionOptions options;
   options.surrogates.surrogates = 59;
-  const Attribution own = attribute(record.model, record.emulator, calibration, options, Context());
+  const Attribution own = attribute(record.records(), 0, calibration, options, Context());
   ASSERT_EQ(own.sets.size(), 4u);
   for (std::size_t s = 0; s < 3; ++s) {
-    EXPECT_EQ(own.sets[s].conditions, std::vector<int>{static_cast<int>(s)});
+    EXPECT_EQ(own.sets[s].conditions, (ConditionSet{{static_cast<int>(s)}}));
     EXPECT_LT(own.sets[s].lost, options.least) << s;
     EXPECT_LT(own.sets[s].standard_error, 0.2) << s;
   }
   const DroppedSet& pair = own.sets[3];
-  EXPECT_EQ(pair.conditions, (std::vector<int>{0, 1}));
+  EXPECT_EQ(pair.conditions, (ConditionSet{{0, 1}}));
   EXPECT_TRUE(pair.trusted);
   EXPECT_GT(pair.lost, 10.0);
   // Hardly a draw has both off: the evidence is that of a posterior sampled without them.
@@ -189,8 +202,8 @@ TEST(Attribute, ATrueConditionAndItsCopyAreNamedTogether) {
 
 TEST(Attribute, WhereNothingActsNothingIsNamedAndFewSurrogatesSuffice) {
   const Copied record(0.0);
-  const Calibration calibration = calibrate(record.model, record.emulator, {}, Context());
-  const Attribution own = attribute(record.model, record.emulator, calibration, {}, Context());
+  const Calibration calibration = calibrate(record.records(), {}, Context());
+  const Attribution own = attribute(record.records(), 0, calibration, {}, Context());
   ASSERT_EQ(own.sets.size(), 3u);
   for (const DroppedSet& set : own.sets) EXPECT_LT(set.lost, 1.15);
   EXPECT_EQ(own.test.null_statistics.rows(), 39);
@@ -198,13 +211,13 @@ TEST(Attribute, WhereNothingActsNothingIsNamedAndFewSurrogatesSuffice) {
 
 TEST(Attribute, OneAndTwoThreadsGiveTheSameBits) {
   const Copied record(0.4);
-  const Calibration calibration = calibrate(record.model, record.emulator, {}, Context());
+  const Calibration calibration = calibrate(record.records(), {}, Context());
   AttributionOptions options;
   options.surrogates.surrogates = 19;
   Context two;
   two.threads = 2;
-  const Attribution a = attribute(record.model, record.emulator, calibration, options, Context()),
-                    b = attribute(record.model, record.emulator, calibration, options, two);
+  const Attribution a = attribute(record.records(), 0, calibration, options, Context()),
+                    b = attribute(record.records(), 0, calibration, options, two);
   ASSERT_EQ(a.sets.size(), b.sets.size());
   for (std::size_t k = 0; k < a.sets.size(); ++k) EXPECT_EQ(a.sets[k].lost, b.sets[k].lost);
   EXPECT_EQ(a.test.null_statistics, b.test.null_statistics);

@@ -103,8 +103,9 @@ TEST(Calibrate, DiscrepancyWhereTheParametersCouldMoveIsFree) {
   const Emulator emulator = make_emulator(2);
   const VectorXd truth = 4.0 * record.response;
   const HistoryModel model = record.model(truth, emulator);
-  const Calibration c = calibrate(model, emulator, {}, Context());
-  EXPECT_TRUE(trusted(c.posterior.outcome)) << in_words(c.posterior.outcome);
+  const Calibration all = calibrate({whole_record(model, emulator)}, {}, Context());
+  const RecordPosterior& c = all.records[0];
+  EXPECT_TRUE(trusted(all.posterior.outcome)) << in_words(all.posterior.outcome);
   EXPECT_GT(c.reach[1], 0.99);
   const MatrixXd seen = model.data().responses * c.coefficients - model.data().moves * c.withheld;
   // The simulator takes its share of what lies along it: a standard deviation of 0.6 of 4.
@@ -116,8 +117,9 @@ TEST(Calibrate, DiscrepancyThatKeepsOutOfTheParametersWayDoesNotReachFar) {
   const Emulator emulator = make_emulator(2);
   const VectorXd truth = 2.4 * record.across;
   const HistoryModel model = record.model(truth, emulator);
-  const Calibration c = calibrate(model, emulator, {}, Context());
-  EXPECT_TRUE(trusted(c.posterior.outcome)) << in_words(c.posterior.outcome);
+  const Calibration all = calibrate({whole_record(model, emulator)}, {}, Context());
+  const RecordPosterior& c = all.records[0];
+  EXPECT_TRUE(trusted(all.posterior.outcome)) << in_words(all.posterior.outcome);
   EXPECT_GT(c.reach[0], 0.99);
   const MatrixXd seen = model.data().responses * c.coefficients - model.data().moves * c.withheld;
   // Noise of 0.5 leaves one coefficient of 60 values an error of a fortieth of 2.4.
@@ -128,24 +130,25 @@ TEST(Calibrate, WhatItReportsFollowsFromItsDraws) {
   const Joint joint;
   CalibrationOptions options;
   options.kept = 20;
-  const Calibration c = calibrate(joint.model, joint.emulator, options, Context());
+  const Calibration c = calibrate({whole_record(joint.model, joint.emulator)}, options, Context());
+  const RecordPosterior& own = c.records[0];
   const CalibrationTarget target = joint.target();
   const Index n = c.posterior.draws.cols();
   EXPECT_EQ(c.posterior.draws.rows(), 7);
-  ASSERT_EQ(static_cast<Index>(c.history.size()), n);
+  ASSERT_EQ(static_cast<Index>(own.history.size()), n);
   EXPECT_EQ(c.unit, target.unit(c.posterior.draws));
   VectorXd reach = VectorXd::Zero(2);
   for (Index i = 0; i < n; ++i) {
-    const HistoryParameters& p = c.history[static_cast<std::size_t>(i)];
+    const HistoryParameters& p = own.history[static_cast<std::size_t>(i)];
     EXPECT_EQ(p.t, target.history(c.posterior.draws.col(i)).t);
     reach[joint.model.reach_of(p.setting) == 20.0 ? 0 : 1] += c.posterior.weights[i];
   }
-  EXPECT_LT((c.reach - reach).cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_NEAR(c.reach.sum(), 1.0, 1e-12);
-  ASSERT_EQ(c.coefficients.rows(), 3);
-  ASSERT_EQ(c.coefficients.cols(), 20);
-  ASSERT_EQ(c.withheld.rows(), 2);
-  ASSERT_EQ(c.withheld.cols(), 20);
+  EXPECT_LT((own.reach - reach).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_NEAR(own.reach.sum(), 1.0, 1e-12);
+  ASSERT_EQ(own.coefficients.rows(), 3);
+  ASSERT_EQ(own.coefficients.cols(), 20);
+  ASSERT_EQ(own.withheld.rows(), 2);
+  ASSERT_EQ(own.withheld.cols(), 20);
   ASSERT_EQ(c.kept.size(), 20u);
   for (Index k = 0; k < 20; ++k) {
     const Index i = c.kept[static_cast<std::size_t>(k)];
@@ -153,38 +156,38 @@ TEST(Calibrate, WhatItReportsFollowsFromItsDraws) {
     const double middle = (static_cast<double>(k) + 0.5) / 20;
     EXPECT_GE(c.posterior.weights.head(i + 1).sum(), middle - 1e-12);
     EXPECT_LE(c.posterior.weights.head(i).sum(), middle + 1e-12);
-    const HistoryParameters& p = c.history[static_cast<std::size_t>(i)];
+    const HistoryParameters& p = own.history[static_cast<std::size_t>(i)];
     VectorXd mean, variance;
     predict(joint.emulator, c.unit.row(i), mean, variance);
     const VectorXd expected = joint.model.coefficients(p, mean, variance);
-    EXPECT_LT((c.coefficients.col(k) - expected).cwiseAbs().maxCoeff(), 1e-9);  // emulated one by one
-    EXPECT_LT((c.withheld.col(k) - joint.model.withheld(p.setting) * expected).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT((own.coefficients.col(k) - expected).cwiseAbs().maxCoeff(), 1e-9);  // emulated one by one
+    EXPECT_LT((own.withheld.col(k) - joint.model.withheld(p.setting) * expected).cwiseAbs().maxCoeff(), 1e-9);
   }
   const GaussianSimulator tangent =
       tangent_at(joint.emulator, (c.posterior.draws * c.posterior.weights).tail(2));
-  EXPECT_LT((c.tangent.mean - tangent.mean).cwiseQuotient(tangent.mean).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((own.tangent.mean - tangent.mean).cwiseQuotient(tangent.mean).cwiseAbs().maxCoeff(), 1e-9);
 }
 
 TEST(Calibrate, OneAndTwoThreadsGiveTheSameBits) {
   const Joint joint;
   Context two;
   two.threads = 2;
-  const Calibration a = calibrate(joint.model, joint.emulator, {}, Context()),
-                    b = calibrate(joint.model, joint.emulator, {}, two);
+  const Calibration a = calibrate({whole_record(joint.model, joint.emulator)}, {}, Context()),
+                    b = calibrate({whole_record(joint.model, joint.emulator)}, {}, two);
   EXPECT_EQ(a.posterior.log_evidence, b.posterior.log_evidence);
   EXPECT_EQ(a.posterior.evaluations, b.posterior.evaluations);
   EXPECT_EQ(a.posterior.draws, b.posterior.draws);
-  EXPECT_EQ(a.coefficients, b.coefficients);
-  EXPECT_EQ(a.withheld, b.withheld);
-  EXPECT_EQ(a.reach, b.reach);
+  EXPECT_EQ(a.records[0].coefficients, b.records[0].coefficients);
+  EXPECT_EQ(a.records[0].withheld, b.records[0].withheld);
+  EXPECT_EQ(a.records[0].reach, b.records[0].reach);
 }
 
 TEST(Calibrate, SeedsGiveDifferentRunsOfTheSamePosterior) {
   const Joint joint;
   Context other;
   other.seed = 2;
-  const AisResult a = calibrate(joint.model, joint.emulator, {}, Context()).posterior,
-                  b = calibrate(joint.model, joint.emulator, {}, other).posterior;
+  const AisResult a = calibrate({whole_record(joint.model, joint.emulator)}, {}, Context()).posterior,
+                  b = calibrate({whole_record(joint.model, joint.emulator)}, {}, other).posterior;
   EXPECT_NE(a.log_evidence, b.log_evidence);
   EXPECT_LT(std::abs(a.log_evidence - b.log_evidence), 4 * std::hypot(a.standard_error, b.standard_error));
 }
@@ -194,8 +197,8 @@ TEST(Calibrate, NumberingOfTheConditionsLeavesTheEvidenceUnchanged) {
   other.responses << make_data().responses.col(2), make_data().responses.leftCols(2);
   other.condition = {0, 1, 1};
   const Joint a, b(other);
-  const Calibration first = calibrate(a.model, a.emulator, {}, Context()),
-                    second = calibrate(b.model, b.emulator, {}, Context());
+  const Calibration first = calibrate({whole_record(a.model, a.emulator)}, {}, Context()),
+                    second = calibrate({whole_record(b.model, b.emulator)}, {}, Context());
   // The same chains; only the order of the sums in the likelihood differs.
   EXPECT_NEAR(first.posterior.log_evidence, second.posterior.log_evidence, 1e-8);
   EXPECT_EQ(first.posterior.evaluations, second.posterior.evaluations);

@@ -24,7 +24,7 @@ TEST(ParameterModes, AreThoseOfAFineGrid) {
   for (double noise_variance : {0.8, 40.0}) {
     const HistoryParameters point{0, noise_variance, VectorXd::Zero(2)};
     Stream stream(1, 2, 3);
-    const ParameterModes modes = parameter_modes(target, {point}, {}, Context(), stream);
+    const ParameterModes modes = parameter_modes(target, {{point}}, {}, Context(), stream);
     EXPECT_GT(modes.evaluations, 192);
     VectorXd exact(4001), fitted(4001);
     for (Index i = 0; i < 4001; ++i) {
@@ -44,7 +44,7 @@ TEST(ParameterModes, AreThoseOfAFineGrid) {
     one.starts = one.searches = 1;
     for (std::uint64_t item = 0; item < 10; ++item) {
       Stream other(2, 2, item);
-      EXPECT_NEAR(parameter_modes(target, {point}, one, Context(), other).best[0], grid[top], 0.15 * sd);
+      EXPECT_NEAR(parameter_modes(target, {{point}}, one, Context(), other).best[0], grid[top], 0.15 * sd);
     }
   }
 }
@@ -65,7 +65,7 @@ TEST(ParameterModes, FindBothOfTwo) {
   options.searches = 16;  // the four best of all starts may lie near the same of the two
   Stream stream(1, 2, 3);
   const ParameterModes modes =
-      parameter_modes(target, {target.history(VectorXd::Zero(2))}, options, Context(), stream);
+      parameter_modes(target, {{target.history(VectorXd::Zero(2))}}, options, Context(), stream);
   ASSERT_EQ(modes.mixture.size(), 2u);
   // u = 1/4 and 3/4, x = -0.67 and 0.67; between them the simulator is far off.
   const auto density = [&](double x) { return modes.mixture.log_density(VectorXd::Constant(1, x)); };
@@ -80,7 +80,8 @@ TEST(ParameterModes, WithoutAModeThePriorStands) {
   const Emulator emulator = make_emulator(2);
   const CalibrationTarget target(model, {}, emulator);
   Stream stream(1, 2, 3);
-  const ParameterModes modes = parameter_modes(target, {{0, 1.0, VectorXd::Zero(2)}}, {}, Context(), stream);
+  const ParameterModes modes =
+      parameter_modes(target, {{{0, 1.0, VectorXd::Zero(2)}}}, {}, Context(), stream);
   EXPECT_EQ(modes.mixture.size(), 1u);
   EXPECT_EQ(modes.best, VectorXd::Zero(2));
 }

@@ -28,7 +28,7 @@ test_that("a good emulator passes the check by runs", {
 
 test_that("the error of the check is that of runs at the record's rows", {
   fit <- linear_fit()
-  made <- amiss:::posterior_runs(fit, 40, 1)
+  made <- amiss:::posterior_runs(fit, amiss:::even_draws(fit, 40), 1)
   own <- function(i) {
     run <- fit$values[made$draws[i], "offset"] + fit$values[made$draws[i], "gain"] * linear_data()$Te
     run - stats::predict(fit$emulator, fit$values[made$draws[i], , drop = FALSE])$mean[, 1]
@@ -161,7 +161,7 @@ test_that("a draw of much weight is run once and counts as often as it was drawn
   fit <- linear_fit()
   fit$weights[] <- 0.5 / (length(fit$weights) - 1)
   fit$weights[5] <- 0.5
-  made <- amiss:::posterior_runs(fit, 40, 1)
+  made <- amiss:::posterior_runs(fit, amiss:::even_draws(fit, 40), 1)
   expect_identical(anyDuplicated(made$draws), 0L)
   expect_equal(sum(made$times), 40)
   expect_equal(made$times[made$draws == 5], 20)
@@ -169,7 +169,8 @@ test_that("a draw of much weight is run once and counts as often as it was drawn
   # The same draws one by one: the same correction.
   each <- rep(seq_along(made$draws), made$times)
   twice <- list(draws = made$draws[each], times = rep(1, 40), runs = made$runs[, each], failed = 0)
-  expect_equal(amiss:::exact_evidence(fit, made, 1)$log_evidence, amiss:::exact_evidence(fit, twice, 1)$log_evidence)
+  expect_equal(amiss:::exact_evidence(list(fit), list(made), 1)[[1]]$log_evidence,
+               amiss:::exact_evidence(list(fit), list(twice), 1)[[1]]$log_evidence)
 })
 
 test_that("an evidence that its correction leaves open by more than a nat is not trusted", {

@@ -22,7 +22,7 @@ test_that("the search finds the parameters on the simulator itself", {
   m <- wide_record(simulator, truth)
   emulator <- train_emulator(simulate_design(simulator, m, 12, seed = 1), m)
   set <- amiss:::calibration_setting(emulator, m, quick_ais, 1)
-  found <- amiss:::search_mode(set, numeric(3), 1)
+  found <- amiss:::search_mode(list(set), numeric(3), 1)
   true_z <- qnorm(vapply(names(truth), function(n) amiss:::prior_cdf(emulator$parameters[[n]]$prior, truth[[n]]), 0))
   apart <- found$centre - true_z
   expect_lt(sum(apart * solve(found$covariance, apart)), stats::qchisq(0.9999, 3))
@@ -37,11 +37,11 @@ test_that("one parameter is enough, and a start where the simulator fails is an 
   alone$f <- function(values, drivers) simulator$f(c(values, rate = -1.2), drivers)
   emulator <- train_emulator(simulate_design(alone, m, 8, seed = 1), m)
   set <- amiss:::calibration_setting(emulator, m, quick_ais, 1)
-  found <- amiss:::search_mode(set, 0, 1)
+  found <- amiss:::search_mode(list(set), 0, 1)
   expect_length(found$centre, 1)
   expect_lt(abs(10^amiss:::unit_to_values(matrix(pnorm(found$centre)), emulator$parameters)[1, 1] - 10^-0.3), 0.02)
   set$emulator$simulator$f <- function(values, drivers) NaN * drivers[, 1]
-  expect_error(amiss:::search_mode(set, 0, 1), "failed where a search begins", class = "amiss_error_numerical")
+  expect_error(amiss:::search_mode(list(set), 0, 1), "failed where a search begins", class = "amiss_error_numerical")
 })
 
 test_that("an ensemble far too coarse leads to a calibration that its check confirms", {

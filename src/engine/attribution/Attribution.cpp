@@ -18,23 +18,47 @@ namespace {
 constexpr Index kLeastGroup = 2;
 constexpr int kFewSurrogates = 39;
 
+// Conditions of one record, none of the others.
+ConditionSet only_of(const std::vector<Record>& records, std::size_t which, std::vector<int> conditions) {
+  ConditionSet set(records.size());
+  set[which] = std::move(conditions);
+  return set;
+}
+
+bool all_off(const Calibration& calibration, const ConditionSet& set, std::size_t draw) {
+  for (std::size_t r = 0; r < set.size(); ++r) {
+    for (int s : set[r]) {
+      if (calibration.records[r].history[draw].t[s] != 0.0) return false;
+    }
+  }
+  return true;
+}
+
+std::vector<Record> without(std::vector<Record> records, const ConditionSet& set) {
+  for (std::size_t r = 0; r < set.size(); ++r) records[r].active = conditions_but(*records[r].model, set[r]);
+  return records;
+}
+
 }  // namespace
 
-DroppedSet dropped_by_draws(const HistoryModel& model, const Calibration& calibration, std::vector<int> set) {
+DroppedSet dropped_by_draws(const std::vector<Record>& records, const Calibration& calibration,
+                            ConditionSet set) {
   const AisResult& posterior = calibration.posterior;
-  double off = 0.0;
-  for (std::size_t i = 0; i < calibration.history.size(); ++i) {
-    const VectorXd& t = calibration.history[i].t;
-    if (std::all_of(set.begin(), set.end(), [&](int s) { return t[s] == 0.0; }))
-      off += posterior.weights[static_cast<Index>(i)];
+  double off = 0.0, log_prior_off = 0.0;
+  for (Index i = 0; i < posterior.weights.size(); ++i) {
+    if (all_off(calibration, set, static_cast<std::size_t>(i))) off += posterior.weights[i];
+  }
+  for (std::size_t r = 0; r < set.size(); ++r) {
+    if (!set[r].empty())
+      log_prior_off +=
+          static_cast<double>(set[r].size()) * std::log(1.0 - records[r].model->priors().inclusion);
   }
   DroppedSet out;
-  const double prior_off = 1.0 - model.priors().inclusion;
   out.trusted = trusted(posterior.outcome);
   out.standard_error = std::numeric_limits<double>::infinity();
   out.lost = std::numeric_limits<double>::infinity();
-  if (prior_off > 0) {
-    out.lost = static_cast<double>(set.size()) * std::log(prior_off) - std::log(off);
+  if (std::isfinite(log_prior_off)) {
+    out.lost = log_prior_off - std::log(off);
     // The error of a share among as many independent draws as the effective size; a share of none has none.
     if (off > 0) out.standard_error = std::sqrt(std::max(0.0, 1.0 - off) / (off * posterior.ess));
   }
@@ -42,14 +66,28 @@ DroppedSet dropped_by_draws(const HistoryModel& model, const Calibration& calibr
   return out;
 }
 
-std::vector<std::vector<int>> find_groups(const HistoryModel& model, const Calibration& calibration,
+DroppedSet drop(const std::vector<Record>& records, const Calibration& calibration, ConditionSet set,
+                const AisOptions& options, const Context& context, std::uint64_t item) {
+  DroppedSet dropped = dropped_by_draws(records, calibration, std::move(set));
+  if (!(dropped.standard_error > options.precision)) return dropped;
+  const AisResult& posterior = calibration.posterior;
+  const AisResult again = sample_posterior(CalibrationTarget(without(records, dropped.conditions)), options,
+                                           context.fork(kWithout + item));
+  dropped.lost = posterior.log_evidence - again.log_evidence;
+  dropped.standard_error = std::hypot(posterior.standard_error, again.standard_error);
+  dropped.trusted = trusted(posterior.outcome) && trusted(again.outcome);
+  return dropped;
+}
+
+std::vector<std::vector<int>> find_groups(const std::vector<Record>& records, std::size_t which,
+                                          const Calibration& calibration,
                                           const std::vector<DroppedSet>& singles, double least) {
   const auto lost = [&](const std::vector<int>& set) {
     if (set.size() == 1) return singles[static_cast<std::size_t>(set.front())].lost;
-    return dropped_by_draws(model, calibration, set).lost;
+    return dropped_by_draws(records, calibration, only_of(records, which, set)).lost;
   };
   std::vector<int> left;
-  for (int s = 0; s < model.conditions(); ++s) {
+  for (int s = 0; s < records[which].model->conditions(); ++s) {
     if (lost({s}) < least) left.push_back(s);
   }
   // Those that act least leave the group first.
@@ -73,44 +111,38 @@ std::vector<std::vector<int>> find_groups(const HistoryModel& model, const Calib
   return groups;
 }
 
-Attribution attribute(const HistoryModel& model, const Emulator& emulator, const Calibration& calibration,
+Attribution attribute(const std::vector<Record>& records, std::size_t which, const Calibration& calibration,
                       const AttributionOptions& options, const Context& context) {
   Attribution out;
+  const HistoryModel& model = *records[which].model;
   const AisResult& posterior = calibration.posterior;
-  const auto drop = [&](std::vector<int> set) {
-    DroppedSet dropped = dropped_by_draws(model, calibration, std::move(set));
-    if (dropped.standard_error > options.ais.precision) {
-      const CalibrationTarget without(model, conditions_but(model, dropped.conditions), emulator);
-      const AisResult again =
-          sample_posterior(without, options.ais, context.fork(kWithout + out.sets.size()));
-      dropped.lost = posterior.log_evidence - again.log_evidence;
-      dropped.standard_error = std::hypot(posterior.standard_error, again.standard_error);
-      dropped.trusted = trusted(posterior.outcome) && trusted(again.outcome);
-    }
-    out.sets.push_back(std::move(dropped));
+  const RecordPosterior& own = calibration.records[which];
+  const auto drop_own = [&](std::vector<int> set) {
+    out.sets.push_back(drop(records, calibration, only_of(records, which, std::move(set)), options.ais,
+                            context, out.sets.size()));
   };
-  for (int s = 0; s < model.conditions(); ++s) drop({s});
+  for (int s = 0; s < model.conditions(); ++s) drop_own({s});
   // By what the singles lose in truth: chains that stick may never drop one of two that say the same.
-  for (std::vector<int>& group : find_groups(model, calibration, out.sets, options.least))
-    drop(std::move(group));
+  for (std::vector<int>& group : find_groups(records, which, calibration, out.sets, options.least))
+    drop_own(std::move(group));
   std::vector<std::vector<int>> sets;
-  for (const DroppedSet& dropped : out.sets) sets.push_back(dropped.conditions);
+  for (const DroppedSet& dropped : out.sets) sets.push_back(dropped.conditions[which]);
 
   Index best = 0;
   posterior.log_likelihood.maxCoeff(&best);
   SurrogateOptions surrogates = options.surrogates;
-  surrogates.settings = {calibration.history[static_cast<std::size_t>(best)].setting,
-                         null_setting(model, calibration.tangent)};
+  surrogates.settings = {own.history[static_cast<std::size_t>(best)].setting,
+                         null_setting(model, own.tangent)};
   if (surrogates.settings[0] == surrogates.settings[1]) surrogates.settings.pop_back();
   // Where no set matters, none can be significant.
   if (std::none_of(out.sets.begin(), out.sets.end(),
                    [&](const DroppedSet& s) { return s.lost >= options.least; }))
     surrogates.surrogates = std::min(surrogates.surrogates, kFewSurrogates);
-  out.test = surrogate_test(model, calibration.tangent, sets, surrogates, context);
+  out.test = surrogate_test(model, own.tangent, sets, surrogates, context);
 
   std::vector<HistoryParameters> kept;
-  for (Index i : calibration.kept) kept.push_back(calibration.history[static_cast<std::size_t>(i)]);
-  out.shares = shapley_shares(model, calibration.tangent, kept, ShapleyOptions(), context);
+  for (Index i : calibration.kept) kept.push_back(own.history[static_cast<std::size_t>(i)]);
+  out.shares = shapley_shares(model, own.tangent, kept, ShapleyOptions(), context);
   return out;
 }
 

@@ -13,15 +13,17 @@ struct AttributionOptions {
   double least = 1.15;          ///< nats that a set of conditions must earn to matter
 };
 
-/// Conditions that are dropped from the discrepancy together.
+/// Conditions that are dropped from the discrepancies together: of each record those that are.
+using ConditionSet = std::vector<std::vector<int>>;
+
 struct DroppedSet {
-  std::vector<int> conditions;
+  ConditionSet conditions;
   double lost = 0.0;            ///< log evidence of the model less that without them
   double standard_error = 0.0;  ///< of it
   bool trusted = false;
 };
 
-/// Which conditions drive the discrepancy.
+/// Which conditions drive the discrepancy of a record.
 struct Attribution {
   std::vector<DroppedSet> sets;  ///< the S single conditions, then groups that cannot be told apart
   SurrogateTest test;            ///< of the same sets
@@ -35,12 +37,23 @@ struct Attribution {
 /// Conditions that say the same hide one another: each can be dropped alone. Among those that are dropped
 /// alone without harm a set is sought that cannot be dropped together, nor be made smaller: a group. As many
 /// groups as there are, each from the conditions that the groups before it have left.
-Attribution attribute(const HistoryModel& model, const Emulator& emulator, const Calibration& calibration,
+///
+/// @param which  the record whose conditions are dropped; the others keep theirs. Surrogates and shares take
+/// the
+///   parameters as this record alone leaves them.
+Attribution attribute(const std::vector<Record>& records, std::size_t which, const Calibration& calibration,
                       const AttributionOptions& options, const Context& context);
 
+/// One set dropped. @param item  of the random numbers, if the posterior is sampled again.
+DroppedSet drop(const std::vector<Record>& records, const Calibration& calibration, ConditionSet set,
+                const AisOptions& options, const Context& context, std::uint64_t item = 0);
+
 /// The part of it that needs the draws alone.
-DroppedSet dropped_by_draws(const HistoryModel& model, const Calibration& calibration, std::vector<int> set);
-std::vector<std::vector<int>> find_groups(const HistoryModel& model, const Calibration& calibration,
+DroppedSet dropped_by_draws(const std::vector<Record>& records, const Calibration& calibration,
+                            ConditionSet set);
+/// Groups of conditions of record `which`, by what its single ones lose.
+std::vector<std::vector<int>> find_groups(const std::vector<Record>& records, std::size_t which,
+                                          const Calibration& calibration,
                                           const std::vector<DroppedSet>& singles, double least);
 
 }  // namespace amiss

@@ -37,14 +37,14 @@ constexpr int kRounds = 2;          // that bring the reference closer
 constexpr Index kRoundDraws = 100;  // each, per coordinate
 
 struct Start {
-  MatrixXd history;  // draws of equal weight
+  std::vector<MatrixXd> history;  // of each record, draws of equal weight
   ParameterModes modes;
 };
 
-// Error and discrepancy under a Gaussian simulator, given a reach (or -1), and where the parameters lie then.
-Start start_from(const CalibrationTarget& target, const GaussianSimulator& simulator, int reach,
+// Error and discrepancy of each record under its Gaussian simulator, given a reach (or -1), and where the
+// parameters lie then.
+Start start_from(const CalibrationTarget& target, const std::vector<GaussianSimulator>& simulators, int reach,
                  const StartOptions& how, const AisOptions& options, const Context& context) {
-  const HistoryTarget history(target.model(), target.coordinates().active(), simulator, reach);
   AisOptions rough = options;
   rough.pilot_chains = how.chains;
   rough.ess_drop = std::min(options.ess_drop, how.ess_drop);
@@ -52,14 +52,27 @@ Start start_from(const CalibrationTarget& target, const GaussianSimulator& simul
   rough.sweeps = std::min(options.sweeps, rough.max_sweeps);
   rough.gradient = false;
   long spent = 0;
-  MatrixXd draws = sample_population(history, StandardNormal(history.dimension()), rough, context, spent);
-  std::vector<HistoryParameters> points;
-  for (int k = 0; k < how.points; ++k)
-    points.push_back(history.parameters(draws.col((2 * k + 1) * draws.cols() / (2 * how.points))));
+  std::vector<HistoryTarget> histories;
+  std::vector<MatrixXd> draws;
+  std::vector<std::vector<HistoryParameters>> points(static_cast<std::size_t>(how.points));
+  for (std::size_t r = 0; r < simulators.size(); ++r) {
+    const Record& record = target.records()[r];
+    const int largest = static_cast<int>(record.model->priors().reach.size()) - 1;
+    histories.emplace_back(*record.model, record.active, simulators[r], std::min(reach, largest));
+    const HistoryTarget& history = histories.back();
+    draws.push_back(sample_population(history, StandardNormal(history.dimension()), rough,
+                                      r == 0 ? context : context.fork(kRecord + r), spent));
+    for (int k = 0; k < how.points; ++k)
+      points[static_cast<std::size_t>(k)].push_back(
+          history.parameters(draws.back().col((2 * k + 1) * draws.back().cols() / (2 * how.points))));
+  }
   Stream stream(context.seed, kModes, 0);
   ParameterModes modes = parameter_modes(target, points, how.modes, context, stream);
   modes.evaluations += spent;
-  for (Index i = 0; i < draws.cols(); ++i) draws.col(i) = history.with_reach(draws.col(i), stream.uniform());
+  for (std::size_t r = 0; r < draws.size(); ++r) {
+    for (Index i = 0; i < draws[r].cols(); ++i)
+      draws[r].col(i) = histories[r].with_reach(draws[r].col(i), stream.uniform());
+  }
   return {std::move(draws), std::move(modes)};
 }
 
@@ -67,29 +80,38 @@ Start start_from(const CalibrationTarget& target, const GaussianSimulator& simul
 // chains that would have to change both at once do not.
 CloserReference closer_reference(const CalibrationTarget& target, const AisOptions& options,
                                  const Context& context, long& evaluations) {
-  const Emulator& emulator = target.emulator();
-  const GaussianSimulator first = over_region(emulator);
-  const Start rough = start_from(target, first, -1, kRoughStart, options, context.fork(kFirstHistory));
+  const std::vector<Record>& records = target.records();
+  std::vector<GaussianSimulator> simulators;
+  std::size_t reaches = 0;
+  for (const Record& record : records) {
+    simulators.push_back(over_region(*record.emulator));
+    reaches = std::max(reaches, record.model->priors().reach.size());
+  }
+  const Start rough = start_from(target, simulators, -1, kRoughStart, options, context.fork(kFirstHistory));
   evaluations += rough.modes.evaluations;
-  const GaussianSimulator tangent = tangent_at(emulator, rough.modes.best);
+  for (std::size_t r = 0; r < records.size(); ++r)
+    simulators[r] = tangent_at(*records[r].emulator, records[r].inputs(rough.modes.best));
   const Context second = context.fork(kSecondHistory);
-  std::vector<StudentTMixture> history, parameters;
-  for (int k = 0; k < static_cast<int>(target.model().priors().reach.size()); ++k) {
-    const auto purpose = static_cast<std::uint64_t>(k);
-    const Start start = start_from(target, tangent, k, kStart, options, second.fork(purpose));
+  std::vector<std::vector<StudentTMixture>> history(records.size());
+  std::vector<StudentTMixture> parameters;
+  for (std::size_t k = 0; k < reaches; ++k) {
+    const Start start = start_from(target, simulators, static_cast<int>(k), kStart, options, second.fork(k));
     evaluations += start.modes.evaluations;
-    const Index n = start.history.cols();
-    Stream stream(second.seed, kMixture, purpose);
-    history.push_back(StudentTMixture::fit(start.history, VectorXd::Constant(n, 1.0 / static_cast<double>(n)),
-                                           options.max_components, kReferenceDof, stream));
+    Stream stream(second.seed, kMixture, k);
+    for (std::size_t r = 0; r < records.size(); ++r) {
+      const Index n = start.history[r].cols();
+      history[r].push_back(StudentTMixture::fit(start.history[r],
+                                                VectorXd::Constant(n, 1.0 / static_cast<double>(n)),
+                                                options.max_components, kReferenceDof, stream));
+    }
     parameters.push_back(start.modes.mixture);
   }
-  return CloserReference({StudentTMixture::together(history), StudentTMixture::together(parameters)});
+  std::vector<StudentTMixture> blocks;
+  for (const std::vector<StudentTMixture>& mixtures : history)
+    blocks.push_back(StudentTMixture::together(mixtures));
+  blocks.push_back(StudentTMixture::together(parameters));
+  return CloserReference(std::move(blocks));
 }
-
-}  // namespace
-
-namespace {
 
 AisResult sample_once(const CalibrationTarget& target, const AisOptions& options, const Context& context) {
   long spent = 0;
@@ -127,45 +149,49 @@ AisResult sample_posterior(const CalibrationTarget& target, const AisOptions& op
   return result;
 }
 
-std::vector<int> conditions_but(const HistoryModel& model, const std::vector<int>& without) {
-  std::vector<int> kept;
-  for (int s = 0; s < model.conditions(); ++s) {
-    if (std::find(without.begin(), without.end(), s) == without.end()) kept.push_back(s);
-  }
-  return kept;
-}
+namespace {
 
-Calibration calibrate(const HistoryModel& model, const Emulator& emulator, const CalibrationOptions& options,
-                      const Context& context) {
-  const CalibrationTarget target(model, conditions_but(model, {}), emulator);
-  Calibration out;
-  out.posterior = sample_posterior(target, options.ais, context);
-  const AisResult& posterior = out.posterior;
-  out.unit = target.unit(posterior.draws);
+RecordPosterior record_posterior(const CalibrationTarget& target, std::size_t r,
+                                 const Calibration& calibration) {
+  const Record& record = target.records()[r];
+  const HistoryModel& model = *record.model;
+  const AisResult& posterior = calibration.posterior;
+  const MatrixXd inputs = record.inputs(posterior.draws.bottomRows(target.parameters()));
+  RecordPosterior out;
   out.reach = VectorXd::Zero(static_cast<Index>(model.priors().reach.size()));
   for (Index i = 0; i < posterior.weights.size(); ++i) {
-    out.history.push_back(target.history(posterior.draws.col(i)));
+    out.history.push_back(target.history(posterior.draws.col(i), r));
     out.reach[out.history.back().setting / model.error_settings()] += posterior.weights[i];
   }
-  out.kept = spread_draws(posterior.weights, options.kept);
-  MatrixXd mean, variance;
-  MatrixXd points(out.unit.cols(), options.kept);
-  for (int k = 0; k < options.kept; ++k)
-    points.col(k) = posterior.draws.col(out.kept[static_cast<std::size_t>(k)]).tail(points.rows());
-  emulator.predict_at(points, mean, variance);
-  out.coefficients.resize(model.data().responses.cols(), options.kept);
-  out.withheld.resize(model.data().moves.cols(), options.kept);
+  const auto kept = static_cast<Index>(calibration.kept.size());
+  MatrixXd points(inputs.rows(), kept), mean, variance;
+  for (Index k = 0; k < kept; ++k) points.col(k) = inputs.col(calibration.kept[static_cast<std::size_t>(k)]);
+  record.emulator->predict_at(points, mean, variance);
+  out.coefficients.resize(model.data().responses.cols(), kept);
+  out.withheld.resize(model.data().moves.cols(), kept);
   std::vector<MatrixXd> held(model.priors().reach.size());  // of each reach that is met
-  for (int k = 0; k < options.kept; ++k) {
+  for (Index k = 0; k < kept; ++k) {
     const HistoryParameters& point =
-        out.history[static_cast<std::size_t>(out.kept[static_cast<std::size_t>(k)])];
+        out.history[static_cast<std::size_t>(calibration.kept[static_cast<std::size_t>(k)])];
     out.coefficients.col(k) = model.coefficients(point, mean.row(k).transpose(), variance.row(k).transpose());
     MatrixXd& withheld = held[static_cast<std::size_t>(point.setting / model.error_settings())];
     if (withheld.size() == 0) withheld = model.withheld(point.setting);
     out.withheld.col(k) = withheld * out.coefficients.col(k);
   }
-  const VectorXd centre = posterior.draws.bottomRows(emulator.n_inputs()) * posterior.weights;
-  out.tangent = tangent_at(emulator, centre);
+  out.tangent = tangent_at(*record.emulator, inputs * posterior.weights);
+  return out;
+}
+
+}  // namespace
+
+Calibration calibrate(const std::vector<Record>& records, const CalibrationOptions& options,
+                      const Context& context) {
+  const CalibrationTarget target(records);
+  Calibration out;
+  out.posterior = sample_posterior(target, options.ais, context);
+  out.unit = target.unit(out.posterior.draws);
+  out.kept = spread_draws(out.posterior.weights, options.kept);
+  for (std::size_t r = 0; r < records.size(); ++r) out.records.push_back(record_posterior(target, r, out));
   return out;
 }
 

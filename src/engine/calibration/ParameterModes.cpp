@@ -28,42 +28,73 @@ struct Mode {
   double log_mass = 0.0;  // of the Gaussian that touches the density there
 };
 
-// The density of the parameters for one point of the history posterior.
+// What one record says of the parameters, for one point of its history posterior.
+class GivenHistory {
+ public:
+  GivenHistory(const Record& record, const HistoryParameters& point)
+      : record_(record), likelihood_(record.model->given(point)) {}
+
+  void add_log_likelihood(const MatrixXd& all, VectorXd& values) const {
+    const MatrixXd x = record_.inputs(all);
+    MatrixXd mean, variance;
+    record_.emulator->predict_at(x, mean, variance);
+    for (Index i = 0; i < x.cols(); ++i) {
+      values[i] += record_.emulator->region().contains(x.col(i))
+                       ? likelihood_.log_density(mean.row(i), variance.row(i))
+                       : -std::numeric_limits<double>::infinity();
+    }
+  }
+
+  // Value; adds gradient (central differences) and Gauss-Newton precision at the parameters `all`.
+  double expand(const VectorXd& all, VectorXd& gradient, MatrixXd& precision) const {
+    const VectorXd x = record_.inputs(all);
+    const Expansion at = amiss::expand(*record_.emulator, x);
+    const MatrixXd information = at.slope.transpose() * likelihood_.information(at.variance) * at.slope;
+    // Of the emulated mean alone: the variance changes slowly.
+    for (Index i = 0; i < x.size(); ++i) {
+      const VectorXd step = kStep * at.slope.col(i);
+      gradient[parameter(i)] += (likelihood_.log_density(at.mean + step, at.variance) -
+                                 likelihood_.log_density(at.mean - step, at.variance)) /
+                                (2.0 * kStep);
+      for (Index j = 0; j < x.size(); ++j) precision(parameter(i), parameter(j)) += information(i, j);
+    }
+    return likelihood_.log_density(at.mean, at.variance);
+  }
+
+ private:
+  static constexpr double kStep = 1e-4;  // of the gradient, in standard deviations of the prior
+
+  Index parameter(Index input) const { return record_.parameters[static_cast<std::size_t>(input)]; }
+
+  const Record& record_;
+  CoefficientLikelihood likelihood_;
+};
+
+// The density of the parameters for one point of the history posteriors.
 class Conditional {
  public:
-  Conditional(const CalibrationTarget& target, const HistoryParameters& point, long& evaluations)
-      : emulator_(target.emulator()), likelihood_(target.model().given(point)), evaluations_(evaluations) {}
+  Conditional(const CalibrationTarget& target, const std::vector<HistoryParameters>& point, long& evaluations)
+      : evaluations_(evaluations) {
+    for (std::size_t k = 0; k < point.size(); ++k) records_.emplace_back(target.records()[k], point[k]);
+  }
 
   VectorXd log_density(const MatrixXd& x) const {
-    MatrixXd mean, variance;
-    emulator_.predict_at(x, mean, variance);
     evaluations_ += x.cols();
-    VectorXd values(x.cols());
-    for (Index i = 0; i < x.cols(); ++i) {
-      values[i] = emulator_.region().contains(x.col(i))
-                      ? likelihood_.log_density(mean.row(i), variance.row(i)) - 0.5 * x.col(i).squaredNorm()
-                      : -std::numeric_limits<double>::infinity();
-    }
+    VectorXd values = VectorXd::Zero(x.cols());
+    for (const GivenHistory& record : records_) record.add_log_likelihood(x, values);
+    for (Index i = 0; i < x.cols(); ++i) values[i] -= 0.5 * x.col(i).squaredNorm();
     return values;
   }
 
-  // Value, gradient (central differences) and Gauss-Newton precision at x.
   double expand(const VectorXd& x, VectorXd& gradient, MatrixXd& precision) const {
-    const Index d = x.size();
-    const Expansion at = amiss::expand(emulator_, x);
-    evaluations_ += 2 * d + 1;
-    // Of the emulated mean alone: the variance changes slowly.
-    gradient.resize(d);
-    for (Index i = 0; i < d; ++i) {
-      const VectorXd step = kStep * at.slope.col(i);
-      gradient[i] = (likelihood_.log_density(at.mean + step, at.variance) -
-                     likelihood_.log_density(at.mean - step, at.variance)) /
-                        (2.0 * kStep) -
-                    x[i];
-    }
-    precision = at.slope.transpose() * likelihood_.information(at.variance) * at.slope;
+    evaluations_ += 2 * x.size() + 1;
+    gradient = VectorXd::Zero(x.size());
+    precision = MatrixXd::Zero(x.size(), x.size());
+    double value = 0.0;
+    for (const GivenHistory& record : records_) value += record.expand(x, gradient, precision);
+    gradient -= x;
     precision.diagonal().array() += 1.0;
-    return likelihood_.log_density(at.mean, at.variance) - 0.5 * x.squaredNorm();
+    return value - 0.5 * x.squaredNorm();
   }
 
   Mode climb(VectorXd x, int max_iterations) const {
@@ -91,10 +122,8 @@ class Conditional {
 
  private:
   static constexpr double kFarthest = 6.0;  // in standard deviations of the prior
-  static constexpr double kStep = 1e-4;     // likewise, of the gradient
 
-  const Emulator& emulator_;
-  CoefficientLikelihood likelihood_;
+  std::vector<GivenHistory> records_;
   long& evaluations_;
 };
 
@@ -110,8 +139,65 @@ bool same(const Mode& a, const Mode& b) {
   return apart.dot(a.precision * apart) < kSame * kSame;
 }
 
-// The distinct modes that searches from the best of the starts find for one point of the history posterior.
-std::vector<Mode> find_modes(const CalibrationTarget& target, const HistoryParameters& point,
+// Where the regions of the emulators lie: that of the first record that has a parameter for input says where
+// this one lies. Parameters of emulators that hold everywhere lie as their priors do.
+struct Middle {
+  bool everywhere = true;
+  VectorXd centre;
+  MatrixXd root;
+};
+
+Middle middle_of_regions(const CalibrationTarget& target) {
+  const Index p = target.parameters();
+  Middle middle{true, VectorXd::Zero(p), MatrixXd::Identity(p, p)};
+  std::vector<bool> placed(static_cast<std::size_t>(p), false);
+  for (const Record& record : target.records()) {
+    const Region& region = record.emulator->region();
+    std::vector<int> to;
+    std::vector<Index> from;
+    for (std::size_t i = 0; i < record.parameters.size(); ++i) {
+      if (placed[static_cast<std::size_t>(record.parameters[i])]) continue;
+      placed[static_cast<std::size_t>(record.parameters[i])] = true;
+      to.push_back(record.parameters[i]);
+      from.push_back(static_cast<Index>(i));
+    }
+    if (region.everywhere()) continue;
+    middle.everywhere = false;
+    const auto n = static_cast<Index>(to.size());
+    MatrixXd root = region.root();
+    if (n < root.rows()) {
+      MatrixXd rows(n, root.cols());
+      for (Index i = 0; i < n; ++i) rows.row(i) = root.row(from[static_cast<std::size_t>(i)]);
+      root = (rows * rows.transpose()).llt().matrixL();
+    }
+    for (Index i = 0; i < n; ++i) {
+      middle.centre[to[static_cast<std::size_t>(i)]] = region.centre()[from[static_cast<std::size_t>(i)]];
+      for (Index j = 0; j < n; ++j)
+        middle.root(to[static_cast<std::size_t>(i)], to[static_cast<std::size_t>(j)]) = root(i, j);
+    }
+  }
+  return middle;
+}
+
+// Draws from N(0, I) (P x n) placed in the regions of the emulators. Where these differ, each record has the
+// last word for some of the draws.
+MatrixXd placed(const CalibrationTarget& target, const MatrixXd& normal) {
+  const std::vector<Record>& records = target.records();
+  MatrixXd points = normal;
+  for (std::size_t last = 0; last < records.size(); ++last) {
+    for (std::size_t k = 1; k <= records.size(); ++k) {
+      const Record& record = records[(last + k) % records.size()];
+      const MatrixXd own = record.emulator->region().place(record.inputs(normal));
+      for (std::size_t p = 0; p < record.parameters.size(); ++p)
+        for (auto i = static_cast<Index>(last); i < normal.cols(); i += static_cast<Index>(records.size()))
+          points(record.parameters[p], i) = own(static_cast<Index>(p), i);
+    }
+  }
+  return points;
+}
+
+// The distinct modes that searches from the best of the starts find for one point of the history posteriors.
+std::vector<Mode> find_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& point,
                              const MatrixXd& starts, const ModeOptions& options, long& evaluations) {
   const Conditional conditional(target, point, evaluations);
   const VectorXd values = conditional.log_density(starts);
@@ -130,10 +216,10 @@ std::vector<Mode> find_modes(const CalibrationTarget& target, const HistoryParam
 
 }  // namespace
 
-ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
+ParameterModes parameter_modes(const CalibrationTarget& target,
+                               const std::vector<std::vector<HistoryParameters>>& points,
                                const ModeOptions& options, const Context& context, Stream& stream) {
-  const Emulator& emulator = target.emulator();
-  const MatrixXd starts = emulator.region().place(stream.normals(emulator.n_inputs(), options.starts));
+  const MatrixXd starts = placed(target, stream.normals(target.parameters(), options.starts));
   std::vector<std::vector<Mode>> at_point(points.size());
   std::vector<long> spent(points.size(), 0);
   parallel_for(static_cast<int>(points.size()), context, [&](int i) {
@@ -174,12 +260,12 @@ ParameterModes parameter_modes(const CalibrationTarget& target, const std::vecto
   const auto highest = std::max_element(modes.begin(), modes.end(),
                                         [](const Mode& a, const Mode& b) { return a.log_mass < b.log_mass; });
   if (highest != modes.end()) best = highest->location;
-  const Region& region = emulator.region();
-  if (!region.everywhere()) {  // which holds the posterior, whatever the searches found of it
+  const Middle middle = middle_of_regions(target);
+  if (!middle.everywhere) {  // which holds the posterior, whatever the searches found of it
     for (double& weight : weights) weight *= 1.0 - kRegionShare;
-    components.emplace_back(region.centre(), region.root(), options.dof);
+    components.emplace_back(middle.centre, middle.root, options.dof);
     weights.push_back(weights.empty() ? 1.0 : kRegionShare);
-    if (highest == modes.end()) best = region.centre();
+    if (highest == modes.end()) best = middle.centre;
   }
   if (components.empty()) {  // nowhere is the record possible: the prior stands
     components.emplace_back(VectorXd::Zero(starts.rows()), MatrixXd::Identity(starts.rows(), starts.rows()),

@@ -12,11 +12,11 @@ struct ModeOptions {
   double dof = 8.0;
 };
 
-/// Where the parameters lie, given the record, for a few points of the history posterior: modes of
+/// Where the parameters lie, given the records, for a few points of the history posterior: modes of
 ///     log p(y | z, history) + log N(x; 0, I),  z = Phi(x),
 /// by the Levenberg-Marquardt method, each with the Gauss-Newton covariance (W'A W + I)^-1, W = dw'/dx, A
-/// what the record tells about the coefficients. A Student-t mixture with one component for each distinct
-/// mode; weights half from the Laplace approximation of its mass, half equal. Where the emulator has a
+/// what the records tell about the coefficients. A Student-t mixture with one component for each distinct
+/// mode; weights half from the Laplace approximation of its mass, half equal. Where an emulator has a
 /// region, a tenth of the mixture is spread over it.
 struct ParameterModes {
   StudentTMixture mixture;
@@ -24,7 +24,9 @@ struct ParameterModes {
   long evaluations;      ///< emulated points
 };
 
-ParameterModes parameter_modes(const CalibrationTarget& target, const std::vector<HistoryParameters>& points,
+/// @param points  each with one history for each record.
+ParameterModes parameter_modes(const CalibrationTarget& target,
+                               const std::vector<std::vector<HistoryParameters>>& points,
                                const ModeOptions& options, const Context& context, Stream& stream);
 
 }  // namespace amiss

@@ -31,6 +31,7 @@ enum ForkPurpose : std::uint64_t {
   kAgain,
   kParameters,     ///< of the paper, apart from its discrepancy
   kThinned,        ///< record before the one it was thinned from
+  kRecord = 50,    ///< of several, numbered from here
   kWithout = 100,  ///< sets of conditions, numbered from here
 };
 

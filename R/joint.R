@@ -1,0 +1,247 @@
+# Several records at once: targets of one simulator, or objects that share parameters. Each record has its own error,
+# its own discrepancy and, if there are several, its own simulator; parameters of the same name are one parameter.
+
+#' Calibrate several records together
+#'
+#' Two or more measured series, each with its own noise, error and discrepancy, and one set of parameters: temperature
+#' and heat flux of one room, two rooms, two houses with the same walls. Given the parameters the records are
+#' independent; parameters of the same name are one parameter with one prior, others belong to the records whose
+#' simulators have them. Emulators are trained and checked by runs for each record, and refined where the joint
+#' posterior lies, as [calibrate_refined()] does for one.
+#'
+#' @param simulators Named list of simulators, one for each record. Several outputs of one function are
+#'   [outputs_of()] it; the heat flux into a wall of a zone is [zone_flux()].
+#' @param measurements Named list of [measurements()], with the same names.
+#' @param runs `simulate_jointly()`: runs of each simulator, all of one design. `calibrate_jointly()`: as in
+#'   [calibrate_refined()], for each record.
+#' @param ensembles Named list of ensembles: those of `simulate_jointly()`, or of [ensemble()] for runs that were made
+#'   elsewhere (which are checked, but not refined).
+#' @inheritParams calibrate_refined
+#' @return `simulate_jointly()`: a named list of ensembles. `calibrate_jointly()`: an object of class `amiss_joint`:
+#'   `records`, a named list of calibrations ([calibrate()]) whose draws are those of the joint posterior, for
+#'   [discrepancy()], `predict()`, `plot()` and all else that concerns one record; `values` and `weights`, draws of all
+#'   parameters; `log_evidence`, `standard_error`, `interval`: the evidence, a density of all records; `trust`;
+#'   `rounds` and `runs_made` as [calibrate_refined()] has them. `coef()`, `confint()`, `vcov()`, `tidy()`,
+#'   `as.data.frame()`, `predict()` (a list by record) and [bayes_factor()] work on it.
+#' @section Errors: `amiss_error_input` if names differ, a parameter has two priors, or fewer than two records are
+#'   given.
+#' @source The joint posterior is that of [calibrate()] with the product of the records' likelihoods;
+#'   `vignette("algorithm", "amiss")`, *Several records*.
+#' @seealso [attribute_discrepancy()] tells which conditions drive the discrepancy of each record, and of all.
+#' @examples
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
+#' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
+#' table$flux <- 3 - 2 * table$Te + 0.5 * cos(1:96 * 2.3)
+#' record <- function(target, noise_sd) {
+#'   measurements(table, time = "hour", target = target, boundary = ~ Te, noise_sd = noise_sd,
+#'                validate = table$hour > 72)
+#' }
+#' both <- list(Ti = record("Ti", 0.1), flux = record("flux", 0.5))
+#' wall <- function_simulator(function(values, drivers) {
+#'   cbind(Ti = 20 + values[["gain"]] * drivers[, "Te"], flux = 3 - 5 * values[["gain"]] * drivers[, "Te"])
+#' }, free("gain", uniform(0, 1)), boundary = "Te")
+#' runs <- simulate_jointly(outputs_of(wall, c("Ti", "flux")), both, runs = 20, seed = 1)
+#' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # coarse, for speed
+#' fit <- calibrate_jointly(runs, both, control = quick, seed = 1)
+#' fit
+#' confint(fit)
+#' @export
+calibrate_jointly <- function(ensembles, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL,
+                              threads = 1, quiet = FALSE) {
+  hush(quiet)
+  check_records(ensembles, measurements, "ensembles", function(x) check_object(x, "amiss_ensemble", "ensembles"))
+  check_one_prior(lapply(ensembles, `[[`, "parameters"))
+  check_input(checkmate::check_count(rounds), "rounds")
+  check_input(checkmate::check_count(runs, positive = TRUE, null.ok = TRUE), "runs")
+  for (m in measurements) check_runs_asked(runs %||% 40, m)
+  check_training_size((runs %||% 40) * 1.3^rounds, "rounds", rounds)
+  control <- merge_control(list(emulator = list(), calibration = list()), control)
+  fill_emulator_control(control$emulator, "control$emulator")
+  for (m in measurements) {
+    fill_calibration_control(control$calibration, m, length(used_rows(m, "calibrate")), "control$calibration")
+  }
+  last <- refine_records(unname(ensembles), unname(measurements[names(ensembles)]), rounds, control, pick_seed(seed),
+                         check_threads(threads), runs)
+  new_joint(stats::setNames(last$fits, names(ensembles)))
+}
+
+#' @rdname calibrate_jointly
+#' @export
+simulate_jointly <- function(simulators, measurements, runs = 150, seed = NULL, threads = 1, quiet = FALSE) {
+  hush(quiet)
+  check_records(simulators, measurements, "simulators", check_simulator)
+  check_input(checkmate::check_count(runs, positive = TRUE), "runs")
+  for (m in measurements) check_run_number(runs, length(m$raw$hours))
+  threads <- check_threads(threads)
+  each <- lapply(simulators, free_parameters)
+  check_one_prior(each)
+  all <- do.call(c, unname(each))
+  all <- all[!duplicated(names(all))]
+  if (!length(all)) {
+    abort_input(c("The simulators have no free parameter.", i = "Replace a number by {.fun free}."))
+  }
+  check_enough_runs(runs, length(all))
+  seed <- pick_seed(seed)
+  unit <- with_seed(seed, lhs::randomLHS(runs, length(all)))
+  colnames(unit) <- names(all)
+  Map(function(simulator, parameters, m) {
+    if (!length(parameters)) {
+      abort_input("The simulator {.val {simulator$name}} has no free parameter; its record says nothing of any.")
+    }
+    own <- unname(unit[, names(parameters), drop = FALSE])
+    values <- unit_to_values(own, parameters)
+    new_ensemble(parameters, own, values, simulate_measured(simulator, values, m, "calibrate", threads), simulator,
+                 seed, hours = row_hours(m, "calibrate"))
+  }, simulators, each, measurements[names(simulators)])
+}
+
+check_records <- function(x, measurements, name, check_one, call = rlang::caller_env()) {
+  check_input(checkmate::check_list(x, min.len = 2, names = "unique"), name,
+              "Give a named list, one element for each record.", call = call)
+  for (one in x) check_one(one)
+  check_input(checkmate::check_list(measurements, min.len = 2, names = "unique"), "measurements",
+              "Give a named list, one element for each record.", call = call)
+  for (m in measurements) check_object(m, "amiss_measurements", "measurements", call = call)
+  if (!setequal(names(x), names(measurements))) {
+    abort_input(c("{.arg {name}} are of {.val {names(x)}}, {.arg measurements} of {.val {names(measurements)}}.",
+                  i = "Give one of each for every record, under the same name."), call = call)
+  }
+}
+
+# A parameter that records share has one prior.
+check_one_prior <- function(each, call = rlang::caller_env()) {
+  all <- do.call(c, unname(each))
+  for (name in unique(names(all)[duplicated(names(all))])) {
+    priors <- vapply(all[names(all) == name], function(p) format(p$prior), "")
+    if (length(unique(priors)) > 1) {
+      abort_input(c("The parameter {.val {name}} has different priors: {.val {unique(unname(priors))}}.",
+                    i = "Parameters of one name are one parameter: give it one prior, or two names."), call = call)
+    }
+  }
+}
+
+# `fits`: calibrations with the same draws.
+new_joint <- function(fits) {
+  parameters <- joint_parameters(fits)
+  values <- do.call(cbind, unname(lapply(fits, `[[`, "values")))[, names(parameters), drop = FALSE]
+  first <- fits[[1]]
+  untrusted <- Filter(function(name) !fits[[name]]$trust$trusted, names(fits))
+  verdict <- if (!length(untrusted)) first$trust$verdict else {
+    paste(vapply(untrusted, function(name) paste0(name, ": ", fits[[name]]$trust$verdict), ""), collapse = "; ")
+  }
+  structure(list(format_version = format_version, records = lapply(fits, as_part), parameters = parameters,
+                 values = values, weights = first$weights, log_evidence = first$log_evidence,
+                 standard_error = first$standard_error, interval = first$interval,
+                 trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
+                 runs_made = first$runs_made, seed = first$seed), class = "amiss_joint")
+}
+
+#' @export
+print.amiss_joint <- function(x, ...) on_stdout(x, {
+  cli::cli_text("{.strong Joint calibration} of {length(x$records)} records: {.val {names(x$records)}}")
+  cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)},",
+                      "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
+  say_parameters(x, 6)
+  for (name in names(x$records)) {
+    fit <- x$records[[name]]
+    cli::cli_bullets(c("*" = "{name} ({length(fit$rows)} rows): {reach_words(fit)}", "*" = "{fit$check$verdict}"))
+  }
+  cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, or {.code $records} one by one"))
+})
+
+#' @export
+summary.amiss_joint <- function(object, ...) {
+  rlang::check_dots_empty()
+  object
+}
+
+#' @export
+coef.amiss_joint <- function(object, ...) coef.amiss_fit(object, ...)
+
+#' @export
+confint.amiss_joint <- function(object, parm = NULL, level = 0.95, ...) confint.amiss_fit(object, parm, level, ...)
+
+#' @export
+vcov.amiss_joint <- function(object, ...) vcov.amiss_fit(object, ...)
+
+#' @export
+tidy.amiss_joint <- function(x, conf.level = 0.95, ...) tidy.amiss_fit(x, conf.level, ...)
+
+#' @export
+as.data.frame.amiss_joint <- function(x, row.names = NULL, optional = FALSE, draws = nrow(x$values), ...) {
+  as.data.frame.amiss_fit(x, row.names, optional, draws, ...)
+}
+
+#' @export
+predict.amiss_joint <- function(object, newdata = NULL, ...) {
+  if (!is.null(newdata)) {
+    check_input(checkmate::check_list(newdata, names = "unique"), "newdata", "Give a list by record.")
+    unknown <- setdiff(names(newdata), names(object$records))
+    if (length(unknown)) {
+      abort_input("{.arg newdata} names {.val {unknown}}; the records are {.val {names(object$records)}}.")
+    }
+  }
+  lapply(stats::setNames(nm = names(newdata) %||% names(object$records)), function(name) {
+    stats::predict(object$records[[name]], newdata[[name]], ...)
+  })
+}
+
+#' @export
+calibrated_record.amiss_joint <- function(fit) lapply(fit$records, calibrated_record)
+
+# Which conditions drive the discrepancies: of each record, and the same condition in all that have it.
+#' @export
+attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, threads = 1) {
+  seed <- pick_seed(seed)
+  threads <- check_threads(threads)
+  fits <- fit$records
+  each <- lapply(stats::setNames(seq_along(fits), names(fits)), function(which) {
+    staged(names(fits)[which], attribute_record(unname(fits), which, control, seed, threads))
+  })
+  structure(list(format_version = format_version, records = each,
+                 table = together_table(fits, each, control, seed, threads), seed = seed),
+            class = "amiss_joint_attribution")
+}
+
+# One row for each condition that any record has: the evidence lost if it is dropped from all discrepancies, and the
+# least p-value among the records, times their number (Bonferroni).
+together_table <- function(fits, each, control, seed, threads) {
+  records <- engine_records(fits)
+  draws <- engine_draws(fits)
+  filled <- fill_attribution_control(control, fits[[1]]$control$ais, length(fits[[1]]$measurements$conditions))
+  conditions <- unique(unlist(lapply(fits, function(fit) fit$measurements$conditions)))
+  rows <- lapply(conditions, function(condition) {
+    at <- lapply(unname(fits), function(fit) which(fit$measurements$conditions == condition) - 1L)
+    dropped <- staged("attributing the discrepancies together", call_engine(
+      drop_conditions_(records, draws, at, filled$ais, engine_context(seed, threads))))
+    own <- lapply(each, function(a) a$table[a$table$boundary == condition, ])
+    p <- min(1, sum(lengths(at) > 0) * min(vapply(own, function(row) min(row$p_value, 1), 0)))
+    significant <- dropped$lost / log(10) >= filled$least_log10_bf && p <= filled$level
+    data.frame(boundary = condition, log10_bf_dropped = dropped$lost / log(10),
+               standard_error = dropped$standard_error / log(10), p_value = p, significant = significant,
+               trusted = dropped$trusted,
+               records = paste(names(Filter(function(row) any(row$significant), own)), collapse = ", "))
+  })
+  table <- do.call(rbind, rows)
+  table <- table[order(-table$log10_bf_dropped), ]
+  rownames(table) <- NULL
+  table
+}
+
+#' @export
+print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
+  cli::cli_text("{.strong Attribution} of the discrepancies of {.val {names(x$records)}}, together:")
+  say_table(x$table[c("boundary", "log10_bf_dropped", "p_value", "significant", "records")])
+  for (name in names(x$records)) {
+    named <- significant_conditions(x$records[[name]]$table)
+    cli::cli_bullets(c("*" = if (length(named)) "{name}: driven by {.field {named}}"
+                             else "{name}: no boundary condition is significant"))
+  }
+})
+
+#' @export
+tidy.amiss_joint_attribution <- function(x, ...) {
+  rlang::check_dots_empty()
+  each <- Map(function(name, attribution) cbind(record = name, attribution$table), names(x$records), x$records)
+  do.call(rbind, unname(each))
+}
