@@ -6,8 +6,8 @@
 #' Two or more measured series, each with its own noise, error and discrepancy, and one set of parameters: temperature
 #' and heat flux of one room, two rooms, two houses with the same walls. Given the parameters the records are
 #' independent; parameters of the same name are one parameter with one prior, others belong to the records whose
-#' simulators have them. Emulators are trained and checked by runs for each record, and refined where the joint
-#' posterior lies, as [calibrate_refined()] does for one.
+#' simulators have them, or that go by another name ([rename_parameters()]). Emulators are trained and checked by runs
+#' for each record, and refined where the joint posterior lies, as [calibrate_refined()] does for one.
 #'
 #' @param simulators Named list of simulators, one for each record. Several outputs of one function are
 #'   [outputs_of()] it; the heat flux into a wall of a zone is [zone_flux()].

@@ -42,7 +42,8 @@ fit_runs <- function(ensemble, settings, calibration = settings$control$calibrat
 }
 
 # The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
-# draws tell how far its evidence is off, correct it, and join them where it is too far.
+# draws tell how far its evidence is off, correct it, and join them where it is too far. It is for the evidence: tails
+# that lie at the end of the region, where parameters' intervals need more runs, it leaves to fit_fully().
 screen_model <- function(simulator, name, settings, hopeless = function(fit) FALSE) {
   calibration <- as.list(settings$control$calibration)
   calibration$ais <- utils::modifyList(as.list(calibration$ais),
@@ -54,7 +55,8 @@ screen_model <- function(simulator, name, settings, hopeless = function(fit) FAL
     control <- list(emulator = settings$control$emulator, calibration = calibration)
     refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
                          settings$threads,
-                         runs = regional_runs(ensemble$parameters, refined_runs(settings)), hopeless = hopeless)
+                         runs = regional_runs(ensemble$parameters, refined_runs(settings)), hopeless = hopeless,
+                         border = largest_border_share)
   })
 }
 
@@ -69,7 +71,7 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
     first <- first %||% screen_model(simulator, name, settings)
     fit <- if (is.null(first$ensemble$simulator)) {
       fit_runs(first$ensemble, settings)
-    } else if (isFALSE(first$fit$check$passed)) {
+    } else if (!settled(first$fit, first$made, good_border)) {
       control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
       refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
                            settings$threads,

@@ -54,19 +54,19 @@ lost <- 3                # error over noise from which an emulator does not even
 
 # list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`:
 # such a list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more
-# is wanted of it.
+# is wanted of it. `border`: share of the posterior in the outer tenth of the region from which no more is refined.
 refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
-                                 hopeless = function(fit) FALSE) {
+                                 hopeless = function(fit) FALSE, border = good_border) {
   if (!is.null(first)) first <- list(ensembles = list(first$ensemble), fits = list(first$fit), made = list(first$made))
   last <- refine_records(list(ensemble), list(measurements), rounds, control, seed, threads, runs, first,
-                         function(fits) hopeless(fits[[1]]))
+                         function(fits) hopeless(fits[[1]]), border)
   list(ensemble = last$ensembles[[1]], fit = last$fits[[1]], made = last$made[[1]])
 }
 
 # The same of records that share parameters: list(ensembles, fits, made), one of each for each record. All fits say in
 # `rounds` and `runs_made` what was spent on all.
 refine_records <- function(ensembles, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
-                           hopeless = function(fits) FALSE) {
+                           hopeless = function(fits) FALSE, border = good_border) {
   runs <- runs %||% max(vapply(ensembles, function(e) regional_runs(e$parameters), 0))
   runs_made <- 0
   round <- 0L
@@ -121,7 +121,7 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
     }
   }
   repeat {
-    if (!all(mapply(settled, result$fits, result$made)) && round < rounds) {
+    if (!all(mapply(settled, result$fits, result$made, border)) && round < rounds) {
       if (hopeless(result$fits)) break
       # A coarse sampler is enough to see where the posterior lies, until the check passes.
       next_round()
@@ -148,9 +148,9 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
 }
 
 # Whether a record asks for no more runs: its check passed with enough to spare, or nothing can be run.
-settled <- function(fit, made) {
+settled <- function(fit, made, border) {
   check <- fit$check
-  is.null(made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= good_border)
+  is.null(made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= border)
 }
 
 can_be_run <- function(ensembles) !any(vapply(ensembles, function(e) is.null(e$simulator), NA))

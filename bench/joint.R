@@ -1,6 +1,7 @@
 #!/usr/bin/env Rscript
 # Records calibrated together, on the Twin Houses: (a) temperature and heat flux into the west wall of N2, and (b) the
-# temperatures of N2 and O5 at once with shared walls, O5's model with the sun through its open blinds. For each: how
+# temperatures of N2 and O5 at once with shared walls, O5's model with the sun through its open blinds and a door, an
+# infiltration and a start of its own. For each: how
 # much narrower the parameters get, the evidence of sharing them (a decision of its own: that of all records together
 # against the product of those of each), and which conditions drive the discrepancies.
 # Usage: Rscript bench/joint.R [--threads 2] [--seed 1] [--runs 150] [--out FILE]
@@ -28,12 +29,16 @@ n2 <- house("N2")
 o5 <- house("O5")
 sun <- o5$catalogue[["south solar aperture"]]
 
+# The houses have the same walls; what people, doors and the summer before them did to each is its own.
+of_o5 <- rename_parameters(sun$edit(o5$model), door = "door O5", ach = "ach O5",
+                           initial_wall_offset = "initial_wall_offset O5")
+
 cases <- list(
   `temperature and heat flux` = list(
     simulators = list(Ti = n2$model, flux = zone_flux(n2$model, "west facade", air = "Ti")),
     measurements = list(Ti = n2$measurements, flux = beside("N2", "hf_wall_west_in", "W/m2", 0.3))),
   `two houses` = list(
-    simulators = list(N2 = n2$model, O5 = sun$edit(o5$model)),
+    simulators = list(N2 = n2$model, O5 = of_o5),
     measurements = list(N2 = n2$measurements, O5 = o5$measurements)))
 
 studied <- lapply(cases, function(case) {

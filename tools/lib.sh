@@ -11,12 +11,12 @@ say() { printf '\n== %s\n' "$*"; }
 fail() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
 
 # Installs the package into build/library from a copy of the sources, so that the clone stays clean; for this machine's
-# processor; with "portable" into build/portable/library as R CMD INSTALL alone does; with "blas" into build/blas/library,
+# processor, or, where AMISS_NATIVE is set and empty, as R CMD INSTALL alone does; with "portable" into build/portable/library as R CMD INSTALL alone does; with "blas" into build/blas/library,
 # for this processor and with R's BLAS.
 # Objects are kept from one run to the next. make does not follow headers, so they are dropped when a header,
 # the build's own files or R have changed.
 install_package() {
-  local copy="$root/build/package" library="$library" native=1 blas= state
+  local copy="$root/build/package" library="$library" native="${AMISS_NATIVE-1}" blas= state
   if [[ $# -gt 0 ]]; then
     copy="$root/build/$1/package"
     library="$root/build/$1/library"
@@ -29,7 +29,7 @@ install_package() {
   tar -C "$root" -c --exclude='*.o' --exclude='*.so' --exclude=./{build,demo,.git,tests,tools,bench} . |
     tar -C "$copy" -x
   [[ ! -d "$root/build/doc" ]] || cp -r "$root/build/doc" "$copy/inst/doc"  # see tools/vignettes
-  state="$(cd "$copy" && { R --version; g++ --version; grep LinkingTo DESCRIPTION; cat src/Makevars "$root/tools/Makevars";
+  state="$(cd "$copy" && { printf '%s\n' "$native" "$blas"; R --version; g++ --version; grep LinkingTo DESCRIPTION; cat src/Makevars "$root/tools/Makevars";
     find src -name '*.hpp' | sort | xargs cat; } | sha256sum)"
   if [[ "$(cat "$copy/.state" 2>/dev/null)" != "$state" ]]; then
     find "$copy/src" -name '*.o' -delete

@@ -1,5 +1,5 @@
 # Prints, one a line, the R packages of DESCRIPTION that cannot be loaded or are too old.
-# Usage: Rscript missing-packages.R DESCRIPTION runtime|all|bench|site|fuzz|valgrind
+# Usage: Rscript missing-packages.R DESCRIPTION runtime|all|bench|site|fuzz|valgrind|coverage
 arguments <- commandArgs(trailingOnly = TRUE)
 runtime <- arguments[2] == "runtime"
 fields <- read.dcf(arguments[1], fields = c("Imports", "LinkingTo", "Suggests"))
@@ -21,6 +21,10 @@ if (arguments[2] == "bench") {
   extra <- c("future", "future.apply", "ranger", "callr")
   name <- c(name, extra)
   minimum <- c(minimum, rep("0", length(extra)))
+}
+if (arguments[2] == "coverage") {
+  name <- c(name, "covr")
+  minimum <- c(minimum, "0")
 }
 if (arguments[2] == "site") {
   name <- c(name, "pkgdown")

@@ -130,6 +130,26 @@ test_that("a run is made once for all outputs", {
   expect_warning(simulate_runs(lacking, values, drivers, 1), "columns a, b, not c", class = "amiss_warning_input")
 })
 
+test_that("parameters under another name are not shared", {
+  apart <- rename_parameters(flux_only, gain = "gain of the flux")
+  expect_named(amiss:::free_parameters(apart), "gain of the flux")
+  drivers <- cbind(Te = 1:4)
+  expect_equal(simulate_runs(apart, cbind(`gain of the flux` = 0.3), drivers, 1),
+               simulate_runs(flux_only, cbind(gain = 0.3), drivers, 1))
+  fit <- joint_fit(simulators = list(Ti = outputs_of(wall, "Ti")$Ti, flux = apart))
+  expect_named(coef(fit), c("gain", "base", "gain of the flux"))
+  # Nothing is shared: the evidence is the product of those of each.
+  alone <- Map(function(simulator, m) {
+    calibrate_refined(simulate_design(simulator, m, 25, seed = 1), m, control = quick, seed = 1)
+  }, list(outputs_of(wall, "Ti")$Ti, flux_only), lapply(fit$records, `[[`, "measurements"))
+  each <- vapply(alone, `[[`, 0, "log_evidence")
+  error <- sqrt(fit$standard_error^2 + sum(vapply(alone, `[[`, 0, "standard_error")^2))
+  expect_lt(abs(fit$log_evidence - sum(each)), 4 * error)
+  expect_error(rename_parameters(flux_only, nothing = "x"), "no parameter", class = "amiss_error_input")
+  expect_error(rename_parameters(wall, gain = "base"), "two parameters", class = "amiss_error_input")
+  expect_output(print(apart), "other names")
+})
+
 test_that("what does not fit together is refused", {
   table <- two_table()
   both <- list(Ti = record_of(table, "Ti", 0.1), flux = record_of(table, "flux", 0.5))

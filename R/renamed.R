@@ -1,0 +1,65 @@
+# A simulator whose parameters go by other names, so that several records need not share them.
+
+#' Give parameters of a simulator other names
+#'
+#' Records that are calibrated together share the parameters of the same name ([calibrate_jointly()]): of two houses
+#' with the same walls and each its own doors, the doors' parameter takes another name in one of them.
+#'
+#' @param simulator Any simulator.
+#' @param ... New names by the old ones: `door = "door of O5"`.
+#' @return An object of class `amiss_renamed`: a simulator that is the same but for the names.
+#' @section Errors: `amiss_error_input` if the simulator has no such parameter, or a new name is there already.
+#' @examples
+#' linear <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
+#'                              free("gain", uniform(0, 2)), boundary = "Te")
+#' rename_parameters(linear, gain = "gain of O5")
+#' @export
+rename_parameters <- function(simulator, ...) {
+  check_simulator(simulator)
+  to <- list(...)
+  check_input(checkmate::check_list(to, types = "character", names = "unique", min.len = 1), "...",
+              "Give new names by the old ones.")
+  to <- vapply(to, function(name) {
+    check_input(checkmate::check_string(name, min.chars = 1), "...", "Give one name for each.")
+    name
+  }, "")
+  parameters <- free_parameters(simulator)
+  unknown <- setdiff(names(to), names(parameters))
+  if (length(unknown)) {
+    abort_input(c("The simulator has no parameter {.val {unknown}}.",
+                  i = "Its parameters: {.val {names(parameters)}}."))
+  }
+  twice <- c(to[to %in% setdiff(names(parameters), names(to))], to[duplicated(to)])
+  if (length(twice)) abort_input("There would be two parameters {.val {unname(twice[1])}}.")
+  structure(list(name = if (is.character(simulator$name)) simulator$name else "simulator", simulator = simulator,
+                 to = to), class = "amiss_renamed")
+}
+
+#' @export
+print.amiss_renamed <- function(x, ...) on_stdout(x, {
+  cli::cli_text("{.strong Simulator} with parameters that go by other names:")
+  cli::cli_bullets(stats::setNames(paste(names(x$to), "is", x$to), rep("*", length(x$to))))
+  cli::cli_bullets(c(">" = "next: {.fun simulate_jointly}"))
+})
+
+#' @export
+free_parameters.amiss_renamed <- function(simulator) {
+  parameters <- free_parameters(simulator$simulator)
+  at <- match(names(simulator$to), names(parameters))
+  names(parameters)[at] <- simulator$to
+  for (name in simulator$to) parameters[[name]]$name <- name
+  parameters
+}
+
+#' @export
+driver_names.amiss_renamed <- function(simulator) driver_names(simulator$simulator)
+
+#' @export
+simulate_runs.amiss_renamed <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+  at <- match(simulator$to, colnames(values))
+  colnames(values)[at] <- names(simulator$to)
+  simulate_runs(simulator$simulator, values, drivers, step_h, hold, threads, ...)
+}
+
+#' @export
+costs_little.amiss_renamed <- function(simulator) costs_little(simulator$simulator)
