@@ -82,8 +82,8 @@ counted <- function(text, n, code) {
   })
 }
 
-# Another piece is done, or `done` of them in all. Workers of package future pass the condition on at once. Made by hand:
-# rlang::signal() takes a fifth of a millisecond, as long as many a run.
+# Another piece is done, or `done` of them in all. Workers of package future pass the condition on at once. Made by
+# hand: rlang::signal() takes a fifth of a millisecond, as long as many a run.
 piece_done <- function(done = NULL) {
   signalCondition(structure(class = c("amiss_piece_done", "immediateCondition", "condition"),
                             list(message = "", call = NULL, done = done)))

@@ -17,12 +17,11 @@
 rename_parameters <- function(simulator, ...) {
   check_simulator(simulator)
   to <- list(...)
-  check_input(checkmate::check_list(to, types = "character", names = "unique", min.len = 1), "...",
-              "Give new names by the old ones.")
-  to <- vapply(to, function(name) {
-    check_input(checkmate::check_string(name, min.chars = 1), "...", "Give one name for each.")
-    name
-  }, "")
+  check_input(checkmate::check_list(to, names = "unique", min.len = 1), "...", "Give new names by the old ones.")
+  for (name in names(to)) {
+    check_input(checkmate::check_string(to[[name]], min.chars = 1), name, "Give the new name of this parameter.")
+  }
+  to <- unlist(to)
   parameters <- free_parameters(simulator)
   unknown <- setdiff(names(to), names(parameters))
   if (length(unknown)) {

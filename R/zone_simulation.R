@@ -43,7 +43,7 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
                   i = "The drivers have {nrow(drivers)} rows."))
   }
   control <- check_zone_control(control, call)
-  if (!is.null(flux)) control$flux_wall <- wall_number(zone, flux, call)
+  if (!is.null(flux)) control$flux_wall <- wall_number(zone, flux, "flux", call)
   check_zone_size(zone, nrow(values), nrow(drivers), step_s, control, call)
   # Every field is a multiple of one parameter and may lie in an interval: what holds for the extremes holds between
   # them.
@@ -73,12 +73,13 @@ check_drivers <- function(zone, drivers, call) {
 }
 
 # Number of a wall in the engine, from 0.
-wall_number <- function(zone, name, call = rlang::caller_env()) {
+wall_number <- function(zone, name, what, call = rlang::caller_env()) {
   walls <- Filter(function(x) x$type == "wall", unclass(zone)$components)
   names <- vapply(walls, `[[`, "", "name")
-  check_input(checkmate::check_string(name), "wall", "Give the name of one wall of the zone.", call = call)
+  check_input(checkmate::check_string(name), what, "Give the name of one wall of the zone.", call = call)
   if (!name %in% names) {
-    abort_input(c("The zone has no wall {.val {name}}.", i = "Its walls: {.val {names}}."), call = call)
+    abort_input(c("{.arg {what}} is {.val {name}}, and the zone has no wall of that name.",
+                  i = "Its walls: {.val {names}}."), call = call)
   }
   match(name, names) - 1L
 }
@@ -139,7 +140,7 @@ costs_little.amiss_zone <- function(simulator) TRUE
 #' @export
 zone_flux <- function(zone, wall, air) {
   check_object(zone, "amiss_zone", "zone")
-  wall_number(zone, wall)
+  wall_number(zone, wall, "wall")
   check_input(checkmate::check_string(air, min.chars = 1), "air", "Give the name of one column.")
   structure(list(name = paste("heat flux,", wall), zone = zone, wall = wall, air = air), class = "amiss_zone_flux")
 }

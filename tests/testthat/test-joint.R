@@ -170,8 +170,9 @@ test_that("the flux at a wall is what its balance says", {
   # Air held at 20 degC until nothing changes: 1 / (1/3 + 1/25 + 0.2/0.3) W/m2K, no other surface to radiate to.
   flux <- simulate_zone(room, NULL, drivers, 3600, hold = rep(20, nrow(drivers)), flux = "facade")
   expect_equal(flux[nrow(flux)], -15 / (1 / 3 + 1 / 25 + 0.2 / 0.3), tolerance = 1e-6)
-  expect_error(simulate_zone(room, NULL, drivers, 3600, flux = "roof"), "no wall", class = "amiss_error_input")
-  expect_error(zone_flux(room, "roof", "Ti"), "no wall", class = "amiss_error_input")
+  expect_error(simulate_zone(room, NULL, drivers, 3600, flux = "roof"), "no wall of that name",
+               class = "amiss_error_input")
+  expect_error(zone_flux(room, "roof", "Ti"), "no wall of that name", class = "amiss_error_input")
   sensor <- zone_flux(room, "facade", "Ti")
   measured <- cbind(drivers, Ti = 20)
   # In rows that warm up it is the air that is held, not the flux measured there.
