@@ -2,8 +2,9 @@
 `%||%` <- function(x, y) if (is.null(x) || length(x) == 0) y else x
 
 odds <- function(log10_bf) {
-  size <- if (is.finite(log10_bf) && abs(log10_bf) < 6) format(round(10^abs(log10_bf), 1),
-                                                               big.mark = ",") else "over a million"
+  size <- if (is.finite(log10_bf) && abs(log10_bf) < 6) {
+    format(signif(10^abs(log10_bf), 2), big.mark = ",", scientific = FALSE)
+  } else "over a million"
   sprintf("odds of %s to 1 %s it (log10 Bayes factor %.1f)", size, if (log10_bf >= 0) "for" else "against", log10_bf)
 }
 
