@@ -206,7 +206,8 @@ print.amiss_calibration <- function(x, ...) on_stdout(x, {
   }
   say_parameters(x, 6)
   cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
-  cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
+  cli::cli_bullets(c(">" = if (isTRUE(x$part)) "next: {.fun discrepancy} or {.fun predict}"
+                           else "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
 })
 
 # What the reach says of the model, in words.

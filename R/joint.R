@@ -141,10 +141,10 @@ print.amiss_joint <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Joint calibration} of {length(x$records)} records: {.val {names(x$records)}}")
   cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)},",
                       "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
-  say_parameters(x, 6)
+  say_parameters(x, 4)
   for (name in names(x$records)) {
     fit <- x$records[[name]]
-    cli::cli_bullets(c("*" = "{name} ({length(fit$rows)} rows): {reach_words(fit)}", "*" = "{fit$check$verdict}"))
+    cli::cli_bullets(c("*" = "{name} ({length(fit$rows)} rows): {fit$check$verdict}"))
   }
   cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, or {.code $records} one by one"))
 })

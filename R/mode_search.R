@@ -16,9 +16,12 @@ search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4
 search_mode <- function(sets, start, threads) {
   records <- lapply(sets, searched_record, all = names(joint_parameters(sets)), threads = threads)
   made <- 0
+  # Points that differ in nothing of a record's own are one run of it.
   runs_at <- function(x) lapply(records, function(record) {
-    made <<- made + nrow(x)
-    record$run_at(x)
+    key <- apply(x[, record$own, drop = FALSE], 1, rlang::hash)
+    apart <- !duplicated(key)
+    made <<- made + sum(apart)
+    record$run_at(x[apart, , drop = FALSE])[, match(key, key[apart]), drop = FALSE]
   })
   x <- as.numeric(start)
   p <- length(x)

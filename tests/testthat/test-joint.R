@@ -87,6 +87,7 @@ test_that("a model that lacks an effect in one record loses against one that has
 test_that("what concerns one record works on its part", {
   fit <- joint_fit()
   expect_output(print(fit), "Joint calibration")
+  expect_lte(length(utils::capture.output(print(fit))), 15)
   expect_output(print(fit$records$Ti), "calibrated together")
   expect_identical(nrow(tidy(fit)), 2L)
   expect_equal(dim(as.data.frame(fit, draws = 10)), c(10L, 2L))
@@ -95,6 +96,34 @@ test_that("what concerns one record works on its part", {
   held <- predicted$flux
   expect_gt(mean(held$observed > held$lower95 & held$observed < held$upper95), 0.85)
   expect_s3_class(discrepancy(fit$records$flux), "amiss_discrepancy")
+})
+
+test_that("a search runs no record again for a parameter that it does not have", {
+  calls <- c(Ti = 0, flux = 0)
+  counted <- function(name, simulator) {
+    f <- simulator$f
+    simulator$f <- function(values, drivers, info) {
+      calls[[name]] <<- calls[[name]] + 1
+      amiss:::call_run_function(f, values, drivers, info = info)
+    }
+    simulator
+  }
+  table <- two_table()
+  both <- list(Ti = record_of(table, "Ti", 0.1), flux = record_of(table, "flux", 0.5))
+  room <- function_simulator(function(values, drivers) {
+    values[["base"]] + values[["offset"]] + values[["gain"]] * drivers[, "Te"]
+  }, free("gain", uniform(0, 1)), free("base", uniform(15, 25)), free("offset", uniform(-1, 1)), boundary = "Te")
+  simulators <- list(Ti = counted("Ti", room), flux = counted("flux", flux_only))
+  sets <- unname(Map(function(ensemble, m) {
+    amiss:::calibration_setting(train_emulator(ensemble, m), m, quick_ais, 1)
+  }, simulate_jointly(simulators, both, 12, seed = 1), both))
+  calls[] <- 0
+  found <- amiss:::search_mode(sets, c(0, 0, 0), 1)
+  expect_equal(found$runs, sum(calls))
+  expect_lt(calls[["flux"]], calls[["Ti"]])
+  estimate <- amiss:::unit_to_values(matrix(pnorm(found$centre), 1), amiss:::joint_parameters(sets))
+  expect_equal(c(estimate[1, "gain"], sum(estimate[1, c("base", "offset")])), c(gain = 0.4, 20), tolerance = 0.01,
+               ignore_attr = TRUE)
 })
 
 test_that("runs that were made elsewhere are calibrated together as they are", {
