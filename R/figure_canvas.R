@@ -89,11 +89,16 @@ text_inches <- function(text, points, face = "plain", family = "") {
   }, 0, USE.NAMES = FALSE)
 }
 
-# Lines no wider than `width` inches; a number stays beside its "%", and a word wider than a line is broken.
+# Lines no wider than `width` inches; a number stays beside its "%", a last word of three letters or fewer (a unit)
+# beside the one before it, and a word wider than a line is broken.
 wrap_measured <- function(text, width, points, face = "plain", family = "") {
   measure <- function(t) text_inches(t, points, face, family)
   wrap_line <- function(line) {
     words <- strsplit(gsub("([0-9]) %", "\\1\u00a0%", line), " +")[[1]]
+    last <- utils::tail(words, 2)
+    if (length(last) == 2 && nchar(last[2]) <= 3 && measure(paste(last, collapse = " ")) <= width) {
+      words <- c(utils::head(words, -2), paste(last, collapse = "\u00a0"))
+    }
     words <- unlist(lapply(words, break_word, width, measure))
     lines <- Reduce(function(lines, word) {
       longer <- paste(lines[length(lines)], word)

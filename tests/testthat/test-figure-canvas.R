@@ -54,6 +54,13 @@ test_that("lines are as long as the width allows, in the font at hand", {
   }
   expect_gt(length(strsplit(wrap_measured(strrep("x", 60), 1, 12), "\n")[[1]]), 1)
   expect_identical(wrap_measured("", 1, 12), "")
+  # A unit at the end does not stand alone, where there is room for it beside what it belongs to.
+  with_unit <- "the response of the room to the sun, in 1.0 / K"
+  for (width in seq(0.8, 4, by = 0.1)) {
+    lines <- strsplit(wrap_measured(with_unit, width, 12), "\n")[[1]]
+    expect_match(lines[length(lines)], "/ K$")
+  }
+  expect_identical(wrap_measured("neighbouring K", text_inches("neighbouring", 12) * 1.02, 12), "neighbouring\nK")
 })
 
 test_that("a figure keeps its whole title, and builds without a device", {
