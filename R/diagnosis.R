@@ -81,20 +81,25 @@ diagnosis_verdict <- function(upgrade) {
   list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
 }
 
+# Where runs of the simulator refute the emulator of the model from which all others start, evidence compares
+# emulators, not simulators.
+unjudged <- function(upgrade) isFALSE(upgrade$models[[1]]$fit$check$passed)
+
 open_verdict <- function(upgrade) {
-  unexplained <- function(headline) list(verdict = "unexplained", tag = "Unexplained", headline = headline)
+  explained <- if (unjudged(upgrade)) "whether a mechanism of the catalogue explains it cannot be told"
+               else "no mechanism of the catalogue explains it"
+  tag <- if (unjudged(upgrade)) "Unexplained; the emulator is not good enough to judge mechanisms" else "Unexplained"
+  unexplained <- function(headline) list(verdict = "unexplained", tag = tag, headline = headline)
   base <- upgrade$models[[1]]
   answers <- significant_conditions(base$attribution$table)
   if (length(answers)) {
-    return(unexplained(
-      sprintf("Something that answers to %s is missing from the model, but no mechanism of the catalogue explains it.",
-                               listed(answers))))
+    return(unexplained(sprintf("Something that answers to %s is missing from the model, but %s.", listed(answers),
+                               explained)))
   }
   remainder <- remaining_error(base, upgrade$measurements)
   if (remainder$large) {
-    return(unexplained(sprintf(paste("Something is missing from the model that no mechanism of the catalogue explains:",
-                                     "its error is %s times the stated noise; %s."),
-                               short(remainder$ratio),
+    return(unexplained(sprintf(paste("Something is missing from the model, and %s: its error is %s times the stated",
+                                     "noise; %s."), explained, short(remainder$ratio),
                                remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
   }
   if (!base$fit$trust$trusted) {
@@ -152,6 +157,7 @@ sure_sentences <- function(upgrade) {
                   "wholly in its favour."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted_models(upgrade))) {
+    if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
              trust_sentence(upgrade, best)))
   }
@@ -160,6 +166,13 @@ sure_sentences <- function(upgrade) {
                                          upgrade$candidates$mechanism == m$mechanism, ])
   }, "")
   c(evidence_sentence(best), later, probability_sentence(trials), trust_sentence(upgrade, best))
+}
+
+unjudged_sentence <- function(fit) {
+  remedy <- if (is.null(fit$emulator$simulator)) "more runs where the posterior lies, or narrower priors"
+            else "more runs, narrower priors or a shorter record"
+  sprintf("No odds can be given for or against any mechanism: %s. What would change it: %s.",
+          sub("^not trusted: ", "", fit$trust$verdict), remedy)
 }
 
 # Only where the size of the error itself says that something is missing.

@@ -202,3 +202,18 @@ test_that("a stand-in is no named cause, and what is named goes before what is l
   expect_equal(cause("named", "named")$boundary, "Gv")
   expect_null(amiss:::named_cause(list(list(name = "base")), candidates, entries))
 })
+
+test_that("where the base model's emulator is refuted, no mechanism is judged and no odds are given", {
+  open <- base_only(small_upgrade())
+  expect_match(paste(summary(open)$sure, collapse = " "), "odds of")
+  open$models[[1]]$fit$check$passed <- FALSE
+  open$models[[1]]$fit$trust <- list(trusted = FALSE,
+                                     verdict = "not trusted: the emulator's error is 0.64 of the noise")
+  told <- summary(open)
+  expect_identical(told$verdict, "unexplained")
+  expect_match(told$headline, "cannot be told")
+  expect_match(told$tag, "not good enough")
+  sure <- paste(told$sure, collapse = " ")
+  expect_no_match(sure, "odds of|of the probability")
+  expect_match(sure, "No odds can be given for or against any mechanism: the emulator's error is 0.64 of the noise")
+})
