@@ -172,7 +172,7 @@ unjudged_sentence <- function(fit) {
   remedy <- if (is.null(fit$emulator$simulator)) "more runs where the posterior lies, or narrower priors"
             else "more runs, narrower priors or a shorter record"
   sprintf("No odds can be given for or against any mechanism: %s. What would change it: %s.",
-          sub("^not trusted: ", "", fit$trust$verdict), remedy)
+          gsub("not trusted: ", "", fit$trust$verdict), remedy)
 }
 
 # Only where the size of the error itself says that something is missing.
