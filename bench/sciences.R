@@ -1,7 +1,7 @@
 #!/usr/bin/env Rscript
-# The loop on records of other sciences (bench/sciences): a tank that leaks, a battery cell with two causes, a
-# greenhouse whose cause the catalogue does not hold, a town where nothing is missing. What is named, what was hidden,
-# and how many of the true values lie in their 95 % intervals.
+# The loop on records of other sciences (bench/sciences): a tank with a leak and a little rain, a battery cell with two
+# causes, a greenhouse whose cause the catalogue does not hold, a town where nothing is missing. What is named, what was
+# hidden, and how many of the true values lie in their 95 % intervals.
 # Usage: Rscript bench/sciences.R [--records reservoir,cell,greenhouse,town] [--seed 1] [--runs 120] [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

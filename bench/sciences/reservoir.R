@@ -1,5 +1,5 @@
-# The level of a water tank, by the hour. Hidden: a leak that grows with the root of the level. The truth takes steps of
-# a minute, the tank widens upwards, the sensor rounds to a millimetre.
+# The level of a water tank, by the hour. Hidden: a leak that grows with the root of the level, and a little rain that
+# enters. The truth takes steps of a minute, the tank widens upwards, the sensor rounds to a millimetre.
 draw_reservoir <- function(seed) {
   set.seed(seed)
   n <- 520
@@ -10,7 +10,7 @@ draw_reservoir <- function(seed) {
     ifelse(weekend, 0.85, 1) * exp(autoregressive(n, 0.6, 0.08))
   air <- 15 + 6 * sin(2 * pi * (hour - 9) / 24) + autoregressive(n, 0.97, 0.6)
   rain <- pmax(0, autoregressive(n, 0.8, 1) - 2.2)
-  true <- c(leak = 1.6, pump_gain = 0.97, demand_gain = 1, area = 50)
+  true <- c(leak = 1.6, roof = 0.05, pump_gain = 0.97, demand_gain = 1, area = 50)
   height <- 2.6
   on <- TRUE
   pump <- numeric(n)
@@ -20,7 +20,7 @@ draw_reservoir <- function(seed) {
     pump[t] <- if (on) 34 + stats::rnorm(1, 0, 0.6) else 0
     for (j in seq_len(minutes)) {
       area <- true[["area"]] * (1 + 0.01 * (height - 2.5))
-      flow <- true[["pump_gain"]] * pump[t] - demand[t] - true[["leak"]] * sqrt(height) + 0.05 * rain[t]
+      flow <- true[["pump_gain"]] * pump[t] - demand[t] - true[["leak"]] * sqrt(height) + true[["roof"]] * rain[t]
       height <- height + flow / area / minutes
       level[j, t] <- height
     }
@@ -63,5 +63,5 @@ draw_reservoir <- function(seed) {
   measured <- measurements(table, time = "hour", target = "level", boundary = ~ pump + demand + air + rain,
                            noise_sd = 0.012, unit = "m", name = "reservoir", warmup = 6, calibrate = table$hour <= 360,
                            validate = table$hour > 360)
-  list(base = base, measurements = measured, catalogue = mechanisms, hidden = "leak", true = true)
+  list(base = base, measurements = measured, catalogue = mechanisms, hidden = c("leak", "rain inflow"), true = true)
 }
