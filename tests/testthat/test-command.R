@@ -8,6 +8,7 @@ exit_code <- function(...) {
 }
 
 test_that("the command ends with 0 when the study ran, with the seed that it was given", {
+  skip_on_cran()
   folder <- withr::local_tempdir()
   expect_equal(exit_code("run", shQuote(write_study_file(folder)), "--out", shQuote(file.path(folder, "out")),
                          "--quiet", "--trust", "--seed", "9"), 0)

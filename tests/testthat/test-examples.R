@@ -16,12 +16,14 @@ test_that("every exported function has a help page with an example", {
 })
 
 test_that("the R session finds the sun", {
+  skip_on_cran()
   result <- run_example(example_file("session.R"))
   expect_equal(result$status, 0, info = result$stderr)
   expect_match(result$stdout, "named: sun|sun \\(named\\)")
 })
 
 test_that("the R Markdown report names the window", {
+  skip_on_cran()
   skip_if_not(rmarkdown::pandoc_available("1.12.3"))
   folder <- withr::local_tempdir()
   made <- new.env()

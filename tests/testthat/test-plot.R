@@ -1,6 +1,7 @@
 layers_of <- function(figure) vapply(figure$layers, function(layer) class(layer$geom)[1], "")
 
 test_that("every figure of an upgrade draws, whatever is missing from it", {
+  skip_on_cran()
   grDevices::pdf(NULL)
   withr::defer(grDevices::dev.off())
   full <- small_upgrade()
@@ -45,6 +46,7 @@ test_that("stages have figures of their own", {
 })
 
 test_that("figures are saved, one PNG each", {
+  skip_on_cran()
   folder <- withr::local_tempdir()
   paths <- save_figures(small_upgrade(), folder, dpi = 40)
   expect_setequal(basename(paths), paste0(figure_names, ".png"))

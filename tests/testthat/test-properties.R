@@ -45,6 +45,7 @@ test_that("quantiles of a prior are the inverse of its probabilities, within its
 })
 
 test_that("any object is told in a few words, and refused in the package's own", {
+  skip_on_cran()
   each_of(60, function(i) {
     x <- random_object()
     expect_true(checkmate::test_string(seen(x), min.chars = 1))

@@ -172,6 +172,7 @@ word_body <- function(file) {
 word_tables <- function(body) tables_of(body, "//w:tbl", ".//w:tr", "./w:tc")
 
 test_that("a report is one file that names the cause and needs nothing from outside", {
+  skip_on_cran()
   skip_without_pandoc()
   folder <- withr::local_tempdir()
   file <- file.path(folder, "diagnosis.html")
@@ -249,6 +250,7 @@ test_that("a report of one calibration has its tables in Word, too", {
 })
 
 test_that("a new file from the template works at once", {
+  skip_on_cran()
   skip_without_pandoc()
   skip_if_not_installed("xml2")
   folder <- withr::local_tempdir()
@@ -322,6 +324,7 @@ seen_in_browser <- function(browser, file, width) {
 }
 
 test_that("a browser shows the report on a desk and on a phone, and prints it", {
+  skip_on_cran()
   skip_without_pandoc()
   browser <- browser_or_skip()
   for (width in c(400, 1400)) {

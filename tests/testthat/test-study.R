@@ -16,6 +16,7 @@ ran_study <- function() {
 }
 
 test_that("a study writes its files", {
+  skip_on_cran()
   out <- ran_study()$out
   expect_setequal(list.files(out), c("report.html", "figures", "result.rds", "result.json"))
   expect_gt(length(list.files(file.path(out, "figures"), "png$")), 3)
@@ -244,6 +245,7 @@ ran_comparison <- function() {
 }
 
 test_that("a comparison study writes its files", {
+  skip_on_cran()
   own <- ran_comparison()
   expect_s3_class(own$comparison, "amiss_comparison")
   expect_setequal(list.files(own$out), c("report.html", "figures", "result.rds", "result.json"))
