@@ -7,7 +7,10 @@ avx2_library <- "amiss_avx2"
   file <- file.path(libname, pkgname, "libs", .Platform$r_arch, paste0(avx2_library, .Platform$dynlib.ext))
   if (!file.exists(file) || Sys.getenv("AMISS_SIMD") == "baseline" || !cpu_has_avx2_()) return(invisible())
   routines <- getDLLRegisteredRoutines(library.dynam(avx2_library, pkgname, libname))$.Call
-  for (routine in routines) assign(routine$name, routine, envir = topenv())
+  for (routine in routines) {
+    routine$dll[["name"]] <- pkgname  # R CMD check takes a library of another name for another package
+    assign(routine$name, routine, envir = topenv())
+  }
 }
 
 .onUnload <- function(libpath) {
@@ -18,5 +21,6 @@ avx2_library <- "amiss_avx2"
 # "AVX2" or "baseline": which library's routines are called. A library compiled for one processor alone is "baseline"
 # too.
 instruction_set <- function() {
-  if (`_amiss_cpu_has_avx2_`$dll[["name"]] == avx2_library) "AVX2" else "baseline"
+  library <- tools::file_path_sans_ext(basename(`_amiss_cpu_has_avx2_`$dll[["path"]]))
+  if (library == avx2_library) "AVX2" else "baseline"
 }

@@ -38,7 +38,8 @@
 #' }
 #' both <- list(Ti = record("Ti", 0.1), flux = record("flux", 0.5))
 #' wall <- function_simulator(function(values, drivers) {
-#'   cbind(Ti = 20 + values[["gain"]] * drivers[, "Te"], flux = 3 - 5 * values[["gain"]] * drivers[, "Te"])
+#'   warmed <- values[["gain"]] * drivers[, "Te"]
+#'   cbind(Ti = 20 + warmed, flux = 3 - 5 * warmed)
 #' }, free("gain", uniform(0, 1)), boundary = "Te")
 #' runs <- simulate_jointly(outputs_of(wall, c("Ti", "flux")), both, runs = 20, seed = 1)
 #' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))  # coarse, for speed

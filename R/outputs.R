@@ -13,7 +13,8 @@
 #' @section Errors: A run that lacks a column stops as a run that fails does.
 #' @examples
 #' wall <- function_simulator(function(values, drivers) {
-#'   cbind(Ti = 20 + values[["gain"]] * drivers[, "Te"], flux = 3 - 5 * values[["gain"]] * drivers[, "Te"])
+#'   warmed <- values[["gain"]] * drivers[, "Te"]
+#'   cbind(Ti = 20 + warmed, flux = 3 - 5 * warmed)
 #' }, free("gain", uniform(0, 1)), boundary = "Te")
 #' outputs_of(wall, c("Ti", "flux"))
 #' @export
