@@ -233,8 +233,9 @@ change_sentences <- function(upgrade) {
   unlist(lapply(adopted, function(model) {
     row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
     entry <- upgrade$catalogue[[model$mechanism]]
-    c(sprintf("%s (%s), driven by %s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict,
-              listed(entry$boundary), entry$sentence, row$word, odds(row$log10_bf)),
+    driven <- if (length(entry$boundary)) paste0(", driven by ", listed(entry$boundary)) else ""
+    c(sprintf("%s (%s)%s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, driven, entry$sentence,
+              row$word, odds(row$log10_bf)),
       description_sentence(entry, last_fit(upgrade)), step_sentence(upgrade, model), doubt_sentence(model),
       confounded_sentence(model))
   }))
@@ -354,8 +355,9 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   listed_alone <- if (length(adopted) > 8) 7 else length(adopted)
   for (model in adopted[seq_len(listed_alone)]) {
     row <- x$candidates[x$candidates$from == model$parent & x$candidates$mechanism == model$mechanism, ]
-    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}",
-                                   "({x$catalogue[[model$mechanism]]$boundary}), log10 Bayes factor",
+    boundary <- x$catalogue[[model$mechanism]]$boundary
+    driven <- if (length(boundary)) sprintf(" (%s)", listed(boundary)) else ""
+    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}{driven}, log10 Bayes factor",
                                    "{round(row$log10_bf, 1)}")))
   }
   others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")

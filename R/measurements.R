@@ -382,7 +382,8 @@ segment_starts <- function(measurements, rows) {
 
 #' @export
 print.amiss_measurements <- function(x, ...) on_stdout(x, {
-  n <- table(factor(x$use, c("calibrate", "validate", "warmup")))
+  lost <- is.na(x$y) & x$use != "warmup"
+  n <- table(factor(x$use[!lost], c("calibrate", "validate", "warmup")))
   cli::cli_text(paste("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in",
                       "{length(unique(x$segment))} segment{?s}"))
   origin <- switch(x$noise$method, given = "",
@@ -391,6 +392,7 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
   cli::cli_bullets(
     c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}{origin}",
                      "*" = "{n[['calibrate']]} calibrate, {n[['validate']]} validate, {n[['warmup']]} warm up",
+                     "*" = if (any(lost)) "{sum(lost)} without a measurement, left out",
                      "*" = "boundary conditions {.field {x$conditions}}",
                      ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })

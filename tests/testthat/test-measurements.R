@@ -147,3 +147,13 @@ test_that("a study may ask for the bootstrap", {
   expect_equal(m$noise$method, "bootstrap of readings")
   expect_gt(m$noise_sd, 0)
 })
+
+test_that("rows without a measurement are told, and not counted as data", {
+  table <- data.frame(hour = 1:100, Ti = 20 + sin(1:100), Te = cos(1:100))
+  table$Ti[c(20:24, 90)] <- NaN
+  m <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 10,
+                    validate = table$hour > 80)
+  told <- paste(capture.output(print(m)), collapse = " ")
+  expect_match(told, "65 calibrate, 19 validate, 10 warm up")
+  expect_match(told, "6 without a measurement, left out")
+})

@@ -217,3 +217,11 @@ test_that("where the base model's emulator is refuted, no mechanism is judged an
   expect_no_match(sure, "odds of|of the probability")
   expect_match(sure, "No odds can be given for or against any mechanism: the emulator's error is 0.64 of the noise")
 })
+
+test_that("a mechanism that no boundary condition drives is not said to be driven", {
+  upgrade <- small_upgrade()
+  expect_match(paste(summary(upgrade)$change, collapse = " "), "sun (named), driven by Gv:", fixed = TRUE)
+  upgrade$catalogue$sun$boundary <- character()
+  expect_match(paste(summary(upgrade)$change, collapse = " "), "sun (named): Sun enters", fixed = TRUE)
+  expect_no_match(paste(capture.output(print(upgrade)), collapse = " "), "sun ()", fixed = TRUE)
+})
