@@ -2,9 +2,6 @@
 
 autoregressive <- function(n, memory, sd) as.numeric(stats::arima.sim(list(ar = memory), n, sd = sd))
 
-# The mean of each `parts` values in turn.
-averaged <- function(x, parts) colMeans(matrix(x, parts))
-
 # What a mechanism adds to or multiplies into a term that the base model reads from `info`.
 added <- function(info, term, x) {
   info[[term]] <- (if (is.null(info[[term]])) 0 else info[[term]]) + x
