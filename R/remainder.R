@@ -58,36 +58,13 @@ daily_share <- function(r, hours, clock) {
   summary(stats::lm(r ~ bin))$adj.r.squared
 }
 
-# TRUE where a drift (a parabola in time) on top of the base model, its parameters adapted to first order, fits the
-# calibration record about as well as the extended model: no decisive difference of likelihoods (white error, a BIC's
-# price for the drift).
-drift_rivals <- function(models, measurements, control) {
-  base <- models[[1]]
-  hours <- measurements$hours[base$fit$rows]
+# TRUE where the evidence for all that was adopted is not decisively above that for a drift: a parabola in time beside
+# the base model, in amounts of the order of what that leaves or less (responses_factor()).
+drift_rivals <- function(models, control, threads) {
+  base <- models[[1]]$fit
+  hours <- base$measurements$hours[base$rows]
   if (length(hours) < 10) return(FALSE)
-  n <- length(hours)
-  drifted <- stats::lm.fit(cbind(1, output_slopes(base$fit), stats::poly(hours, 2)),
-                           calibration_residual(base))$residuals
-  extended <- calibration_residual(models[[length(models)]])
-  if (!sum(extended^2) > 0) return(FALSE)
-  0.5 * n * log(sum(drifted^2) / sum(extended^2)) + log(n) < control$decisive * log(10)
-}
-
-calibration_residual <- function(model) {
-  p <- model$prediction[model$prediction$use == "calibrate", ]
-  p$observed - p$mean
-}
-
-# Change of the simulated series with each parameter about the posterior mean, by central differences in the unit cube,
-# within the posterior's own spread: the emulator may know no more.
-output_slopes <- function(fit, step = 0.02) {
-  unit <- posterior_unit(fit)
-  step <- pmin(step, 0.5 / sqrt(diag(solve(stats::cov.wt(unit, fit$weights)$cov + diag(1e-10, ncol(unit))))))
-  centre <- pmin(pmax(colSums(fit$weights * unit), step), 1 - step)
-  steps <- diag(step, length(centre))
-  series <- function(sign) {
-    w <- emulated_coefficients(fit$emulator, sweep(sign * steps, 2, centre, "+"))$mean
-    fit$emulator$basis$vectors %*% t(w)
-  }
-  sweep(series(1) - series(-1), 2, 2 * step, "/")
+  parabola <- error_sd(base) * sqrt(length(hours)) * stats::poly(hours, 2)
+  drift <- responses_factor(base, threads)(parabola)
+  bayes_factor(models[[length(models)]]$fit, base)$log10_bf < drift$log10_bf + control$decisive
 }

@@ -9,35 +9,38 @@ response_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps =
 
 response_scales <- c(1, 0.25, 0.0625)
 
-# One row for each trial: log10 Bayes factor of its responses against none, 95 % interval, word, and the runs made. NA
-# where its runs failed.
-response_factors <- function(fit, trials, settings) {
-  emulator <- fit$emulator
-  m <- fit$measurements
-  data <- history_data(emulator, m, fit$rows, fit$control)
+# What the record says of responses (rows x k) beside the model of a calibration: a function of them that gives their
+# log10 Bayes factor against none, its 95 % interval and the word. Amounts are N(0, 1) times the scale that suits the
+# record best: a mechanism whose prior is wide may be needed in a small part of it alone.
+responses_factor <- function(fit, threads, scales = response_scales) {
+  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   ais <- fill_ais_control(utils::modifyList(fit$control$ais, response_ais))
   evidence <- function(responses) {
-    call_engine(response_evidence_(data, fit$priors, fit$tangent, responses, ais,
-                                   engine_context(settings$seed, settings$threads)))
+    call_engine(response_evidence_(data, fit$priors, fit$tangent, responses, ais, engine_context(fit$seed, threads)))
   }
-  # Of the amounts that suit the record best: a mechanism whose prior is wide may be needed in a small part of it alone.
-  best <- function(responses) {
-    of <- lapply(response_scales, function(scale) evidence(scale * responses))
-    of[[which.max(vapply(of, `[[`, 0, "log_evidence"))]]
+  nothing <- evidence(matrix(0, length(fit$rows), 0))
+  function(responses) {
+    of <- lapply(scales, function(scale) evidence(scale * responses))
+    factor_of(of[[which.max(vapply(of, `[[`, 0, "log_evidence"))]], nothing)
   }
+}
+
+# responses_factor() of the responses that trials show, a row for each, and the runs made. NA where its runs failed.
+response_factors <- function(fit, trials, threads) {
+  emulator <- fit$emulator
   simulated <- function(simulator, values) {
-    suppress_run_warnings(simulate_measured(simulator, values, m, "calibrate", settings$threads))
+    suppress_run_warnings(simulate_measured(simulator, values, fit$measurements, "calibrate", threads))
   }
   centre <- unit_to_values(stats::pnorm(matrix(posterior_centre(fit), 1)), emulator$parameters)
   present <- simulated(emulator$simulator, centre)[, 1]
-  nothing <- evidence(matrix(0, length(present), 0))
+  factor <- responses_factor(fit, threads)
   rows <- lapply(trials, function(trial) {
     values <- response_design(trial, centre)
     responses <- simulated(trial, values) - present
     responses <- responses[, colSums(!is.finite(responses)) == 0, drop = FALSE]
     if (!ncol(responses)) return(data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_,
                                             word = NA_character_, runs = nrow(values)))
-    cbind(factor_of(best(responses), nothing), runs = nrow(values))
+    cbind(factor(responses), runs = nrow(values))
   })
   do.call(rbind, rows)
 }

@@ -127,19 +127,19 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     ordered <- trial_order(catalogue[left], current$attribution)
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
-    best <- which.max(trials$table$log10_bf)
-    if (!length(best) || trials$table$log10_bf[best] < control$decisive || trials$table$lower95[best] <= 0) {
-      stopped <- stop_reason(trials$table, current$attribution, control$decisive)
+    best <- best_trial(trials$table)
+    if (best$log10_bf < control$decisive || best$lower95 <= 0) {
+      stopped <- stop_reason(best, current$attribution, control$decisive)
       break
     }
-    chosen <- trials$table$mechanism[best]
-    say("Adopted {.strong {chosen}}: log10 Bayes factor {round(trials$table$log10_bf[best], 1)}")
+    chosen <- best$mechanism
+    say("Adopted {.strong {chosen}}: log10 Bayes factor {round(best$log10_bf, 1)}")
     current <- measured_model(trials$fits[[chosen]], paste(current$name, "+", chosen), current$name, chosen, settings)
     report_model(current, say)
     models <- c(models, list(current))
   }
   say("Stopped: {stopped}")
-  models <- judge_models(models, candidates, catalogue, measurements, control)
+  models <- judge_models(models, candidates, catalogue, measurements, control, threads)
   structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
                  named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models),
                  stopped_because = stopped,
@@ -190,14 +190,11 @@ trial_order <- function(catalogue, attribution) {
 # Every mechanism as an extension of the current model: fits of those worth one, and the table of all Bayes factors.
 try_mechanisms <- function(current, catalogue, settings, say) {
   trials <- lapply(catalogue, extend, simulator = model_of(current$fit), adopted = settings$adopted)
-  if (is.null(settings$control$screening)) {
-    return(tried_in_full(current, trials, NULL, names(trials), settings, say))
-  }
+  if (is.null(settings$control$screening)) return(tried_in_full(current, trials, NULL, settings, say))
   responses <- staged("responses of the mechanisms", seen_responses(current, trials, settings))
   if (!is.null(responses)) say("  {sum(responses$runs)} runs show in which order mechanisms are tried")
   screens <- screened_mechanisms(current, trials, responses, settings, say)
-  full <- contenders(lapply(screens, `[[`, "fit"), as_coarse(current$fit), settings$control)
-  tried_in_full(current, trials, screens, full, settings, say, responses)
+  tried_in_full(current, trials, screens, settings, say, responses)
 }
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
@@ -219,16 +216,24 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
   screens
 }
 
-# list(fits, table) of the mechanisms `full` calibrated in full, and of the others as they are.
-tried_in_full <- function(current, trials, screens, full, settings, say, responses = NULL) {
+# list(fits, table) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by its full
+# calibration, others may come near: they are calibrated too, until what leads is known in full.
+tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
-  turn <- turns("mechanism in full", length(full))
-  for (name in full) {
-    fits[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
-      trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
-    report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
+  full <- character()
+  repeat {
+    left <- if (is.null(screens)) setdiff(names(trials), full)
+            else contenders(fits, current$fit, full, settings$control)
+    if (!length(left)) break
+    turn <- turns("mechanism in full", length(left))
+    for (name in left) {
+      fits[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
+        trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
+      report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
+    }
+    full <- c(full, left)
   }
-  list(fits = fits, table = trial_table(fits, current, full, responses))
+  list(fits = fits, table = trial_table(fits, current$fit, current$name, full, responses))
 }
 
 naming_mechanism <- function(name, code) {
@@ -242,7 +247,8 @@ naming_mechanism <- function(name, code) {
 # made.
 seen_responses <- function(current, trials, settings) {
   if (inherits(trials[[1]], "amiss_ensemble")) return(NULL)
-  settings$keep(list("responses", current$name, lapply(trials, plain)), response_factors(current$fit, trials, settings))
+  settings$keep(list("responses", current$name, lapply(trials, plain)),
+                response_factors(current$fit, trials, settings$threads))
 }
 
 # Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by
@@ -264,34 +270,43 @@ report_candidate <- function(what, fit, reference, say) {
     "  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
 }
 
-# Candidates whose coarse evidence could come near the best, if any could come near adoption. It is taken as uncertain
-# by three standard errors and by the nats that annealing lies behind the second estimator: where chains lag, a mode may
-# be missed.
-contenders <- function(fits, reference, control) {
+# Bayes factors against the fit `current`: of the candidates calibrated in full (`full`) beside its full calibration, of
+# the others beside its coarse one.
+standing <- function(fits, current, full) {
+  rows <- lapply(names(fits), function(name) {
+    bayes_factor(fits[[name]], if (name %in% full) current else as_coarse(current))
+  })
+  do.call(rbind, rows)
+}
+
+# Candidates not calibrated in full whose coarse evidence could come near the best, if any could come near adoption. It
+# is taken as uncertain by three standard errors and by the nats that annealing lies behind the second estimator: where
+# chains lag, a mode may be missed.
+contenders <- function(fits, current, full, control) {
   if (!length(fits)) return(character())
-  bf <- do.call(rbind, lapply(fits, bayes_factor, reference))
+  bf <- standing(fits, current, full)
   lag <- vapply(fits, function(f) max(0, f$posterior$second[[1]] - f$posterior$annealed[[1]], na.rm = TRUE), 0)
   reach <- bf$log10_bf + 3 * (bf$upper95 - bf$log10_bf) / 1.96 + lag / log(10) + control$margin
-  names(fits)[reach >= max(bf$log10_bf, control$decisive)]
+  setdiff(names(fits)[reach >= max(bf$log10_bf, control$decisive)], full)
 }
 
 # Bayes factors of all mechanisms against the current model: in full, by the coarse calibration, or by the responses
 # alone.
-trial_table <- function(fits, current, full, responses = NULL) {
+trial_table <- function(fits, current, from, full, responses = NULL) {
   rows <- lapply(names(fits), function(name) {
-    reference <- if (name %in% full) current$fit else as_coarse(current$fit)
-    row <- data.frame(from = current$name, mechanism = name, bayes_factor(fits[[name]], reference),
+    row <- data.frame(from = from, mechanism = name, standing(fits[name], current, full),
                       trusted = fits[[name]]$trust$trusted,
                       judged_by = if (name %in% full) "calibration" else "screening")
-    row$parameters <- list(added_parameters(fits[[name]], current$fit))
+    if (!name %in% full) row <- as_far_as_emulated(row, fits[[name]]$check, length(current$rows))
+    row$parameters <- list(added_parameters(fits[[name]], current))
     row
   })
   by_response <- responses[!rownames(responses) %in% names(fits), ]
   if (NROW(by_response)) {
-    seen <- data.frame(from = current$name, mechanism = rownames(by_response),
+    seen <- data.frame(from = from, mechanism = rownames(by_response),
                        by_response[names(by_response) != "runs"], trusted = FALSE,
                        judged_by = "response", row.names = NULL)
-    seen$parameters <- rep(list(added_parameters(current$fit, current$fit)), nrow(seen))
+    seen$parameters <- rep(list(added_parameters(current, current)), nrow(seen))
     rows <- c(rows, list(seen))
   }
   table <- do.call(rbind, rows)
@@ -303,19 +318,40 @@ trial_table <- function(fits, current, full, responses = NULL) {
   table
 }
 
+# The interval of a candidate whose emulator runs refute holds the error e that they saw, in units of the noise: over N
+# rows it takes N e^2 / 2 nats from the log-likelihood of what the emulator says, and moves it by sqrt(N) e at random.
+as_far_as_emulated <- function(row, check, rows) {
+  if (!isFALSE(check$passed)) return(row)
+  error <- check$ratio
+  row$upper95 <- row$upper95 + (0.5 * rows * error^2 + 1.96 * sqrt(rows) * error) / log(10)
+  row$lower95 <- row$lower95 - 1.96 * sqrt(rows) * error / log(10)
+  row$word <- evidence_word(row$lower95, row$upper95)
+  row
+}
+
 # Estimates of the parameters that a mechanism brought with it.
 added_parameters <- function(fit, parent) {
   table <- parameter_table(fit)
   table[!table$name %in% names(parent$emulator$parameters), ]
 }
 
-stop_reason <- function(table, attribution, decisive) {
+# The row of highest evidence among the mechanisms that were calibrated: responses alone decide nothing.
+best_trial <- function(table) {
+  calibrated <- table[table$judged_by != "response", ]
+  calibrated[which.max(calibrated$log10_bf), ]
+}
+
+stop_reason <- function(best, attribution, decisive) {
   significant <- significant_conditions(attribution$table)
-  best <- which.max(table$log10_bf)
-  tail <- sprintf(paste("no mechanism is decisive (best: %s, log10 Bayes factor %.1f; %s or more and an interval above",
-                        "zero are needed)"), table$mechanism[best], table$log10_bf[best], format(decisive))
-  if (length(significant)) paste0(tail, "; what answers to ", paste(significant, collapse = ", "),
-                                  " remains unexplained") else paste0(tail, " and no boundary condition is significant")
+  found <- sprintf("best: %s, log10 Bayes factor %.1f", best$mechanism, best$log10_bf)
+  why <- if (best$log10_bf < decisive) {
+    sprintf("no mechanism is decisive (%s; %s or more and an interval above zero are needed)", found, format(decisive))
+  } else {
+    sprintf("the evidence for the best mechanism is too uncertain (%s, interval from %.1f to %.1f)", found,
+            best$lower95, best$upper95)
+  }
+  if (length(significant)) paste0(why, "; what answers to ", paste(significant, collapse = ", "),
+                                  " remains unexplained") else paste0(why, " and no boundary condition is significant")
 }
 
 # The first mechanism that is named or, if none is, likely; a stand-in is no cause, nor is a description.

@@ -3,7 +3,7 @@
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
 # is a stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely
 # otherwise.
-judge_models <- function(models, candidates, catalogue, measurements, control) {
+judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
   remains <- much_remains(models, measurements)
   for (k in seq_along(models)[-1]) {
     model <- models[[k]]
@@ -24,7 +24,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control) {
         "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
       if (remains) "a good part of the error remains",
-      if (k == 2 && drift_rivals(models, measurements, control)) "a drifting sensor would explain the error as well")
+      if (k == 2 && drift_rivals(models, control, threads)) "a drifting sensor would explain the error as well")
     models[[k]]$held_out_gain <- gain
     models[[k]]$confounded_with <- confounded_parameters(model$fit, new)
     models[[k]]$doubts <- doubts

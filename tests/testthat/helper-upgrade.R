@@ -53,7 +53,7 @@ small_upgrade <- function() {
 # The upgrade with its mechanisms judged anew, after a change by hand.
 rejudged <- function(upgrade) {
   upgrade$models <- judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements,
-                                 upgrade$control)
+                                 upgrade$control, threads = 1)
   upgrade
 }
 

@@ -23,7 +23,7 @@ test_that("responses tell the mechanism that acts from those that do not, and on
                  free("d", uniform(-1, 1)))
   none <- adding("nothing", function(values, drivers) 0 * values[["n"]], free("n", uniform(0, 1)))
   fails <- adding("fails", function(values, drivers) NaN * values[["n"]], free("n", uniform(0, 1)))
-  own <- amiss:::response_factors(base_fit(), extensions(acts, idle, none, fails), settings())
+  own <- amiss:::response_factors(base_fit(), extensions(acts, idle, none, fails), threads = 1)
   expect_gt(own["sun", "log10_bf"], 5)
   expect_lt(own["drift", "upper95"], 1)
   # The same record and the same model: what is left is the sampler's error.
@@ -34,7 +34,7 @@ test_that("responses tell the mechanism that acts from those that do not, and on
 
 test_that("responses lie near the full Bayes factor, and not above twice of it", {
   upgrade <- small_upgrade()
-  seen <- amiss:::response_factors(base_fit(), extensions(upgrade$catalogue$sun), settings())
+  seen <- amiss:::response_factors(base_fit(), extensions(upgrade$catalogue$sun), threads = 1)
   full <- upgrade$candidates$log10_bf[upgrade$candidates$mechanism == "sun"]
   expect_gt(seen$log10_bf, 0.4 * full)
   expect_lt(seen$log10_bf, 1.5 * full)

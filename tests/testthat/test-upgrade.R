@@ -25,7 +25,7 @@ test_that("a coarse candidate is compared with the coarse calibration of the cur
   expect_identical(coarse$log_evidence, base$coarse$log_evidence)
   expect_false(coarse$log_evidence == base$log_evidence)
   table <- amiss:::trial_table(list(sun = upgrade$models[[2]]$fit, drift = upgrade$models[[2]]$fit),
-                               upgrade$models[[1]], full = "sun")
+                               base, from = "base", full = "sun")
   expect_equal(diff(table$log10_bf), (base$log_evidence - coarse$log_evidence) / log(10), tolerance = 1e-10)
 })
 
@@ -40,22 +40,67 @@ test_that("the coarse calibration follows screening, whatever is asked of the fu
   expect_equal(ncol(coarse$ensemble$outputs), 20)
 })
 
+# Two calibrations by hand that share a record: `coarse` is the evidence that screening found.
+fit_by_hand <- function(log10_evidence, se = 0.05, lag = 0, coarse = log10_evidence) {
+  posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
+  structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10),
+                 standard_error = se * log(10), posterior = posterior,
+                 coarse = list(log_evidence = coarse * log(10), standard_error = 0)),
+            class = c("amiss_calibration", "amiss_fit"))
+}
+
 test_that("contenders are those within the margin, and none where nothing comes near adoption", {
-  fit <- function(log10_evidence, se = 0.05, lag = 0) {
-    posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
-    structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10),
-                   standard_error = se * log(10), posterior = posterior),
-              class = c("amiss_calibration", "amiss_fit"))
-  }
   control <- list(margin = 3, decisive = 2)
-  reference <- fit(0, 0)
-  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(7.5), c = fit(6)), reference, control), c("a", "b"))
-  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, se = 0.5)), reference, control),
-               c("a", "b"))  # its error reaches
-  expect_equal(amiss:::contenders(list(a = fit(10), b = fit(6, lag = 2)), reference, control),
-               c("a", "b"))  # its chains may have missed a mode
-  expect_length(amiss:::contenders(list(a = fit(-2), b = fit(-5)), reference, control), 0)
-  expect_equal(amiss:::contenders(list(a = fit(-0.5), b = fit(-5)), reference, control), "a")
+  fit <- fit_by_hand
+  contenders <- function(fits, full = character(), reference = fit(0, 0)) {
+    amiss:::contenders(fits, reference, full, control)
+  }
+  expect_equal(contenders(list(a = fit(10), b = fit(7.5), c = fit(6))), c("a", "b"))
+  expect_equal(contenders(list(a = fit(10), b = fit(6, se = 0.5))), c("a", "b"))  # its error reaches
+  expect_equal(contenders(list(a = fit(10), b = fit(6, lag = 2))), c("a", "b"))  # its chains may have missed a mode
+  expect_length(contenders(list(a = fit(-2), b = fit(-5))), 0)
+  expect_equal(contenders(list(a = fit(-0.5), b = fit(-5))), "a")
+})
+
+test_that("where the leader falls back in full, what now leads is calibrated in full as well", {
+  control <- list(margin = 1, decisive = 2)
+  fit <- fit_by_hand
+  fits <- list(a = fit(10), b = fit(6), c = fit(2))
+  expect_equal(amiss:::contenders(fits, fit(0, 0), character(), control), "a")
+  fits$a <- fit(3)  # in full
+  expect_equal(amiss:::contenders(fits, fit(0, 0), "a", control), "b")
+  # Those in full stand beside the current model in full, the others beside its coarse calibration.
+  expect_length(amiss:::contenders(fits, fit(-5, 0, coarse = 0), "a", control), 0)
+  # The loop itself asks again until what leads is known in full. Here every full calibration falls back by 8 decades.
+  base <- small_upgrade()$models[[1]]
+  screen <- function(above) {
+    own <- base$fit
+    own$log_evidence <- amiss:::as_coarse(base$fit)$log_evidence + above * log(10)
+    own$standard_error <- 0.1
+    list(fit = own)
+  }
+  screens <- list(a = screen(30), b = screen(25), c = screen(2))
+  made <- character()
+  fall_back <- function(key, code) {
+    made <<- c(made, key[[2]])
+    own <- screens[[sub("base \\+ ", "", key[[2]])]]$fit
+    own$log_evidence <- own$log_evidence - 8 * log(10)
+    own
+  }
+  trials <- lapply(screens, function(screen) linear_simulator())
+  tried <- amiss:::tried_in_full(base, trials, screens, list(control = amiss:::upgrade_control, keep = fall_back),
+                                 say = function(...) NULL)
+  expect_equal(made, c("base + a", "base + b"))
+  expect_equal(tried$table$judged_by, c("calibration", "calibration", "screening"))
+})
+
+test_that("the interval of a coarse candidate whose emulator is refuted holds the emulator's error", {
+  sound <- amiss:::factor_of(fit_by_hand(1), fit_by_hand(0))
+  row <- amiss:::as_far_as_emulated(sound, list(passed = FALSE, ratio = 0.5), rows = 3)
+  expect_identical(amiss:::as_far_as_emulated(sound, list(passed = TRUE, ratio = 0.2), rows = 3), sound)
+  expect_equal(row$upper95 - sound$upper95, (3 * 0.25 / 2 + 1.96 * sqrt(3) * 0.5) / log(10))
+  expect_equal(sound$lower95 - row$lower95, 1.96 * sqrt(3) * 0.5 / log(10))
+  expect_equal(row$log10_bf, sound$log10_bf)
 })
 
 test_that("screening can be left out, and bad settings are refused before anything runs", {
@@ -199,4 +244,14 @@ test_that("given runs at the calibration rows alone are judged without held-out 
   expect_true(all(is.na(upgrade$models[[1]]$scores$validate)))
   expect_equal(upgrade$models[[2]]$mechanism, "sun")
   expect_true(is.na(upgrade$models[[2]]$held_out_gain$improves))
+})
+
+test_that("why the loop stops is told: nothing decisive, or evidence too uncertain; responses alone decide nothing", {
+  table <- data.frame(mechanism = c("a", "b", "c"), log10_bf = c(1, 3, 9), lower95 = c(0.5, -1, 8),
+                      upper95 = c(2, 7, 9), judged_by = c("screening", "calibration", "response"))
+  attribution <- list(table = data.frame(boundary = "Te", significant = FALSE, group = NA))
+  best <- amiss:::best_trial(table)
+  expect_equal(best$mechanism, "b")
+  expect_match(amiss:::stop_reason(best, attribution, 2), "too uncertain \\(best: b.*3.0, interval from -1.0 to 7.0\\)")
+  expect_match(amiss:::stop_reason(best, attribution, 4), "no mechanism is decisive \\(best: b.*; 4 or more")
 })
