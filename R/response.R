@@ -34,15 +34,21 @@ response_factors <- function(fit, trials, threads) {
   centre <- unit_to_values(stats::pnorm(matrix(posterior_centre(fit), 1)), emulator$parameters)
   present <- simulated(emulator$simulator, centre)[, 1]
   factor <- responses_factor(fit, threads)
-  rows <- lapply(trials, function(trial) {
+  rows <- Map(function(trial, name) {
     values <- response_design(trial, centre)
     responses <- simulated(trial, values) - present
     responses <- responses[, colSums(!is.finite(responses)) == 0, drop = FALSE]
+    if (ncol(responses) && all(responses == 0)) warn_no_response(name)
     if (!ncol(responses)) return(data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_,
                                             word = NA_character_, runs = nrow(values)))
     cbind(factor(responses), runs = nrow(values))
-  })
+  }, trials, names(trials))
   do.call(rbind, rows)
+}
+
+warn_no_response <- function(mechanism) {
+  warn_input(c("Mechanism {.val {mechanism}} changes nothing: every run with it is that of the model without it.",
+               i = "Does the simulator use its parameters? See {.code vignette(\"mechanisms\")}, Inside a simulator."))
 }
 
 # Values of the parameters for the runs that show a mechanism's responses: those of the model at `centre`, those that

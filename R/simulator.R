@@ -12,7 +12,8 @@
 #'   of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment` (its number) and
 #'   `hold` (the target as measured in the rows that warm up, `NA` in the others). `with_parameters()`: if it has an
 #'   argument `base`, it is given the simulator before the edit, as a function of `values` and, if they are to differ,
-#'   `drivers` and `info`; `NULL` leaves the function as it is.
+#'   `drivers` and `info`; to change what the simulator does not read is an error. `NULL` leaves the function as it is:
+#'   the parameters are for the one that was there first, which uses them where it is given them.
 #' @param ... The parameters, each made by [free()]. Those of `model` stay.
 #' @param boundary Names of the driver columns that the function needs; `with_parameters()`: beside those of `model`.
 #' @param name A name for people.
@@ -72,20 +73,41 @@ with_parameters <- function(model, ..., f = NULL, boundary = character(), name =
   edited$name <- name
   edited$parameters[names(added)] <- added
   edited$boundary <- union(model$boundary, boundary)
-  if (is.null(f)) return(edited)
+  if (!is.null(f)) return(on_top_of(edited, f, model))
+  # Parameters without a function are for the one that was there first.
+  if (is.null(model$base)) edited
+  else on_top_of(edited, model$edit, with_parameters(model$base, ..., boundary = boundary))
+}
+
+# The simulator whose function is `f` on top of that of `base`. Both stay in sight, for keys of kept results.
+on_top_of <- function(edited, f, base) {
   edited$f <- function(values, drivers, info = NULL) {
-    call_run_function(f, values, drivers, info = info, base = as_base(model, drivers, info))
+    call_run_function(f, values, drivers, info = info, base = as_base(base, drivers, info))
   }
-  # What the function is made of, for keys of kept results.
   edited$edit <- f
-  edited$base <- model
+  edited$base <- base
   edited
 }
 
 # A simulator as a function of its parameters; what is not given is that of the call it is used in.
 as_base <- function(model, its_drivers, its_info) {
   function(values, drivers = its_drivers, info = its_info) {
+    if (!missing(drivers)) check_drivers_read(model, drivers, its_drivers)
     call_run_function(model$f, values[names(model$parameters)], drivers[, model$boundary, drop = FALSE], info = info)
+  }
+}
+
+# What an edit changes of the drivers must be read by the simulator that it gives them to.
+check_drivers_read <- function(model, drivers, its_drivers) {
+  check_named_columns(drivers, "drivers", model$boundary)
+  beyond <- setdiff(colnames(drivers), model$boundary)
+  as_it_was <- function(name) name %in% colnames(its_drivers) && identical(drivers[, name], its_drivers[, name])
+  changed <- beyond[!vapply(beyond, as_it_was, NA)]
+  if (length(changed)) {
+    abort_input(c(paste("{.code base()} was given a {.val {changed}} of its own, which {.val {model$name}} does not",
+                        "read: it would change nothing."),
+                  i = if (length(model$boundary)) "It reads {.val {model$boundary}}." else "It reads no drivers.",
+                  i = "What it does not read must act in {.arg f} itself."), call = NULL)
   }
 }
 
@@ -245,6 +267,7 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
     point <- stats::setNames(values[m, ], colnames(values))
     out <- tryCatch(call_run_function(simulator$f, point, drivers, info = info), error = function(e) e)
     piece_done()
+    if (inherits(out, "amiss_error_input")) rlang::cnd_signal(out)
     if (inherits(out, "error")) {
       stopped[[as.character(m)]] <- conditionMessage(out)
       next

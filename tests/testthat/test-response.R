@@ -23,7 +23,8 @@ test_that("responses tell the mechanism that acts from those that do not, and on
                  free("d", uniform(-1, 1)))
   none <- adding("nothing", function(values, drivers) 0 * values[["n"]], free("n", uniform(0, 1)))
   fails <- adding("fails", function(values, drivers) NaN * values[["n"]], free("n", uniform(0, 1)))
-  own <- amiss:::response_factors(base_fit(), extensions(acts, idle, none, fails), threads = 1)
+  expect_warning(own <- amiss:::response_factors(base_fit(), extensions(acts, idle, none, fails), threads = 1),
+                 "\"nothing\" changes nothing", class = "amiss_warning_input")
   expect_gt(own["sun", "log10_bf"], 5)
   expect_lt(own["drift", "upper95"], 1)
   # The same record and the same model: what is left is the sampler's error.

@@ -78,6 +78,41 @@ test_that("edits with a base stack in any order", {
   expect_identical(amiss:::plain(sun(model)), amiss:::plain(sun(model)))
 })
 
+test_that("an edit that changes drivers which the simulator before it does not read is refused", {
+  model <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"], gain, boundary = "Te")
+  shaded <- function(change) {
+    with_parameters(model, free("shade", uniform(0, 1)), boundary = "Gv", f = function(values, drivers, base) {
+      base(values, change(drivers, values[["shade"]]))
+    })
+  }
+  run <- function(change) simulate_runs(shaded(change), cbind(gain = 2, shade = 0.5), drivers, step_h = 1)
+  expect_error(run(function(drivers, by) replace(drivers, TRUE, cbind(drivers[, "Te"], by * drivers[, "Gv"]))),
+               "\"Gv\" of its own.*does not read.*It reads \"Te\"", class = "amiss_error_input")
+  expect_error(run(function(drivers, by) cbind(drivers, shade = by)), "\"shade\"", class = "amiss_error_input")
+  expect_error(run(function(drivers, by) drivers[, "Gv", drop = FALSE]), "no column.*Te", class = "amiss_error_input")
+  expect_equal(run(function(drivers, by) drivers), run(function(drivers, by) drivers[, "Te", drop = FALSE]))
+})
+
+test_that("parameters without a function reach the one that was there first, in any order", {
+  # A door: the model leaks if it is told how much.
+  model <- function_simulator(function(values, drivers) {
+    leak <- if ("leak" %in% names(values)) values[["leak"]] else 0
+    values[["gain"]] * drivers[, "Te"] - leak
+  }, gain, boundary = "Te")
+  leak <- function(model) with_parameters(model, free("leak", uniform(0, 1)))
+  sun <- function(model) {
+    with_parameters(model, free("sun", uniform(0, 1)), boundary = "Gv",
+                    f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+  }
+  values <- cbind(gain = 2, sun = 10, leak = 0.5)
+  expected <- 2 * drivers[, "Te"] + 10 * drivers[, "Gv"] - 0.5
+  run <- function(edited) simulate_runs(edited, values, drivers[, driver_names(edited)], step_h = 1)[, 1]
+  expect_equal(run(sun(leak(model))), expected)
+  expect_equal(run(leak(sun(model))), expected)
+  expect_equal(run(leak(sun(sun(model)))), expected + 10 * drivers[, "Gv"])
+  expect_false(identical(amiss:::plain(leak(sun(model))), amiss:::plain(sun(model))))
+})
+
 test_that("parameters of an extended model are checked", {
   model <- function_simulator(function(values, drivers) drivers[, 1], gain, boundary = "Te")
   expect_error(with_parameters(model, free("gain", uniform(0, 3))), "in the model already", class = "amiss_error_input")
