@@ -106,6 +106,7 @@ compared_model <- function(simulator, name, settings) {
     rlang::abort(paste0("Model \"", name, "\" could not be calibrated."), parent = e,
                  class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
   })
+  warn_coarse_basis(fit$emulator, "control$emulator$max_vectors", name)
   settings$keep(list("compared", name, plain(simulator)), {
     attribution <- condition_table(fit, settings)
     prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)

@@ -20,8 +20,8 @@ warn_input <- function(message, .envir = parent.frame()) {
   cli::cli_warn(message, class = c("amiss_warning_input", "amiss_warning"), .envir = .envir)
 }
 
-warn_result <- function(message, .envir = parent.frame()) {
-  cli::cli_warn(message, class = c("amiss_warning_result", "amiss_warning"), .envir = .envir)
+warn_result <- function(message, class = character(), .envir = parent.frame()) {
+  cli::cli_warn(message, class = c(class, "amiss_warning_result", "amiss_warning"), .envir = .envir)
 }
 
 # The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own condition. The value that

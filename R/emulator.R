@@ -89,14 +89,10 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   trained <- staged(paste("training the emulator of", ncol(ensemble$outputs), "runs"), call_engine(train_emulator_(
     region_inputs(ensemble$region, ensemble$unit), basis, control, engine_context(1, threads))))
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
-  if (basis$discarded_rms > noise_sd && noise_sd > 0) {
-    warn_result(c(paste("The basis of {ncol(basis$vectors)} vectors leaves {signif(basis$discarded_rms, 3)} of the",
-                        "runs unexplained (RMS), more than the noise of {signif(noise_sd, 3)}."),
-                  i = "What it leaves out looks like discrepancy: raise {.code max_vectors} or narrow the priors."))
-  }
   selection <- trained$selection
   selection$parameter <- names(ensemble$parameters)[selection$parameter]
-  structure(list(format_version = format_version, parameters = ensemble$parameters, simulator = ensemble$simulator,
+  emulator <-
+    structure(list(format_version = format_version, parameters = ensemble$parameters, simulator = ensemble$simulator,
                  basis = basis[c("vectors", "singular_values", "explained", "discarded_rms", "discarded_ss",
                                  "discarded_sd")],
                  processes = c(trained[c("inputs", "coefficients", "hyperparameters")], list(region = ensemble$region)),
@@ -107,6 +103,26 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
                  control = control,
                  hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
                  noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
+  warn_coarse_basis(emulator, "control$max_vectors")
+  emulator
+}
+
+coarse_basis <- function(basis, noise_sd) noise_sd > 0 && basis$discarded_rms > noise_sd
+
+# Told once for every model that was asked for: where emulators come and go (without_basis_warnings()), of the one that
+# stays.
+warn_coarse_basis <- function(emulator, option, model = NULL) {
+  basis <- emulator$basis
+  if (!coarse_basis(basis, emulator$noise_sd)) return(invisible())
+  of <- if (!is.null(model)) " of {.val {model}}"
+  warn_result(c(paste0("The basis", of, " of {ncol(basis$vectors)} vectors leaves {signif(basis$discarded_rms, 3)} of ",
+                       "the runs unexplained (RMS), more than the noise of {signif(emulator$noise_sd, 3)}."),
+                i = "What it leaves out looks like discrepancy: raise {.code {option}} or narrow the priors."),
+              class = "amiss_warning_basis")
+}
+
+without_basis_warnings <- function(code) {
+  withCallingHandlers(code, amiss_warning_basis = function(w) rlang::cnd_muffle(w))
 }
 
 check_runs_differ <- function(ensemble, call = rlang::caller_env()) {
@@ -175,7 +191,7 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
   predictions <- ncol(ensemble$outputs) * ncol(basis$vectors)
   beyond_chance <- diagnostics$coverage95 * predictions < stats::qbinom(0.001, predictions, 0.9)  # below 90 % in truth
   why <- c(
-    if (noise_sd > 0 && basis$discarded_rms > noise_sd)
+    if (coarse_basis(basis, noise_sd))
       sprintf("the basis of %d vectors leaves %s (RMS) of the runs out, more than the noise of %s", ncol(basis$vectors),
               format(signif(basis$discarded_rms, 3)), format(signif(noise_sd, 3))),
     if (max(diagnostics$coefficients$widened) > 4)

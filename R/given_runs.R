@@ -31,7 +31,7 @@ held_out_runs <- function(fit, call = rlang::caller_env()) {
 held_out_emulator <- function(fit, call = rlang::caller_env()) {
   given <- fit$emulator$given
   given[c("outputs", "hours")] <- held_out_runs(fit, call)[c("outputs", "hours")]
-  train_emulator(given, fit$measurements$noise_sd, fit$emulator$control)
+  without_basis_warnings(train_emulator(given, fit$measurements$noise_sd, fit$emulator$control))
 }
 
 # The runs themselves at all rows of these uses.

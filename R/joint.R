@@ -63,7 +63,9 @@ calibrate_jointly <- function(ensembles, measurements, rounds = 8, runs = NULL, 
   }
   last <- refine_records(unname(ensembles), unname(measurements[names(ensembles)]), rounds, control, pick_seed(seed),
                          check_threads(threads), runs)
-  new_joint(stats::setNames(last$fits, names(ensembles)))
+  fits <- stats::setNames(last$fits, names(ensembles))
+  for (name in names(fits)) warn_coarse_basis(fits[[name]]$emulator, "control$emulator$max_vectors", name)
+  new_joint(fits)
 }
 
 #' @rdname calibrate_jointly

@@ -28,18 +28,22 @@ fit_model <- function(simulator, name, settings) {
   settings$keep(list("fit", name, plain(simulator)), fit_runs(first_runs(simulator, settings$runs, settings), settings))
 }
 
-# By calibrate() with refinements where its check by runs fails; calibrate_paper() has none.
-fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, rounds = settings$control$rounds) {
+# By calibrate() with refinements where its check by runs fails; calibrate_paper() has none. Of a coarse basis tells
+# who asks for the model.
+fit_runs <- function(ensemble, settings, calibration = settings$control$calibration,
+                     rounds = settings$control$rounds) without_basis_warnings({
   if (identical(settings$calibrate, calibrate)) {
     more <- refined_runs(settings)
-    return(calibrate_refined(ensemble, settings$measurements, rounds %||% refining_control$rounds,
-                             regional_runs(ensemble$parameters, more),
-                             list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration)),
-                             seed = settings$seed, threads = settings$threads))
+    calibrate_refined(ensemble, settings$measurements, rounds %||% refining_control$rounds,
+                      regional_runs(ensemble$parameters, more),
+                      list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration)),
+                      seed = settings$seed, threads = settings$threads)
+  } else {
+    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator,
+                               threads = settings$threads)
+    settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
   }
-  emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator, threads = settings$threads)
-  settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
-}
+})
 
 # The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
 # draws tell how far its evidence is off, correct it, and join them where it is too far. It is for the evidence: tails

@@ -43,8 +43,10 @@ calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, c
   fill_emulator_control(control$emulator, "control$emulator")
   n <- length(used_rows(measurements, "calibrate"))
   fill_calibration_control(control$calibration, measurements, n, "control$calibration")
-  refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), check_threads(threads),
-                       runs = runs)$fit
+  fit <- refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), check_threads(threads),
+                              runs = runs)$fit
+  warn_coarse_basis(fit$emulator, "control$emulator$max_vectors")
+  fit
 }
 
 good_effective <- 1 / 3  # effective share of the runs at posterior draws from which no more is refined
@@ -79,8 +81,8 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
     if (round > 0) staged(sprintf("round %d of at most %d", round, rounds), code) else code
   }
   trained <- function(ensembles) {
-    Map(function(ensemble, m) in_round(train_emulator(ensemble, m, control$emulator, threads = threads)), ensembles,
-        measurements)
+    train <- function(ensemble, m) in_round(train_emulator(ensemble, m, control$emulator, threads = threads))
+    without_basis_warnings(Map(train, ensembles, measurements))
   }
   settings <- function(emulators, calibration) {
     Map(function(emulator, m) calibration_setting(emulator, m, calibration, seed), emulators, measurements)

@@ -171,6 +171,7 @@ measured_model <- function(fit, name, parent, mechanism,
 })
 
 report_model <- function(model, say) {
+  warn_coarse_basis(model$fit$emulator, "control$emulator$max_vectors", model$name)
   first <- model$attribution$table[1, ]
   say(paste("{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
             "{signif(model$scores$validate[['rmse']], 3)} held out; discrepancy answers most to",

@@ -23,6 +23,9 @@ test_that("a basis that explains too little is said to", {
   noise <- matrix(rnorm(240 * 30), 240)
   expect_warning(train_emulator(ensemble(design, noise), 0.01, list(max_vectors = 3)), "unexplained",
                  class = "amiss_warning_result")
+  expect_warning(calibrate_refined(ensemble(design, noise), m, control = c(list(emulator = list(max_vectors = 3)),
+                                                                           list(calibration = quick_ais)), seed = 1),
+                 "control\\$emulator\\$max_vectors", class = "amiss_warning_basis")
   emulator <- suppressWarnings(train_emulator(ensemble(design, noise), 0.01, list(max_vectors = 3)))
   expect_false(emulator$trust$trusted)
   expect_match(emulator$trust$verdict, "basis of 3 vectors leaves 0.9.*more than the noise of 0.01")
