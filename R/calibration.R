@@ -225,6 +225,14 @@ reach_words <- function(fit) {
   sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)
 }
 
+# What a discrepancy that reaches that far says of the parameters; NULL where it does not.
+reach_sentence <- function(fit) {
+  free <- sum(fit$reach[is.infinite(fit$control$reach)])
+  if (length(fit$reach) > 1 && free > 0.9)
+    paste("What remains reaches into what the parameters can do: they may hide a part of it, so do not read their",
+          "values as physical.")
+}
+
 #' @export
 calibrator.amiss_calibration <- function(fit) calibrate
 

@@ -258,8 +258,8 @@ model_doubts <- function(model) {
   fit <- model$fit
   emulator <- fit$emulator
   noise <- fit$measurements$noise_sd
-  beside <- function(size) sprintf("%s beside a noise of %s %s", short(size), short(noise),
-                                   pretty_unit(fit$measurements$unit))
+  beside <- function(size) sprintf("%s beside a noise of %s", short(size),
+                                   with_unit(short(noise), fit$measurements$unit))
   c(if (!fit$trust$trusted) sprintf("the evidence is rough (%s).", fit$trust$verdict),
     if (emulator$basis$discarded_rms > 0.5 * noise) {
       sprintf("the basis is coarse; what it leaves out of the runs (%s) looks like discrepancy.",

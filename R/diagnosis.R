@@ -69,8 +69,9 @@ diagnosis_verdict <- function(upgrade) {
   of <- function(verdict) Filter(function(m) m$verdict == verdict, adopted)
   headline <- cause_headline(upgrade)
   if (length(of("named"))) {
-    return(list(verdict = "named", tag = if (length(of("named")) > 1) "Causes named" else "Cause named",
-                headline = headline))
+    tag <- paste0(if (length(of("named")) > 1) "Causes named" else "Cause named",
+                  if (length(of("likely"))) "; another is likely")
+    return(list(verdict = "named", tag = tag, headline = headline))
   }
   likely <- of("likely")
   if (length(likely)) {
@@ -210,15 +211,15 @@ size_note <- function(upgrade) {
   m <- upgrade$measurements
   seen <- score_of(upgrade, "calibrate", "rmse")
   held <- score_of(upgrade, "validate", "rmse")
-  unit <- pretty_unit(m$unit)
-  noise <- sprintf("the stated measurement noise is %s %s", short(m$noise_sd), unit)
-  if (length(seen) < 2) return(sprintf("The model's typical error is %s %s; %s.", short(seen), unit, noise))
+  told <- function(x) with_unit(short(x), m$unit)
+  noise <- sprintf("the stated measurement noise is %s", told(m$noise_sd))
+  if (length(seen) < 2) return(sprintf("The model's typical error is %s; %s.", told(seen), noise))
   change <- if (length(upgrade$models) > 2) "changes" else "change"
   if (!improves_held_out(upgrade)) {
-    return(sprintf(paste("The %s not improve predictions of data the model has not seen (typical error %s %s before,",
+    return(sprintf(paste("The %s not improve predictions of data the model has not seen (typical error %s before,",
                          "%s after; %s). Take it as a hint, not as a repair."),
-                   if (length(upgrade$models) > 2) "changes do" else "change does", short(held[1]), unit,
-                   short(held[2]), noise))
+                   if (length(upgrade$models) > 2) "changes do" else "change does", told(held[1]),
+                   told(held[2]), noise))
   }
   if (anyNA(held))
     sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit), noise)
@@ -296,7 +297,7 @@ gain_sentences <- function(upgrade) {
   held <- score_of(upgrade, "validate", "rmse")
   inside <- score_of(upgrade, if (anyNA(held)) "calibrate" else "validate", "coverage95")
   inside <- round(100 * inside[length(inside)])
-  told <- function(v) if (length(v) < 2) paste("is", short(v), pretty_unit(unit)) else change_words(v[1], v[2], unit)
+  told <- function(v) if (length(v) < 2) paste("is", with_unit(short(v), unit)) else change_words(v[1], v[2], unit)
   c(paste0("The typical error (RMSE) ", told(seen), " in calibration",
            if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
     if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
@@ -312,7 +313,7 @@ narrow_words <- function(upgrade) {
   p <- p[p$use == if (has_validation(upgrade)) "validate" else "calibrate", ]
   bias <- mean(p$observed - p$mean)
   if (abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
-  sprintf("the simulation is on average %s %s too %s there", short(abs(bias)), pretty_unit(upgrade$measurements$unit),
+  sprintf("the simulation is on average %s too %s there", with_unit(short(abs(bias)), upgrade$measurements$unit),
           if (bias > 0) "low" else "high")
 }
 
@@ -339,14 +340,6 @@ remaining_sentences <- function(upgrade) {
             if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))
 }
 
-# What the reach of the discrepancy says of the last model.
-reach_sentence <- function(fit) {
-  free <- sum(fit$reach[is.infinite(fit$control$reach)])
-  if (length(fit$reach) > 1 && free > 0.9)
-    paste("What remains reaches into what the parameters can do: they may hide a part of it, so do not read their",
-          "values as physical.")
-}
-
 #' @export
 print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   adopted <- adopted_models(x)
@@ -365,9 +358,10 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   told <- unlist(lapply(x$catalogue[vapply(adopted, `[[`, "", "mechanism")], description_sentence, last_fit(x)))
   for (sentence in told) cli::cli_bullets(c("*" = "{sentence}"))
   g <- x$gain
-  cli::cli_bullets(c("*" = paste("RMSE {signif(g$rmse_calibration[1], 3)} -> {signif(g$rmse_calibration[2], 3)} in",
-                                 "calibration, {signif(g$rmse_validation[1], 3)} -> {signif(g$rmse_validation[2], 3)}",
-                                 "held out"),
+  errors <- function(rmse) if (length(adopted)) paste(signif(rmse, 3), collapse = " -> ") else signif(rmse[1], 3)
+  cli::cli_bullets(c("*" = paste0("RMSE {errors(g$rmse_calibration)} in calibration, ",
+                                  if (has_validation(x)) "{errors(g$rmse_validation)} held out"
+                                  else "no data held out"),
                      "*" = "stopped because {x$stopped_because}",
                      ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
 })

@@ -20,8 +20,8 @@ changes_table <- function(upgrade) {
 parameters_words <- function(fit) {
   rows <- parameter_rows(fit)
   data.frame(name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit), median = short(rows$median, 3),
-             "95 % interval" = paste(short(rows$lower95, 3), "to", short(rows$upper95, 3)),
-             "range thought possible" = paste(short(rows$prior_lower, 3), "to", short(rows$prior_upper, 3)),
+             "95 % interval" = interval_words(rows$lower95, rows$upper95, 3),
+             "range thought possible" = interval_words(rows$prior_lower, rows$prior_upper, 3),
              note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
 }
 
@@ -49,9 +49,9 @@ candidates_words <- function(upgrade) {
 method_table <- function(upgrade) {
   value <- function(model) {
     fit <- model$fit
-    unit <- pretty_unit(fit$measurements$unit)
+    unit <- fit$measurements$unit
     c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
-      paste(short(fit$measurements$noise_sd), unit), paste(short(fit$emulator$basis$discarded_rms), unit),
+      with_unit(short(c(fit$measurements$noise_sd, fit$emulator$basis$discarded_rms)), unit),
       paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ",
              signed(fit$interval[2] / log(10)), ")"),
       fit$check$verdict %||% "not checked", fit$trust$verdict)

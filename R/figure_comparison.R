@@ -146,12 +146,12 @@ figure_models_in_time <- function(comparison, use) {
                                    function(model) prediction_rows(model)[model$prediction$use == use, ]), comparison)
   score <- if (use == "calibrate") "rmse_calibration" else "rmse_validation"
   criteria <- comparison$tables$criteria
-  labels <- stats::setNames(paste0(criteria$model, "\n", short(criteria[[score]]), " ", pretty_unit(m$unit)),
+  labels <- stats::setNames(paste0(criteria$model, "\n", with_unit(short(criteria[[score]]), m$unit)),
                             criteria$model)
   lead <- criteria$model[which.min(criteria[[score]])]
-  title <- sprintf("%s %s is typically wrong by least: %s %s",
+  title <- sprintf("%s %s is typically wrong by least: %s",
                    if (use == "calibrate") "In calibration" else "On data not seen", lead,
-                   short(min(criteria[[score]])), pretty_unit(m$unit))
+                   with_unit(short(min(criteria[[score]])), m$unit))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, group = .data$part)) +
     ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95, fill = .data$standing),
                          alpha = 0.25) +
@@ -175,9 +175,9 @@ figure_discrepancies <- function(comparison) {
     transform(d$series, part = d$segment)
   }), comparison)
   size <- vapply(split(table$discrepancy, table$model), function(d) sqrt(mean(d^2)), 0)
-  title <- sprintf("The discrepancy is least in %s: typically %s %s", names(size)[which.min(size)], short(min(size)),
-                   pretty_unit(m$unit))
-  labels <- stats::setNames(paste0(names(size), "\n", short(size), " ", pretty_unit(m$unit)), names(size))
+  title <- sprintf("The discrepancy is least in %s: typically %s", names(size)[which.min(size)],
+                   with_unit(short(min(size)), m$unit))
+  labels <- stats::setNames(paste0(names(size), "\n", with_unit(short(size), m$unit)), names(size))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, group = .data$part)) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
     ggplot2::geom_line(ggplot2::aes(y = .data$residual), colour = "grey65", linewidth = 0.5) +

@@ -4,7 +4,7 @@ discrepancy_title <- function(table) {
   size <- vapply(split(table$discrepancy, table$stage), function(d) sqrt(mean(d^2)), 0)
   unit <- attr(table, "unit")
   if (length(size) < 2)
-    paste("The part of the error that answers to boundary conditions is typically", short(size), pretty_unit(unit))
+    paste("The part of the error that answers to boundary conditions is typically", with_unit(short(size), unit))
   else paste("The part of the error that answers to boundary conditions", change_words(size[1], size[2], unit))
 }
 
@@ -78,11 +78,13 @@ figure_response <- function(upgrade, classes = 10) {
   with_height(figure, 5)
 }
 
-# The response that the model lacks, of each of the leading conditions, in the unit of the target.
-figure_missing <- function(discrepancy, most = 4) {
+# The response that the model lacks, of each of the leading conditions, in the unit of the target: first of those that
+# are significant in the `attribution`, if there is one.
+figure_missing <- function(discrepancy, attribution = NULL, most = 4) {
   responses <- discrepancy$responses
   size <- sqrt(colMeans(responses^2))
-  shown <- names(sort(size, decreasing = TRUE))[seq_len(min(most, length(size)))]
+  first <- names(size) %in% if (!is.null(attribution)) significant_conditions(attribution$table)
+  shown <- names(size)[order(!first, -size)][seq_len(min(most, length(size)))]
   table <- data.frame(time = rep(discrepancy$series$time, length(shown)), value = as.numeric(responses[, shown]),
                       panel = factor(rep(shown, each = nrow(responses)), shown),
                       part = rep(discrepancy$segment, length(shown)))
@@ -90,9 +92,8 @@ figure_missing <- function(discrepancy, most = 4) {
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
     ggplot2::geom_line(colour = stage_colours[["the model"]], linewidth = 0.9) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, labeller = wrap_strips()) +
-    figure_titles(sprintf("What the model lacks is mostly a response to %s, typically %s %s", shown[1],
-                          short(size[[shown[1]]]),
-                          pretty_unit(discrepancy$unit)),
+    figure_titles(sprintf("What the model lacks is mostly a response to %s, typically %s", shown[1],
+                          with_unit(short(size[[shown[1]]]), discrepancy$unit)),
                   paste("How the target answers to each boundary condition, present and past, beyond what the model",
                         "says. Above zero the model is too low, below it too high."),
                   x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +

@@ -5,9 +5,8 @@ fit_title <- function(upgrade) {
   seen <- score_of(upgrade, "calibrate", "rmse")
   held <- score_of(upgrade, "validate", "rmse")
   if (length(seen) < 2) {
-    title <- paste("The calibrated model is typically wrong by", short(seen), pretty_unit(unit))
-    return(if (anyNA(held)) title else paste0(title, "; on data it has not seen, by ", short(held), " ",
-                                              pretty_unit(unit)))
+    title <- paste("The calibrated model is typically wrong by", with_unit(short(seen), unit))
+    return(if (anyNA(held)) title else paste0(title, "; on data it has not seen, by ", with_unit(short(held), unit)))
   }
   title <- paste("The typical error", change_words(seen[1], seen[2], unit))
   if (anyNA(held)) title else paste0(title, "; on data the model has not seen it ",
@@ -79,7 +78,7 @@ mean_day_title <- function(binned, unit, noise) {
   stages <- split(binned[binned$use == "calibration", ], binned$stage[binned$use == "calibration"])
   worst <- stages[[1]][which.max(abs(stages[[1]]$residual)), ]
   if (abs(worst$residual) < noise) return("No time of day stands out from the noise")
-  told <- function(r) paste(short(abs(r)), pretty_unit(unit), if (r > 0) "too low" else "too high")
+  told <- function(r) paste(with_unit(short(abs(r)), unit), if (r > 0) "too low" else "too high")
   title <- sprintf("In calibration, around %02d:30, the simulation is on average %s", floor(worst$hour),
                    told(worst$residual))
   if (length(stages) < 2) return(title)

@@ -76,7 +76,7 @@ held_out_inspection <- function(model, measurements) {
   }
   if (held < 1.5 * max(seen, measurements$noise_sd)) return(NULL)
   beyond <- uncovered_conditions(measurements)
-  where <- if (!length(beyond)) "compare the two periods for what else differs: settings, doors, use, sensors"
+  where <- if (!length(beyond)) "compare the two periods for what else differs: settings, use, sensors"
            else sprintf("there %s outside of what calibration saw; calibrate on data that cover it",
                         listed(sprintf("%s lies in %s of the steps", names(beyond), percent(beyond))))
   c(held_out = sprintf("On held-out data the error is %s times that in calibration: %s.", short(held / seen), where))
@@ -142,8 +142,8 @@ correlation_words <- function(measurements, a, b) {
 
 called_for <- function(parameters) {
   if (!NROW(parameters)) return("no value that could be checked")
-  unit <- ifelse(nzchar(parameters$unit), paste0(" ", pretty_unit(parameters$unit)), "")
-  listed(sprintf("a %s of %s to %s%s", parameters$name, short(parameters$lower95), short(parameters$upper95), unit))
+  listed(sprintf("a %s of %s", parameters$name,
+                 with_unit(interval_words(parameters$lower95, parameters$upper95), parameters$unit)))
 }
 
 # The strongest tie between what a mechanism brought and another part of the model.
@@ -168,10 +168,10 @@ site_inspection <- function(upgrade, model) {
   table <- changes_table(upgrade)
   brought <- table[table$mechanism == model$mechanism, ]
   if (!NROW(brought)) return(NULL)
-  unit <- ifelse(nzchar(brought$unit), paste0(" ", brought$unit), "")
   between <- sub(" to ", " and ", brought[["95 % interval"]], fixed = TRUE)
-  c(site = sprintf("If %s is the cause, %s: check that on site.", model$mechanism,
-                   listed(sprintf("%s lies between %s%s", brought$parameter, between, unit))))
+  hidden <- if (!is.null(reach_sentence(last_fit(upgrade)))) " What remains of the error may be hidden in these values."
+  values <- listed(sprintf("%s lies between %s", brought$parameter, with_unit(between, brought$unit)))
+  c(site = sprintf("If %s is the cause, %s: check that on site.%s", model$mechanism, values, hidden %||% ""))
 }
 
 # ---- what was not adopted
@@ -239,11 +239,10 @@ edge_inspections <- function(fit) {
   rows <- parameter_rows(fit)
   rows <- rows[rows$at_edge, ]
   upper <- abs(rows$prior_upper - rows$median) < abs(rows$median - rows$prior_lower)
-  unit <- ifelse(nzchar(rows$unit), paste0(" ", pretty_unit(rows$unit)), "")
-  told <- sprintf(paste("At the %s end of its prior (%s%s) lies %s: measure it, or widen the prior if %s is",
+  end <- with_unit(short(ifelse(upper, rows$prior_upper, rows$prior_lower)), rows$unit)
+  told <- sprintf(paste("At the %s end of its prior (%s) lies %s: measure it, or widen the prior if %s is",
                         "possible; otherwise it makes up for something else."),
-                  ifelse(upper, "upper", "lower"), short(ifelse(upper, rows$prior_upper, rows$prior_lower)), unit,
-                  rows$label, ifelse(upper, "more", "less"))
+                  ifelse(upper, "upper", "lower"), end, rows$label, ifelse(upper, "more", "less"))
   stats::setNames(told, rep("edge", length(told)))
 }
 
@@ -273,7 +272,7 @@ loose_inspections <- function(fit) {
 
 remainder_inspection <- function(model, measurements) {
   left <- remaining_error(model, measurements)
-  noise <- paste0(short(measurements$noise_sd), " ", pretty_unit(measurements$unit))
+  noise <- with_unit(short(measurements$noise_sd), measurements$unit)
   if (left$large && is.null(left$pattern)) {
     return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: hold a second sensor",
                                    "beside the first; if that noise is right, something is still missing from the",
@@ -307,9 +306,9 @@ separation_inspection <- function(comparison) {
   }, 0)
   name <- names(which.max(abs(conditions)))
   at <- which.max(apart)
-  c(separate = sprintf(paste("Not told apart are %s and %s. Their simulations differ most (by %s %s) at %s, and the",
+  c(separate = sprintf(paste("Not told apart are %s and %s. Their simulations differ most (by %s) at %s, and the",
                              "more so the %s %s is: measure under such conditions."),
-                       best$model, best$against, short(apart[at]), pretty_unit(m$unit),
+                       best$model, best$against, with_unit(short(apart[at]), m$unit),
                        paste0(if (is.numeric(a$time)) "hour ", format(a$time[at])),
                        if (conditions[[name]] > 0) "higher" else "lower", name))
 }

@@ -127,7 +127,7 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
     priors = figure_priors(lapply(stages, `[[`, "fit")),
     moved = figure_moved(upgrade),
     steps = figure_steps(upgrade),
-    missing = figure_missing(discrepancy(stages[[1]]$fit)),
+    missing = figure_missing(discrepancy(stages[[1]]$fit), stages[[1]]$attribution),
     emulator = figure_emulator(lapply(stages, `[[`, "fit")),
     sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)))
 }

@@ -17,25 +17,24 @@ remaining_error <- function(model, measurements) {
 remainder_pattern <- function(r, rows, measurements) {
   hours <- measurements$hours[rows]
   clock <- clock_hour(measurements$time[rows])
-  unit <- pretty_unit(measurements$unit)
+  unit <- measurements$unit
   shares <- c(drift = drift_share(r, hours), daily = daily_share(r, hours, clock))
   best <- which.max(shares)
   if (!shares[best] > 0.5) return(NULL)
   if (names(shares)[best] == "drift") {
     ends <- stats::fitted(stats::lm(r ~ stats::poly(hours, 2)))[c(1, length(r))]
-    return(list(what = sprintf("it drifts, by %s %s from the beginning to the end of the calibration",
-                               signed(unname(diff(ends))), unit),
+    return(list(what = sprintf("it drifts, by %s from the beginning to the end of the calibration",
+                               with_unit(signed(unname(diff(ends))), unit)),
                 where = "Suspect a drifting sensor, or something slow that the inputs do not hold."))
   }
   profile <- tapply(r, clock, mean)
   peak <- which.max(abs(profile - mean(r)))
   hour <- as.numeric(names(profile)[peak])
-  list(what = sprintf("every day around %02d:%02d the measured %s is on average %s %s %s than simulated", floor(hour),
-                      round(60 * (hour %% 1)),
-                      measurements$target, short(abs(profile[[peak]])), unit,
+  list(what = sprintf("every day around %s the measured %s is on average %s %s than simulated", clock_words(hour),
+                      measurements$target, with_unit(short(abs(profile[[peak]])), unit),
                       if (profile[[peak]] > 0) "higher" else "lower"),
-       where = paste("Look for something that follows the clock and is not among the inputs: a heat gain, a schedule,",
-                     "a door."))
+       where = paste("Look for something that follows the clock and is not among the inputs: a schedule, a switch, a",
+                     "habit."))
 }
 
 # Hour of the day as the record's own clock shows it.

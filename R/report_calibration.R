@@ -19,8 +19,8 @@ calibration_words <- function(fit, only) {
   left <- remaining_error(model, fit$measurements)
   list(title = fit$measurements$name, verdict = if (trusted) "named" else "likely",
        tag = if (trusted) "Calibration" else "Calibration that is not to be trusted",
-       headline = sprintf("The calibrated model's typical error is %s %s, %s times the stated noise.",
-                          short(model$scores$calibrate[["rmse"]]), pretty_unit(fit$measurements$unit),
+       headline = sprintf("The calibrated model's typical error is %s, %s times the stated noise.",
+                          with_unit(short(model$scores$calibrate[["rmse"]]), fit$measurements$unit),
                           short(left$ratio)),
        sure = c(sprintf("Sampler: %s.", sampler_said(fit)$verdict),
                 if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),

@@ -95,7 +95,7 @@ practice_sentences <- function(comparison) {
     if (nrow(noted)) sprintf("Likelihood ratio of %s against %s: %s.", noted$model, noted$nested, noted$lr_note))
 }
 
-interval_words <- function(lower, upper, digits = 3) paste0("[", short(lower, digits), ", ", short(upper, digits), "]")
+bracketed <- function(lower, upper) paste0("[", interval_words(lower, upper, 3, ", "), "]")
 
 # Table 3a of the paper, in two: evidence, and attribution with a column for each condition.
 models_words <- function(comparison) {
@@ -133,9 +133,9 @@ compared_parameters_words <- function(comparison) {
                                             sum(weights * values[, name]) / sum(weights)), rows$model, rows$name)
   holds <- ifelse(rows$lower95 <= true & true <= rows$upper95, "holds the truth", "misses the truth")
   table <- data.frame(model = rows$model, parameter = rows$label, unit = pretty_unit(rows$unit),
-                      prior = interval_words(rows$prior_lower, rows$prior_upper),
+                      prior = bracketed(rows$prior_lower, rows$prior_upper),
                       true = short(true, 3), mean = short(mean, 3), median = short(rows$median, 3),
-                      "95 % interval" = interval_words(rows$lower95, rows$upper95),
+                      "95 % interval" = bracketed(rows$lower95, rows$upper95),
                       note = paste0(ifelse(is.na(true), "", holds), ifelse(rows$at_edge, ", at the edge", "")),
                       check.names = FALSE, row.names = NULL)
   table$note <- sub("^, ", "", table$note)
@@ -156,14 +156,14 @@ criteria_words <- function(comparison) {
 
 # Tables 4 and 5: errors in calibration and held out.
 errors_words <- function(comparison) {
-  unit <- pretty_unit(comparison$measurements$unit)
+  unit <- comparison$measurements$unit
   score <- function(use, which) vapply(comparison$models, function(m) m$scores[[use]][[which]], 0)
   inside <- function(use) ifelse(is.na(score(use, "coverage95")), "", paste(round(100 * score(use, "coverage95")), "%"))
   table <- data.frame(model = names(comparison$models), calibration = short(score("calibrate", "rmse"), 3),
                       inside = inside("calibrate"), row.names = NULL)
-  names(table)[2:3] <- c(paste0("RMSE, calibration [", unit, "]"), "in its 95 % band")
+  names(table)[2:3] <- c(axis_label("RMSE, calibration", unit), "in its 95 % band")
   if (validates(comparison)) {
-    table[[paste0("RMSE, held out [", unit, "]")]] <- short(score("validate", "rmse"), 3)
+    table[[axis_label("RMSE, held out", unit)]] <- short(score("validate", "rmse"), 3)
     table[["in the band, held out"]] <- inside("validate")
   }
   table
@@ -174,18 +174,18 @@ heat_loss_words <- function(comparison) {
   if (!length(losses)) return(NULL)
   limits <- vapply(losses, stats::quantile, c(0, 0), c(0.025, 0.975))
   table <- data.frame(model = names(losses), "heat loss coefficient [W/K]" = short(vapply(losses, mean, 0), 3),
-                      "95 % interval" = interval_words(limits[1, ], limits[2, ]), check.names = FALSE, row.names = NULL)
+                      "95 % interval" = bracketed(limits[1, ], limits[2, ]), check.names = FALSE, row.names = NULL)
   true <- true_heat_loss(comparison)
   if (is.na(true)) table else cbind(table, true = short(true, 3))
 }
 
 comparison_method_table <- function(comparison) {
-  unit <- pretty_unit(comparison$measurements$unit)
+  unit <- comparison$measurements$unit
   value <- function(model) {
     fit <- model$fit
     c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
-      paste(short(fit$measurements$noise_sd), unit),
-      paste(short(fit$emulator$basis$discarded_rms), unit), paste(short(fit$emulator$diagnostics$series_rmse), unit),
+      with_unit(short(c(fit$measurements$noise_sd, fit$emulator$basis$discarded_rms,
+                        fit$emulator$diagnostics$series_rmse)), unit),
       fit$trust$verdict)
   }
   cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M",

@@ -7,9 +7,8 @@ report_content.amiss_upgrade <- function(x) {
 score_tiles <- function(upgrade) {
   number <- function(x) sub("\\.$", "", formatC(x, digits = 2, format = "fg", flag = "#"))
   arrow <- function(x) paste(x, collapse = " \u2192 ")
-  unit <- pretty_unit(upgrade$measurements$unit)
   held <- has_validation(upgrade)
-  rmse <- function(use) paste(arrow(number(score_of(upgrade, use, "rmse"))), unit)
+  rmse <- function(use) with_unit(arrow(number(score_of(upgrade, use, "rmse"))), upgrade$measurements$unit)
   inside <- round(100 * score_of(upgrade, if (held) "validate" else "calibrate", "coverage95"))
   list(value = c(if (held) rmse("validate"), rmse("calibrate"), paste(arrow(inside), "%")),
        words = c(if (held) "typical error, held-out data", "typical error, calibration",

@@ -224,7 +224,7 @@ description_sentence <- function(entry, fit) {
   rows <- parameter_rows(fit)
   number <- function(name) {
     row <- rows[rows$name == name, ]
-    sprintf("%s %s (%s to %s)", short(row$median), pretty_unit(row$unit), short(row$lower95), short(row$upper95))
+    sprintf("%s (%s)", with_unit(short(row$median), row$unit), interval_words(row$lower95, row$upper95))
   }
   lag <- rows$median[rows$name == response$time_constant]
   shape <- if (lag < m$step_h) {

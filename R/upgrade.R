@@ -107,7 +107,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   repeat {
     left <- setdiff(names(catalogue), unlist(lapply(models, `[[`, "mechanism")))
     if (!length(left)) {
-      stopped <- "every mechanism of the catalogue has been adopted"
+      stopped <- if (length(catalogue)) "every mechanism of the catalogue has been adopted"
+                 else "the catalogue is empty"
       break
     }
     settings$adopted <- setdiff(names(current$fit$emulator$parameters), names(models[[1]]$fit$emulator$parameters))

@@ -14,7 +14,11 @@ short <- function(x, digits = 2) {
 
 format_each <- function(x) vapply(x, format, "")
 
-signed <- function(x) ifelse(abs(x) < 9.95, sprintf("%+.1f", x), sprintf("%+.0f", x))
+# What rounds to zero has no sign.
+signed <- function(x) {
+  text <- ifelse(abs(x) < 9.95, sprintf("%+.1f", x), sprintf("%+.0f", x))
+  ifelse(text %in% c("-0.0", "+0.0"), "0.0", text)
+}
 
 percent <- function(x) {
   digits <- trimws(formatC(100 * x, digits = 2, format = "fg"))
@@ -23,13 +27,37 @@ percent <- function(x) {
   ifelse(is.na(x), "\u2013", text)
 }
 
-pretty_unit <- function(unit) gsub("m3", "m\u00b3", gsub("m2", "m\u00b2", unit, fixed = TRUE), fixed = TRUE)
+# Powers of metres and seconds, not m0.5 and not CO2.
+pretty_unit <- function(unit) {
+  squared <- gsub("([ms])2(?![0-9.])", "\\1\u00b2", unit, perl = TRUE)
+  gsub("([ms])3(?![0-9.])", "\\1\u00b3", squared, perl = TRUE)
+}
+
+with_unit <- function(text, unit) ifelse(rep_len(nzchar(unit), length(text)), paste(text, pretty_unit(unit)), text)
+
+# Two ends of an interval, with as many digits as tell them apart.
+short_ends <- function(lower, upper, digits = 2) {
+  for (more in digits + 0:3) {
+    ends <- short(c(lower, upper), more)
+    if (lower == upper || ends[1] != ends[2]) break
+  }
+  ends
+}
+
+interval_words <- function(lower, upper, digits = 2, between = " to ") {
+  mapply(function(l, u) paste(short_ends(l, u, digits), collapse = between), lower, upper, USE.NAMES = FALSE)
+}
+
+# An hour of the day in decimals, as a clock shows it.
+clock_words <- function(hour) {
+  minutes <- round(60 * hour)
+  sprintf("%02d:%02d", minutes %/% 60, minutes %% 60)
+}
 
 change_words <- function(before, after, unit) {
   pair <- short(c(before, after))
-  unit <- if (nzchar(unit)) paste0(" ", pretty_unit(unit)) else ""
-  if (pair[1] == pair[2]) paste0("stays at ", pair[1], unit)
-  else paste0(if (after < before) "falls" else "rises", " from ", pair[1], " to ", pair[2], unit)
+  if (pair[1] == pair[2]) paste("stays at", with_unit(pair[1], unit))
+  else paste(if (after < before) "falls" else "rises", "from", pair[1], "to", with_unit(pair[2], unit))
 }
 
 # 10^x written out while it can be read.
