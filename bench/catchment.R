@@ -73,10 +73,13 @@ draw_catchment <- function(code) {
   mechanisms <- catalogue(
     snow,
     new_mechanism("undercatch", "rain", "Gauges catch less than falls, or more.", free("catch", uniform(0.7, 1.6)),
-                  function(values, drivers, info, base) base(values, info = scaled(info, "catch", values[["catch"]]))),
+                  function(values, drivers, info, base) {
+      base(values, info = scaled(info, "catch", values[["catch"]]))
+    }),
     new_mechanism("evaporative demand", "evaporation", "Plants need more water than the formula says, or less.",
-                  free("demand", uniform(0.5, 1.6)),
-                  function(values, drivers, info, base) base(values, info = scaled(info, "demand", values[["demand"]]))),
+                  free("demand", uniform(0.5, 1.6)), function(values, drivers, info, base) {
+      base(values, info = scaled(info, "demand", values[["demand"]]))
+    }),
     new_mechanism("abstraction", character(), "A steady flow is taken from the river.",
                   free("taken", uniform(0, 0.3), "mm/d"), function(values, drivers, info, base) {
       base(values, info = added(info, "abstraction", values[["taken"]]))
