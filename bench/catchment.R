@@ -34,8 +34,6 @@ runoff <- function(drivers, time, basin, parameters, snow = NULL) {
   model(inputs, options, c(parameters, snow))$Qsim
 }
 
-store_names <- c("production", "exchange", "routing", "lag")
-
 draw_catchment <- function(code) {
   scope <- new.env()
   utils::data(list = code, package = "airGR", envir = scope)
@@ -52,42 +50,54 @@ draw_catchment <- function(code) {
   measured <- measurements(table, time = "day", target = "flow", boundary = ~ rain + temperature + evaporation,
                            noise_sd = noise, unit = "ln(mm/d)", name = basin$BasinName, warmup = 24 * sum(warm),
                            calibrate = !warm & year < until, validate = year >= until)
-  base <- function_simulator(function(values, drivers, info) {
+  list(base = gr4j(basin), measurements = measured, catalogue = river_mechanisms())
+}
+
+gr4j <- function(basin) {
+  flow <- function(values, drivers, info) {
     drivers[, "rain"] <- drivers[, "rain"] * term(info, "catch", 1, 1)
     drivers[, "evaporation"] <- drivers[, "evaporation"] * term(info, "demand", 1, 1)
     parameters <- c(exp(values[["production"]]), values[["exchange"]], exp(values[["routing"]]), values[["lag"]])
     flow <- runoff(cbind(drivers, temperature = info$temperature), info$time, basin, parameters, info$snow)
     log(pmax(flow - term(info, "abstraction", 0, 1), least))
-  }, free("production", normal(5.9, 0.8), "ln mm"), free("exchange", normal(0, 1.5), "mm/d"),
-  free("routing", normal(4.5, 0.7), "ln mm"), free("lag", uniform(0.6, 5), "d"),
-  boundary = c("rain", "evaporation"), name = "GR4J")
+  }
+  function_simulator(flow, free("production", normal(5.9, 0.8), "ln mm", "production store"),
+                     free("exchange", normal(0, 1.5), "mm/d", "groundwater exchange"),
+                     free("routing", normal(4.5, 0.7), "ln mm", "routing store"),
+                     free("lag", uniform(0.6, 5), "d", "time base of the unit hydrograph"),
+                     boundary = c("rain", "evaporation"), name = "GR4J")
+}
+
+river_mechanisms <- function() {
   snow <- mechanism("snow", boundary = c("rain", "temperature"), sentence = "Precipitation waits as snow and melts.",
                     edit = function(model) {
-    with_parameters(model, free("cold", uniform(0, 1)), free("melt", uniform(0.5, 10), "mm/(K d)"),
-                    boundary = "temperature", f = function(values, drivers, info, base) {
+    with_parameters(model, free("cold", uniform(0, 1), "", "memory of the snow's cold"),
+                    free("melt", uniform(0.5, 10), "mm/(K d)", "melt"), boundary = "temperature",
+                    f = function(values, drivers, info, base) {
       info$temperature <- drivers[, "temperature"]
       info$snow <- c(values[["cold"]], values[["melt"]])
       base(values, info = info)
     })
   })
-  mechanisms <- catalogue(
+  catalogue(
     snow,
-    new_mechanism("undercatch", "rain", "Gauges catch less than falls, or more.", free("catch", uniform(0.7, 1.6)),
+    new_mechanism("undercatch", "rain", "Gauges catch less than falls, or more.",
+                  free("catch", uniform(0.7, 1.6), "", "rain over what was caught"),
                   function(values, drivers, info, base) {
       base(values, info = scaled(info, "catch", values[["catch"]]))
     }),
     new_mechanism("evaporative demand", "evaporation", "Plants need more water than the formula says, or less.",
-                  free("demand", uniform(0.5, 1.6)), function(values, drivers, info, base) {
+                  free("demand", uniform(0.5, 1.6), "", "demand over the formula's"),
+                  function(values, drivers, info, base) {
       base(values, info = scaled(info, "demand", values[["demand"]]))
     }),
     new_mechanism("abstraction", character(), "A steady flow is taken from the river.",
-                  free("taken", uniform(0, 0.3), "mm/d"), function(values, drivers, info, base) {
+                  free("taken", uniform(0, 0.3), "mm/d", "flow taken"), function(values, drivers, info, base) {
       base(values, info = added(info, "abstraction", values[["taken"]]))
     }),
     new_mechanism("gauge offset", character(), "The rating curve is off by a factor.",
-                  free("offset", normal(0, 0.2)),
+                  free("offset", normal(0, 0.2), "", "offset of the logarithm"),
                   function(values, drivers, info, base) base(values, info = info) + values[["offset"]]))
-  list(base = base, measurements = measured, catalogue = mechanisms)
 }
 
 score_catchment <- function(code) {
