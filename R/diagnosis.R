@@ -152,21 +152,28 @@ odds_interval <- function(interval) {
 sure_sentences <- function(upgrade) {
   if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
   trials <- first_trials(upgrade)
-  best <- trials[1, ]
+  adopted <- adopted_models(upgrade)
+  best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
   needed <-
     sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that lies",
                   "wholly in its favour."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
-  if (!length(adopted_models(upgrade))) {
+  if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
+    if (raises_error(best)) needed <- raised_sentence(best)
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
              trust_sentence(upgrade, best)))
   }
-  later <- vapply(adopted_models(upgrade)[-1], function(m) {
+  later <- vapply(adopted[-1], function(m) {
     evidence_sentence(upgrade$candidates[upgrade$candidates$from == m$parent &
                                          upgrade$candidates$mechanism == m$mechanism, ])
   }, "")
   c(evidence_sentence(best), later, probability_sentence(trials), trust_sentence(upgrade, best))
+}
+
+raised_sentence <- function(row) {
+  sprintf(paste("It was not adopted, because with %s the simulation's own error in calibration is %s times as large:",
+                "what is gained, the discrepancy gains."), row$mechanism, short(row$error_ratio))
 }
 
 unjudged_sentence <- function(fit) {

@@ -41,9 +41,14 @@ candidates_words <- function(upgrade) {
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
              "log10 Bayes factor" = signed(table$log10_bf),
              "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)), evidence = table$word,
-             probability = percent(table$probability), estimate = ifelse(table$trusted, "sound", "rough"),
+             probability = percent(table$probability),
+             "error in calibration" = error_words(table$error_ratio),
+             estimate = ifelse(table$trusted, "sound", "rough"),
              decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
 }
+
+# Over that of the model before.
+error_words <- function(ratio) ifelse(is.na(ratio), "", paste(short(ratio), "times"))
 
 # What each adopted model was computed with.
 method_table <- function(upgrade) {

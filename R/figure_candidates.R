@@ -3,7 +3,8 @@
 candidates_title <- function(table, decisive) {
   if (!any(table$adopted)) {
     best <- table[which.max(table$log10_bf), ]
-    return(if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero"
+    return(if (best$log10_bf >= decisive && raises_error(best)) "No mechanism was adopted: the best raises the error"
+           else if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero"
            else "No mechanism explains the measurements decisively better than no change")
   }
   paste0("The measurements call for ", listed(table$mechanism[table$adopted]))

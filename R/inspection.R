@@ -181,8 +181,8 @@ nearest_inspection <- function(upgrade) {
   last <- upgrade$models[[length(upgrade$models)]]
   trials <- upgrade$candidates[upgrade$candidates$from == last$name, ]
   if (!NROW(trials)) return(NULL)
-  best <- trials[which.max(trials$log10_bf), ]
-  if (best$probability < rival_probability || best$log10_bf < 0.5) return(NULL)
+  best <- best_trial(trials)
+  if (!nrow(best) || best$probability < rival_probability || best$log10_bf < 0.5) return(NULL)
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it%s.",

@@ -102,7 +102,8 @@ result_list.amiss_upgrade <- function(x) {
   candidate_list <- function(i) {
     row <- x$candidates[i, ]
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
-         probability = row$probability, trusted = row$trusted, screened = row$screened, judged_by = row$judged_by,
+         probability = row$probability, error_ratio = row$error_ratio, trusted = row$trusted,
+         screened = row$screened, judged_by = row$judged_by,
          parameters = table_rows(row$parameters[[1]]))
   }
   cause <- x$named_cause

@@ -6,7 +6,9 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'
 #' The model is calibrated and its discrepancy attributed; every mechanism of the catalogue is tried as a real
 #' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
-#' and the loop begins again with the extended model. Held-out rows only measure; they decide nothing.
+#' and the loop begins again with the extended model. A mechanism with which the simulation's own error in calibration
+#' rises (by more than 2 %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. Held-out rows
+#' only measure; they decide nothing.
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
 #' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
@@ -129,8 +131,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
     best <- best_trial(trials$table)
-    if (best$log10_bf < control$decisive || best$lower95 <= 0) {
-      stopped <- stop_reason(best, current$attribution, control$decisive)
+    if (!nrow(best) || best$log10_bf < control$decisive || best$lower95 <= 0) {
+      stopped <- stop_reason(trials$table, current$attribution, control$decisive)
       break
     }
     chosen <- best$mechanism
@@ -281,15 +283,21 @@ standing <- function(fits, current, full) {
   do.call(rbind, rows)
 }
 
-# Candidates not calibrated in full whose coarse evidence could come near the best, if any could come near adoption. It
-# is taken as uncertain by three standard errors and by the nats that annealing lies behind the second estimator: where
-# chains lag, a mode may be missed.
+# The simulation's own error in calibration over that of the fit `current`.
+error_ratio <- function(fit, current) sqrt(mean(stats::residuals(fit)^2) / mean(stats::residuals(current)^2))
+
+raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > risen_error
+
+# Candidates not calibrated in full whose coarse evidence could come near the best that may be adopted, if any could
+# come near adoption. It is taken as uncertain by three standard errors and by the nats that annealing lies behind the
+# second estimator: where chains lag, a mode may be missed.
 contenders <- function(fits, current, full, control) {
   if (!length(fits)) return(character())
   bf <- standing(fits, current, full)
   lag <- vapply(fits, function(f) max(0, f$posterior$second[[1]] - f$posterior$annealed[[1]], na.rm = TRUE), 0)
   reach <- bf$log10_bf + 3 * (bf$upper95 - bf$log10_bf) / 1.96 + lag / log(10) + control$margin
-  setdiff(names(fits)[reach >= max(bf$log10_bf, control$decisive)], full)
+  barred <- vapply(names(fits), function(name) name %in% full && error_ratio(fits[[name]], current) > risen_error, NA)
+  setdiff(names(fits)[reach >= max(bf$log10_bf[!barred], control$decisive)], full)
 }
 
 # Bayes factors of all mechanisms against the current model: in full, by the coarse calibration, or by the responses
@@ -297,7 +305,7 @@ contenders <- function(fits, current, full, control) {
 trial_table <- function(fits, current, from, full, responses = NULL) {
   rows <- lapply(names(fits), function(name) {
     row <- data.frame(from = from, mechanism = name, standing(fits[name], current, full),
-                      trusted = fits[[name]]$trust$trusted,
+                      error_ratio = error_ratio(fits[[name]], current), trusted = fits[[name]]$trust$trusted,
                       judged_by = if (name %in% full) "calibration" else "screening")
     if (!name %in% full) row <- as_far_as_emulated(row, fits[[name]]$check, length(current$rows))
     row$parameters <- list(added_parameters(fits[[name]], current))
@@ -306,7 +314,7 @@ trial_table <- function(fits, current, from, full, responses = NULL) {
   by_response <- responses[!rownames(responses) %in% names(fits), ]
   if (NROW(by_response)) {
     seen <- data.frame(from = from, mechanism = rownames(by_response),
-                       by_response[names(by_response) != "runs"], trusted = FALSE,
+                       by_response[names(by_response) != "runs"], error_ratio = NA_real_, trusted = FALSE,
                        judged_by = "response", row.names = NULL)
     seen$parameters <- rep(list(added_parameters(current, current)), nrow(seen))
     rows <- c(rows, list(seen))
@@ -337,16 +345,23 @@ added_parameters <- function(fit, parent) {
   table[!table$name %in% names(parent$emulator$parameters), ]
 }
 
-# The row of highest evidence among the mechanisms that were calibrated: responses alone decide nothing.
+# The row of highest evidence among the mechanisms that may be adopted: they were calibrated (responses alone decide
+# nothing), and the simulation's own error does not rise with them. No row if there is none.
 best_trial <- function(table) {
-  calibrated <- table[table$judged_by != "response", ]
-  calibrated[which.max(calibrated$log10_bf), ]
+  open <- table[table$judged_by != "response" & !raises_error(table), ]
+  open[which.max(open$log10_bf), ]
 }
 
-stop_reason <- function(best, attribution, decisive) {
+stop_reason <- function(table, attribution, decisive) {
   significant <- significant_conditions(attribution$table)
+  best <- best_trial(table)
+  highest <- table[which.max(table$log10_bf), ]
+  if (!nrow(best)) best <- highest
   found <- sprintf("best: %s, log10 Bayes factor %.1f", best$mechanism, best$log10_bf)
-  why <- if (best$log10_bf < decisive) {
+  why <- if (raises_error(highest) && highest$log10_bf >= decisive) {
+    sprintf("no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but raises it)",
+            highest$mechanism, highest$log10_bf)
+  } else if (best$log10_bf < decisive) {
     sprintf("no mechanism is decisive (%s; %s or more and an interval above zero are needed)", found, format(decisive))
   } else {
     sprintf("the evidence for the best mechanism is too uncertain (%s, interval from %.1f to %.1f)", found,

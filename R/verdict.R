@@ -1,5 +1,7 @@
 # Each adopted mechanism judged by itself: named, likely, or a stand-in for something that the catalogue does not hold.
 
+risen_error <- 1.02  # times the simulation's error in calibration before: from there it counts as risen
+
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
 # is a stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely
 # otherwise.
@@ -18,7 +20,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (row$probability < 0.95) "other causes are possible",
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (no_gain) "data held out do not gain by it",
-      if (model$scores$calibrate[["rmse"]] > 1.02 * parent$scores$calibrate[["rmse"]])
+      if (model$scores$calibrate[["rmse"]] > risen_error * parent$scores$calibrate[["rmse"]])
         "the error in calibration rose with it",
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
         "the error still answers to what drives it",

@@ -40,10 +40,11 @@ test_that("the coarse calibration follows screening, whatever is asked of the fu
   expect_equal(ncol(coarse$ensemble$outputs), 20)
 })
 
-# Two calibrations by hand that share a record: `coarse` is the evidence that screening found.
-fit_by_hand <- function(log10_evidence, se = 0.05, lag = 0, coarse = log10_evidence) {
+# Calibrations by hand that share a record: `coarse` is the evidence that screening found, `error` the simulation's.
+fit_by_hand <- function(log10_evidence, se = 0.05, lag = 0, coarse = log10_evidence, error = 1) {
   posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
-  structure(list(measurements = list(y = 1:3), rows = 1:3, log_evidence = log10_evidence * log(10),
+  structure(list(measurements = list(y = 1:3), rows = 1:3, check = list(mean = 1:3 - error),
+                 log_evidence = log10_evidence * log(10),
                  standard_error = se * log(10), posterior = posterior,
                  coarse = list(log_evidence = coarse * log(10), standard_error = 0)),
             class = c("amiss_calibration", "amiss_fit"))
@@ -71,6 +72,9 @@ test_that("where the leader falls back in full, what now leads is calibrated in 
   expect_equal(amiss:::contenders(fits, fit(0, 0), "a", control), "b")
   # Those in full stand beside the current model in full, the others beside its coarse calibration.
   expect_length(amiss:::contenders(fits, fit(-5, 0, coarse = 0), "a", control), 0)
+  # A leader with which the simulation's own error rises stands in nobody's way.
+  fits$a <- fit(10, error = 1.5)
+  expect_equal(amiss:::contenders(fits, fit(0, 0), "a", control), "b")
   # The loop itself asks again until what leads is known in full. Here every full calibration falls back by 8 decades.
   base <- small_upgrade()$models[[1]]
   screen <- function(above) {
@@ -248,10 +252,20 @@ test_that("given runs at the calibration rows alone are judged without held-out 
 
 test_that("why the loop stops is told: nothing decisive, or evidence too uncertain; responses alone decide nothing", {
   table <- data.frame(mechanism = c("a", "b", "c"), log10_bf = c(1, 3, 9), lower95 = c(0.5, -1, 8),
-                      upper95 = c(2, 7, 9), judged_by = c("screening", "calibration", "response"))
+                      upper95 = c(2, 7, 9), judged_by = c("screening", "calibration", "response"),
+                      error_ratio = c(0.9, 0.5, NA))
   attribution <- list(table = data.frame(boundary = "Te", significant = FALSE, group = NA))
   best <- amiss:::best_trial(table)
   expect_equal(best$mechanism, "b")
-  expect_match(amiss:::stop_reason(best, attribution, 2), "too uncertain \\(best: b.*3.0, interval from -1.0 to 7.0\\)")
-  expect_match(amiss:::stop_reason(best, attribution, 4), "no mechanism is decisive \\(best: b.*; 4 or more")
+  expect_match(amiss:::stop_reason(table, attribution, 2),
+               "too uncertain \\(best: b.*3.0, interval from -1.0 to 7.0\\)")
+  expect_match(amiss:::stop_reason(table, attribution, 4), "no mechanism is decisive \\(best: b.*; 4 or more")
+  # With a rise of the simulation's own error no evidence is enough.
+  table$error_ratio[2] <- 1.5
+  expect_equal(amiss:::best_trial(table)$mechanism, "a")
+  table$log10_bf[3] <- NA
+  expect_match(amiss:::stop_reason(table, attribution, 2),
+               "no mechanism lowers the error decisively \\(b has a log10 Bayes factor of 3.0, but raises it\\)")
+  table$error_ratio[1] <- 2
+  expect_equal(nrow(amiss:::best_trial(table)), 0)
 })

@@ -203,6 +203,17 @@ test_that("a stand-in is no named cause, and what is named goes before what is l
   expect_null(amiss:::named_cause(list(list(name = "base")), candidates, entries))
 })
 
+test_that("a mechanism with which the simulation's own error rises is not adopted, and why is told", {
+  upgrade <- base_only(small_upgrade())
+  expect_lt(upgrade$candidates$error_ratio[upgrade$candidates$mechanism == "sun"], 0.5)
+  upgrade$candidates$error_ratio <- 1.9
+  told <- summary(upgrade)
+  expect_match(paste(told$sure, collapse = " "),
+               "not adopted, because with sun the simulation's own error .* 1.9 times")
+  expect_match(told$candidates[["error in calibration"]], "1.9 times", all = FALSE)
+  expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title, "the best raises the error")
+})
+
 test_that("where the base model's emulator is refuted, no mechanism is judged and no odds are given", {
   open <- base_only(small_upgrade())
   expect_match(paste(summary(open)$sure, collapse = " "), "odds of")
