@@ -208,10 +208,11 @@ test_that("a report says what result.json says", {
   trials <- table_with(tables, c("step", "mechanism"))
   for (trial in told$candidates) {
     row <- trials[trials[, 2] == trial$mechanism, ]
-    expect_identical(row[c(4, 5, 7, 8)],
+    expect_identical(row[c(4, 5, 7, 8, 9)],
                      c(signed(trial$log10_bf), paste(signed(unlist(trial$interval)), collapse = " to "),
-                                           percent(trial$probability), if (trial$trusted) "sound" else "rough"))
-    expect_identical(row[9] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
+                       percent(trial$probability), paste(short(trial$error_ratio), "times"),
+                       if (trial$trusted) "sound" else "rough"))
+    expect_identical(row[10] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
   }
 
   first <- told$models[[1]]
