@@ -87,7 +87,8 @@ diagnosis_verdict <- function(upgrade) {
 unjudged <- function(upgrade) isFALSE(upgrade$models[[1]]$fit$check$passed)
 
 open_verdict <- function(upgrade) {
-  explained <- if (unjudged(upgrade)) "whether a mechanism of the catalogue explains it cannot be told"
+  explained <- if (is.null(upgrade$candidates)) "no mechanism was tried"
+               else if (unjudged(upgrade)) "whether a mechanism of the catalogue explains it cannot be told"
                else "no mechanism of the catalogue explains it"
   tag <- if (unjudged(upgrade)) "Unexplained; the emulator is not good enough to judge mechanisms" else "Unexplained"
   unexplained <- function(headline) list(verdict = "unexplained", tag = tag, headline = headline)

@@ -79,12 +79,14 @@ figure_response <- function(upgrade, classes = 10) {
 }
 
 # The response that the model lacks, of each of the leading conditions, in the unit of the target: first of those that
-# are significant in the `attribution`, if there is one.
+# are significant in the `attribution`, if there is one. What is below a hundredth of the largest is a flat line, and
+# left out.
 figure_missing <- function(discrepancy, attribution = NULL, most = 4) {
   responses <- discrepancy$responses
   size <- sqrt(colMeans(responses^2))
   first <- names(size) %in% if (!is.null(attribution)) significant_conditions(attribution$table)
-  shown <- names(size)[order(!first, -size)][seq_len(min(most, length(size)))]
+  shown <- utils::head(names(size)[order(!first, -size)], most)
+  shown <- shown[size[shown] >= 0.01 * max(size)]
   table <- data.frame(time = rep(discrepancy$series$time, length(shown)), value = as.numeric(responses[, shown]),
                       panel = factor(rep(shown, each = nrow(responses)), shown),
                       part = rep(discrepancy$segment, length(shown)))

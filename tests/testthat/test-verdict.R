@@ -236,3 +236,9 @@ test_that("a mechanism that no boundary condition drives is not said to be drive
   expect_match(paste(summary(upgrade)$change, collapse = " "), "sun (named): Sun enters", fixed = TRUE)
   expect_no_match(paste(capture.output(print(upgrade)), collapse = " "), "sun ()", fixed = TRUE)
 })
+
+test_that("where the catalogue was empty, no mechanism of it is said to have failed", {
+  upgrade <- base_only(small_upgrade())
+  upgrade["candidates"] <- list(NULL)
+  expect_match(summary(upgrade)$headline, "Gv is missing from the model, but no mechanism was tried")
+})
