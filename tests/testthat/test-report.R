@@ -1,3 +1,4 @@
+skip_on_cran()  # second tier: tools/test --quick
 skip_without_pandoc <- function() {
   skip_if_not_installed("rmarkdown")
   skip_if_not(rmarkdown::pandoc_available("2.0"), "pandoc is not installed")

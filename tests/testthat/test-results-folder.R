@@ -1,3 +1,4 @@
+skip_on_cran()  # second tier: tools/test --quick
 # A study run once into a folder in which files of others stand.
 used_folder <- local({
   used <- NULL

@@ -1,3 +1,4 @@
+skip_on_cran()  # second tier: tools/test --quick
 # Runs are made once for this file.
 study_cache <- new.env()
 
