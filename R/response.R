@@ -48,7 +48,8 @@ response_factors <- function(fit, trials, threads) {
 
 warn_no_response <- function(mechanism) {
   warn_input(c("Mechanism {.val {mechanism}} changes nothing: every run with it is that of the model without it.",
-               i = "Does the simulator use its parameters? See {.code vignette(\"mechanisms\")}, Inside a simulator."))
+               i = paste("Does this record hold what it acts on, and does the simulator use its parameters? See",
+                         "{.code vignette(\"mechanisms\")}, Inside a simulator.")))
 }
 
 # Values of the parameters for the runs that show a mechanism's responses: those of the model at `centre`, those that
