@@ -39,12 +39,13 @@
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
-#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1, unit = "K",
-#'                      validate = table$hour > 72)
+#' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+#'                      unit = "K", validate = table$hour > 72)
 #' sun <- response_mechanism("Gv", room, unit = "W/m2")
 #' sun
 #' gain <- seq(0.02, 0.98, 0.03)
-#' given <- ensemble(cbind(gain), 20 + outer(table$Te, gain), list(free("gain", uniform(0, 1))), measurements = room)
+#' given <- ensemble(cbind(gain), 20 + outer(table$Te, gain), list(free("gain", uniform(0, 1))),
+#'                   measurements = room)
 #' sun$edit(given)
 #' responses(room, c(Te = "K", Gv = "W/m2"))
 #' @export

@@ -134,8 +134,8 @@ costs_little.amiss_zone <- function(simulator) TRUE
 #'   into the room.
 #' @section Errors: `amiss_error_input` if the zone has no such wall.
 #' @examples
-#' room <- zone(zone_wall("facade", area = 12, zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5),
-#'                        outside = "Te"), volume = 40)
+#' brick <- zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5)
+#' room <- zone(zone_wall("facade", area = 12, brick, outside = "Te"), volume = 40)
 #' zone_flux(room, "facade", air = "Ti")
 #' @export
 zone_flux <- function(zone, wall, air) {
