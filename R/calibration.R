@@ -210,9 +210,11 @@ print.amiss_calibration <- function(x, ...) on_stdout(x, {
                            else "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
 })
 
+free_probability <- function(fit) sum(fit$reach[is.infinite(fit$control$reach)])
+
 # What the reach says of the model, in words.
 reach_words <- function(fit) {
-  free <- sum(fit$reach[is.infinite(fit$control$reach)])
+  free <- free_probability(fit)
   if (length(fit$reach) < 2) {
     return(if (free > 0) "the discrepancy is free" else paste("the discrepancy's reach is held at", names(fit$reach)))
   }
@@ -227,8 +229,7 @@ reach_words <- function(fit) {
 
 # What a discrepancy that reaches that far says of the parameters; NULL where it does not.
 reach_sentence <- function(fit) {
-  free <- sum(fit$reach[is.infinite(fit$control$reach)])
-  if (length(fit$reach) > 1 && free > 0.9)
+  if (length(fit$reach) > 1 && free_probability(fit) > 0.9)
     paste("What remains reaches into what the parameters can do: they may hide a part of it, so do not read their",
           "values as physical.")
 }

@@ -70,7 +70,8 @@ diagnosis_verdict <- function(upgrade) {
   headline <- cause_headline(upgrade)
   if (length(of("named"))) {
     tag <- paste0(if (length(of("named")) > 1) "Causes named" else "Cause named",
-                  if (length(of("likely"))) "; another is likely")
+                  if (length(of("likely")) > 1) "; others are likely"
+                  else if (length(of("likely"))) "; another is likely")
     return(list(verdict = "named", tag = tag, headline = headline))
   }
   likely <- of("likely")

@@ -44,12 +44,13 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried, the
-#'   named cause, the gain, why the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model
-#'   that adopted a mechanism has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks
-#'   against it; or `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then
-#'   it takes the place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those
-#'   that it brought: other parts of the model that could do the same.
+#' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried (with
+#'   the simulation's error in calibration with each over that before, `error_ratio`), the named cause, the gain, why
+#'   the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
+#'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
+#'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
+#'   place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those that it brought: other
+#'   parts of the model that could do the same.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
