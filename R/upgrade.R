@@ -49,8 +49,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
 #'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
-#'   place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those that it brought: other
-#'   parts of the model that could do the same.
+#'   place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those that it
+#'   brought: other parts of the model that could do the same.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
