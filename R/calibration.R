@@ -34,7 +34,7 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   `reach` (see *Model*), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
 #'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept for the
 #'   discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (runs that
-#'   correct the evidence; default those of the check, 200 for a [zone()]; 0 for none), and `ais`, a list for the
+#'   correct the evidence; default those of the check; 0 for none), and `ais`, a list for the
 #'   sampler (`pilot_chains`, `groups`, `chains`, `sweeps`, `ess_drop`, `resample`, `importance_draws`,
 #'   `max_components`).
 #' @param seed Seed; if `NULL`, R's generator gives one.

@@ -21,12 +21,8 @@ checked_by_runs <- function(fits, threads) {
   list(fits = checked, made = made)
 }
 
-# The runs of the check serve the exact evidence; where they cost milliseconds, more are made for it.
-default_exact <- function(fit) {
-  if (is.null(fit$emulator$simulator)) return(0)
-  if (inherits(fit$emulator$simulator,
-               c("amiss_zone", "amiss_zone_flux"))) max(200, fit$control$check) else fit$control$check
-}
+# The runs of the check serve the exact evidence.
+default_exact <- function(fit) if (is.null(fit$emulator$simulator)) 0 else fit$control$check
 
 # Runs of the simulator at draws spread evenly over the posterior (even_draws()): list(draws, times, runs, failed),
 # failed ones left out. A draw of more weight than one of them is run once, and counts as often as it was drawn.

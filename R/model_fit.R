@@ -22,27 +22,28 @@ first_runs <- function(simulator, runs, settings) {
   simulate_design(simulator, settings$measurements, runs, seed = settings$seed, threads = settings$threads)
 }
 
-# A model simulated, trained and calibrated by `settings$calibrate`. Every model of a study is drawn on the same design
-# seed: differences between models are not the design's.
+# A model simulated, trained and calibrated by `settings$calibrate`; calibrate_paper() has no refinements. Every model of
+# a study is drawn on the same design seed: differences between models are not the design's.
 fit_model <- function(simulator, name, settings) {
-  settings$keep(list("fit", name, plain(simulator)), fit_runs(first_runs(simulator, settings$runs, settings), settings))
+  settings$keep(list("fit", name, plain(simulator)), {
+    ensemble <- first_runs(simulator, settings$runs, settings)
+    if (identical(settings$calibrate, calibrate)) {
+      fit_runs(ensemble, settings)$fit
+    } else without_basis_warnings({
+      emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator,
+                                 threads = settings$threads)
+      settings$calibrate(emulator, settings$measurements, settings$control$calibration, seed = settings$seed,
+                         threads = settings$threads)
+    })
+  })
 }
 
-# By calibrate() with refinements where its check by runs fails; calibrate_paper() has none. Of a coarse basis tells
-# who asks for the model.
-fit_runs <- function(ensemble, settings, calibration = settings$control$calibration,
-                     rounds = settings$control$rounds) without_basis_warnings({
-  if (identical(settings$calibrate, calibrate)) {
-    more <- refined_runs(settings)
-    calibrate_refined(ensemble, settings$measurements, rounds %||% refining_control$rounds,
-                      regional_runs(ensemble$parameters, more),
-                      list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration)),
-                      seed = settings$seed, threads = settings$threads)
-  } else {
-    emulator <- train_emulator(ensemble, settings$measurements, settings$control$emulator,
-                               threads = settings$threads)
-    settings$calibrate(emulator, settings$measurements, calibration, seed = settings$seed, threads = settings$threads)
-  }
+# refine_until_checked() as a study asks for it. Of a coarse basis tells who asks for the model.
+fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, ...) without_basis_warnings({
+  control <- list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration))
+  refine_until_checked(ensemble, settings$measurements, settings$control$rounds %||% refining_control$rounds, control,
+                       settings$seed, settings$threads,
+                       runs = regional_runs(ensemble$parameters, refined_runs(settings)), ...)
 })
 
 # The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
@@ -55,38 +56,48 @@ screen_model <- function(simulator, name, settings, hopeless = function(fit) FAL
   if (is.null(calibration$check) || calibration$check > screening_runs)
     calibration$check <- calibration$exact <- screening_runs
   settings$keep(list("coarse", name, plain(simulator)), {
-    ensemble <- first_runs(simulator, settings$runs - refined_runs(settings), settings)
-    control <- list(emulator = settings$control$emulator, calibration = calibration)
-    refine_until_checked(ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
-                         settings$threads,
-                         runs = regional_runs(ensemble$parameters, refined_runs(settings)), hopeless = hopeless,
-                         border = largest_border_share)
+    fit_runs(first_runs(simulator, settings$runs - refined_runs(settings), settings), settings, calibration,
+             hopeless = hopeless, border = largest_border_share)
   })
 }
 
 refined_runs <- function(settings) round((settings$control$refine %||% refining_control$refine) * settings$runs)
 
-# The full calibration. Where the coarse one did with runs spread over the priors, the remaining runs are made where
-# its posterior lies. It keeps the coarse one's evidence.
+# The full calibration: list(ensemble, fit, made). Where the coarse one did with runs spread over the priors, the
+# remaining runs are made where its posterior lies. It keeps the coarse one's evidence, and is for the evidence too:
+# settled_fit() asks for the tails.
 fit_fully <- function(simulator, name, settings, first = NULL) {
-  more <- refined_runs(settings)
-  if (more == 0 && is.null(settings$control$screening)) return(fit_model(simulator, name, settings))
   settings$keep(list("full", name, plain(simulator)), {
-    first <- first %||% screen_model(simulator, name, settings)
-    fit <- if (is.null(first$ensemble$simulator)) {
-      fit_runs(first$ensemble, settings)
-    } else if (!settled(first$fit, first$made, good_border)) {
-      control <- list(emulator = settings$control$emulator, calibration = settings$control$calibration)
-      refine_until_checked(first$ensemble, settings$measurements, settings$control$rounds, control, settings$seed,
-                           settings$threads,
-                           runs = regional_runs(first$ensemble$parameters, more), first = first)$fit
-    } else if (more > 0 && is.null(first$ensemble$region)) {
-      fit_runs(refine_ensemble(with_checked_runs(first$ensemble, first$fit, first$made), first$fit, more,
-                               threads = settings$threads), settings)
+    more <- refined_runs(settings)
+    if (more == 0 && is.null(settings$control$screening)) {
+      full <- fit_runs(first_runs(simulator, settings$runs, settings), settings, border = largest_border_share)
     } else {
-      fit_runs(with_checked_runs(first$ensemble, first$fit, first$made), settings)
+      first <- first %||% screen_model(simulator, name, settings)
+      full <- if (is.null(first$ensemble$simulator)) {
+        fit_runs(first$ensemble, settings)
+      } else if (!settled(first$fit, first$made, largest_border_share)) {
+        fit_runs(first$ensemble, settings, first = first, border = largest_border_share)
+      } else {
+        ensemble <- with_checked_runs(first$ensemble, first$fit, first$made)
+        if (more > 0 && is.null(ensemble$region))
+          ensemble <- refine_ensemble(ensemble, first$fit, more, threads = settings$threads)
+        fit_runs(ensemble, settings, border = largest_border_share)
+      }
+      full$fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     }
-    fit$coarse <- first$fit[c("log_evidence", "standard_error")]
+    full
+  })
+}
+
+# The fit that fit_fully() gave, refined where tails of the posterior lie at the end of the region: a model that is kept
+# needs its parameters' intervals. What its rounds could not mend is left.
+settled_fit <- function(full, name, settings) {
+  if (isFALSE(full$fit$check$passed) || settled(full$fit, full$made, good_border)) return(full$fit)
+  settings$keep(list("settled", name, plain(model_of(full$fit))), {
+    fit <- fit_runs(full$ensemble, settings, first = full)$fit
+    fit$coarse <- full$fit$coarse
+    fit$rounds <- fit$rounds + full$fit$rounds
+    fit$runs_made <- fit$runs_made + full$fit$runs_made
     fit
   })
 }

@@ -59,6 +59,3 @@ simulate_runs.amiss_renamed <- function(simulator, values, drivers, step_h, hold
   colnames(values)[at] <- names(simulator$to)
   simulate_runs(simulator$simulator, values, drivers, step_h, hold, threads, ...)
 }
-
-#' @export
-costs_little.amiss_renamed <- function(simulator) costs_little(simulator$simulator)

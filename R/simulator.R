@@ -301,12 +301,6 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
   }
 }
 
-# Whether a run is a matter of milliseconds.
-costs_little <- function(simulator) UseMethod("costs_little")
-
-#' @export
-costs_little.default <- function(simulator) FALSE
-
 # Runs of simulators in this session, by which a study says what it cost.
 ledger <- new.env(parent = emptyenv())
 ledger$runs <- 0

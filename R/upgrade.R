@@ -103,7 +103,10 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   warn_absent_drivers(catalogue, measurements)
   say("Calibrating the base model")
-  current <- staged("base", measured_model(fit_fully(simulator, "base", settings), "base", NULL, NULL, settings))
+  current <- staged("base", {
+    fit <- settled_fit(fit_fully(simulator, "base", settings), "base", settings)
+    measured_model(fit, "base", NULL, NULL, settings)
+  })
   report_model(current, say)
   models <- list(current)
   candidates <- NULL
@@ -132,7 +135,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
     best <- best_trial(trials$table)
-    if (!nrow(best) || best$log10_bf < control$decisive || best$lower95 <= 0) {
+    if (!may_be_adopted(best, control)) {
       stopped <- stop_reason(trials$table, current$attribution, control$decisive)
       break
     }
@@ -222,23 +225,33 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
 }
 
 # list(fits, table) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by its full
-# calibration, others may come near: they are calibrated too, until what leads is known in full.
+# calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be adopted
+# is settled, and must lead after that too.
 tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
-  full <- character()
+  full <- list()
+  settled <- character()
   repeat {
-    left <- if (is.null(screens)) setdiff(names(trials), full)
-            else contenders(fits, current$fit, full, settings$control)
-    if (!length(left)) break
-    turn <- turns("mechanism in full", length(left))
-    for (name in left) {
-      fits[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
-        trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
-      report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
+    left <- if (is.null(screens)) setdiff(names(trials), names(full))
+            else contenders(fits, current$fit, names(full), settings$control)
+    if (length(left)) {
+      turn <- turns("mechanism in full", length(left))
+      for (name in left) {
+        full[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
+          trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
+        fits[[name]] <- full[[name]]$fit
+        report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
+      }
+      next
     }
-    full <- c(full, left)
+    table <- trial_table(fits, current$fit, current$name, names(full), responses)
+    best <- best_trial(table)
+    if (!may_be_adopted(best, settings$control) || best$mechanism %in% settled) break
+    name <- best$mechanism
+    fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name), settings)))
+    settled <- c(settled, name)
   }
-  list(fits = fits, table = trial_table(fits, current$fit, current$name, full, responses))
+  list(fits = fits, table = table)
 }
 
 naming_mechanism <- function(name, code) {
@@ -256,11 +269,16 @@ seen_responses <- function(current, trials, settings) {
                 response_factors(current$fit, trials, settings$threads))
 }
 
-# Whether a candidate that its check still finds too coarse lies so far behind that no refinement is worth its runs: by
-# more than `far` decades, and three standard errors, behind the best before it or behind what adoption asks for.
+# Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is worth
+# its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it too
+# coarse, if `far` decades and three standard errors would not be enough.
 hopeless <- function(fits, reference, control, far = 3) {
   needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
-  function(fit) fit$check$ratio <= 1 && fit$log_evidence + 3 * fit$standard_error + far * log(10) < needed
+  function(fit) {
+    above <- if (isTRUE(fit$check$passed)) uncertainty(fit, reference, control)
+             else 3 * fit$standard_error / log(10) + far
+    fit$check$ratio <= 1 && fit$log_evidence + above * log(10) < needed
+  }
 }
 
 # The fit with the evidence of its coarse calibration, with which other coarse ones are compared.
@@ -289,16 +307,23 @@ error_ratio <- function(fit, current) sqrt(mean(stats::residuals(fit)^2) / mean(
 
 raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > risen_error
 
-# Candidates not calibrated in full whose coarse evidence could come near the best that may be adopted, if any could
-# come near adoption. It is taken as uncertain by three standard errors and by the nats that annealing lies behind the
-# second estimator: where chains lag, a mode may be missed.
+# Candidates not calibrated in full whose evidence could come near the best that may be adopted, if any could come near
+# adoption.
 contenders <- function(fits, current, full, control) {
   if (!length(fits)) return(character())
   bf <- standing(fits, current, full)
-  lag <- vapply(fits, function(f) max(0, f$posterior$second[[1]] - f$posterior$annealed[[1]], na.rm = TRUE), 0)
-  reach <- bf$log10_bf + 3 * (bf$upper95 - bf$log10_bf) / 1.96 + lag / log(10) + control$margin
+  reach <- bf$log10_bf + vapply(fits, uncertainty, 0, as_coarse(current), control)
   barred <- vapply(names(fits), function(name) name %in% full && error_ratio(fits[[name]], current) > risen_error, NA)
   setdiff(names(fits)[reach >= max(bf$log10_bf[!barred], control$decisive)], full)
+}
+
+# By how many decades the coarse evidence of a fit, beside that of a reference, may lie too low: three standard errors,
+# the nats that annealing lies behind the second estimator (where chains lag, a mode may be missed), and the margin, of
+# which a third is enough where runs of the simulator have confirmed the fit.
+uncertainty <- function(fit, reference, control) {
+  lag <- max(0, fit$posterior$second[[1]] - fit$posterior$annealed[[1]], na.rm = TRUE)
+  margin <- if (isTRUE(fit$check$passed)) control$margin / 3 else control$margin
+  (3 * sqrt(fit$standard_error^2 + reference$standard_error^2) + lag) / log(10) + margin
 }
 
 # Bayes factors of all mechanisms against the current model: in full, by the coarse calibration, or by the responses
@@ -352,6 +377,8 @@ best_trial <- function(table) {
   open <- table[table$judged_by != "response" & !raises_error(table), ]
   open[which.max(open$log10_bf), ]
 }
+
+may_be_adopted <- function(best, control) nrow(best) > 0 && best$log10_bf >= control$decisive && best$lower95 > 0
 
 stop_reason <- function(table, attribution, decisive) {
   significant <- significant_conditions(attribution$table)

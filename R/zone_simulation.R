@@ -118,9 +118,6 @@ simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = 
   simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
 }
 
-#' @export
-costs_little.amiss_zone <- function(simulator) TRUE
-
 #' Heat flux into a wall of a zone
 #'
 #' The zone as a simulator of what a heat flux sensor on the inner surface of a wall measures, beside that of the air
@@ -164,6 +161,3 @@ simulate_runs.amiss_zone_flux <- function(simulator, values, drivers, step_h, ho
   simulate_zone(simulator$zone, values, drivers, step_s = 3600 * step_h, hold = air, threads = threads,
                 flux = simulator$wall)
 }
-
-#' @export
-costs_little.amiss_zone_flux <- function(simulator) TRUE

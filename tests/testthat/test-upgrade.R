@@ -89,13 +89,54 @@ test_that("where the leader falls back in full, what now leads is calibrated in 
     made <<- c(made, key[[2]])
     own <- screens[[sub("base \\+ ", "", key[[2]])]]$fit
     own$log_evidence <- own$log_evidence - 8 * log(10)
-    own
+    list(fit = own)
   }
   trials <- lapply(screens, function(screen) linear_simulator())
   tried <- amiss:::tried_in_full(base, trials, screens, list(control = amiss:::upgrade_control, keep = fall_back),
                                  say = function(...) NULL)
   expect_equal(made, c("base + a", "base + b"))
   expect_equal(tried$table$judged_by, c("calibration", "calibration", "screening"))
+})
+
+test_that("what is to be adopted is settled, and must lead after that too", {
+  base <- small_upgrade()$models[[1]]
+  above <- function(fit, decades, border) {
+    fit$log_evidence <- amiss:::as_coarse(base$fit)$log_evidence + decades * log(10)
+    fit$check$border <- border
+    fit
+  }
+  decades <- list(full = c(a = 30, b = 28), settled = c(a = 27, b = 28))
+  made <- character()
+  keep <- function(key, code) {
+    made <<- c(made, paste(key[[1]], key[[2]]))
+    fit <- above(base$fit, decades[[key[[1]]]][[sub("base \\+ ", "", key[[2]])]], border = 0.03)
+    if (key[[1]] == "full") list(fit = fit, made = list()) else fit
+  }
+  trials <- list(a = linear_simulator(), b = linear_simulator())
+  screens <- lapply(decades$full, function(d) list(fit = above(base$fit, d, 0)))
+  tried <- amiss:::tried_in_full(base, trials, screens, list(control = amiss:::upgrade_control, keep = keep),
+                                 say = function(...) NULL)
+  expect_equal(made, c("full base + a", "settled base + a", "full base + b", "settled base + b"))
+  expect_equal(amiss:::best_trial(tried$table)$mechanism, "b")
+  expect_equal(tried$fits$a$log_evidence, tried$fits$b$log_evidence - log(10))
+})
+
+test_that("the evidence of a fit that runs confirmed needs a smaller margin, and nothing below it is refined", {
+  control <- list(margin = 3, decisive = 2)
+  confirmed <- function(passed, log10_evidence, ratio = 0.1) {
+    fit <- fit_by_hand(log10_evidence, se = 0)
+    fit$check[c("passed", "ratio")] <- list(passed, ratio)
+    fit
+  }
+  contends <- function(fit) length(amiss:::contenders(list(a = fit), fit_by_hand(0, 0), character(), control)) == 1
+  expect_true(contends(confirmed(FALSE, -0.5)))
+  expect_false(contends(confirmed(TRUE, 0.5)))
+  expect_true(contends(confirmed(TRUE, 1.5)))
+  hopeless <- amiss:::hopeless(list(), fit_by_hand(0, 0), control)
+  expect_true(hopeless(confirmed(TRUE, 0.5)))
+  expect_false(hopeless(confirmed(FALSE, 0.5)))
+  expect_true(hopeless(confirmed(FALSE, -1.5)))
+  expect_false(hopeless(confirmed(FALSE, -1.5, ratio = 2)))  # such an emulator says nothing
 })
 
 test_that("the interval of a coarse candidate whose emulator is refuted holds the emulator's error", {
