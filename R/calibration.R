@@ -190,7 +190,7 @@ fill_calibration_control <- function(control, measurements, n, what = "control",
 fit_trust <- function(fit) {
   why <- c(if (!fit$posterior$trusted) fit$posterior$verdict,
            if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
-           if (fit$posterior$trusted && fit$standard_error > 1)
+           if (fit$posterior$trusted && fit$standard_error > largest_error)
              "not trusted: corrected by the runs, the evidence has a standard error of more than one nat")
   list(trusted = is.null(why), verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }

@@ -4,6 +4,7 @@
 largest_error_ratio <- 1 / 3  # of the noise: above it the emulator is not good enough
 least_effective <- 0.1        # share of the runs under their own likelihoods
 largest_border_share <- 0.05  # of the posterior in the outer tenth of the emulator's region
+largest_error <- 1            # of the evidence, in nats
 
 # list(fits, made): calibrations that have the same draws with their checks, and the runs of each (NULL where none were
 # made).

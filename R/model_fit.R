@@ -6,6 +6,7 @@ refining_control <- list(refine = 1 / 3, rounds = 8,
                                           precision = 0.5, gradient = FALSE, importance_draws = 0))
 
 screening_runs <- 20  # that check a coarse calibration
+least_rounds <- 3     # of refinement that are left to each calibration of a model, if so many were asked for
 
 # The options of the stages, as these will take them.
 check_stage_controls <- function(control, measurements, method = "history", call = rlang::caller_env()) {
@@ -38,13 +39,18 @@ fit_model <- function(simulator, name, settings) {
   })
 }
 
-# refine_until_checked() as a study asks for it. Of a coarse basis tells who asks for the model.
-fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, ...) without_basis_warnings({
+# refine_until_checked() as a study asks for it; what was spent on the model `before` counts. Of a coarse basis tells who
+# asks for the model.
+fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, before = NULL, ...) {
+  rounds <- settings$control$rounds %||% refining_control$rounds
+  left <- min(rounds, max(least_rounds, rounds - (before$rounds %||% 0)))
   control <- list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration))
-  refine_until_checked(ensemble, settings$measurements, settings$control$rounds %||% refining_control$rounds, control,
-                       settings$seed, settings$threads,
-                       runs = regional_runs(ensemble$parameters, refined_runs(settings)), ...)
-})
+  found <- without_basis_warnings(refine_until_checked(
+    ensemble, settings$measurements, left, control, settings$seed, settings$threads,
+    runs = regional_runs(ensemble$parameters, refined_runs(settings)), ...))
+  for (spent in c("rounds", "runs_made")) found$fit[[spent]] <- found$fit[[spent]] + (before[[spent]] %||% 0L)
+  found
+}
 
 # The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
 # draws tell how far its evidence is off, correct it, and join them where it is too far. It is for the evidence: tails
@@ -57,7 +63,7 @@ screen_model <- function(simulator, name, settings, hopeless = function(fit) FAL
     calibration$check <- calibration$exact <- screening_runs
   settings$keep(list("coarse", name, plain(simulator)), {
     fit_runs(first_runs(simulator, settings$runs - refined_runs(settings), settings), settings, calibration,
-             hopeless = hopeless, border = largest_border_share)
+             hopeless = hopeless, purpose = for_evidence)
   })
 }
 
@@ -70,18 +76,18 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
   settings$keep(list("full", name, plain(simulator)), {
     more <- refined_runs(settings)
     if (more == 0 && is.null(settings$control$screening)) {
-      full <- fit_runs(first_runs(simulator, settings$runs, settings), settings, border = largest_border_share)
+      full <- fit_runs(first_runs(simulator, settings$runs, settings), settings, purpose = for_evidence)
     } else {
       first <- first %||% screen_model(simulator, name, settings)
       full <- if (is.null(first$ensemble$simulator)) {
-        fit_runs(first$ensemble, settings)
-      } else if (!settled(first$fit, first$made, largest_border_share)) {
-        fit_runs(first$ensemble, settings, first = first, border = largest_border_share)
+        fit_runs(first$ensemble, settings, before = first$fit)
+      } else if (!settled(first$fit, first$made, for_evidence)) {
+        fit_runs(first$ensemble, settings, before = first$fit, first = first, purpose = for_evidence)
       } else {
         ensemble <- with_checked_runs(first$ensemble, first$fit, first$made)
         if (more > 0 && is.null(ensemble$region))
           ensemble <- refine_ensemble(ensemble, first$fit, more, threads = settings$threads)
-        fit_runs(ensemble, settings, border = largest_border_share)
+        fit_runs(ensemble, settings, before = first$fit, purpose = for_evidence)
       }
       full$fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     }
@@ -92,12 +98,10 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
 # The fit that fit_fully() gave, refined where tails of the posterior lie at the end of the region: a model that is kept
 # needs its parameters' intervals. What its rounds could not mend is left.
 settled_fit <- function(full, name, settings) {
-  if (isFALSE(full$fit$check$passed) || settled(full$fit, full$made, good_border)) return(full$fit)
+  if (isFALSE(full$fit$check$passed) || settled(full$fit, full$made, for_intervals)) return(full$fit)
   settings$keep(list("settled", name, plain(model_of(full$fit))), {
-    fit <- fit_runs(full$ensemble, settings, first = full)$fit
+    fit <- fit_runs(full$ensemble, settings, before = full$fit, first = full)$fit
     fit$coarse <- full$fit$coarse
-    fit$rounds <- fit$rounds + full$fit$rounds
-    fit$runs_made <- fit$runs_made + full$fit$runs_made
     fit
   })
 }

@@ -49,26 +49,29 @@ calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, c
   fit
 }
 
-good_effective <- 1 / 3  # effective share of the runs at posterior draws from which no more is refined
-good_border <-
-  0.01      # share of the posterior in the outer tenth of the region; a normal one has a tenth of that there
-lost <- 3                # error over noise from which an emulator does not even tell where the posterior lies
+# From where no more is refined: effective share of the runs at posterior draws, and share of the posterior in the outer
+# tenth of the region (a normal one has a tenth of `for_intervals` there). The evidence asks for no more than the check
+# does; the intervals of parameters, which their tails decide, do.
+for_evidence <- list(effective = least_effective, border = largest_border_share)
+for_intervals <- list(effective = 1 / 3, border = 0.01)
+
+lost <- 3  # error over noise from which an emulator does not even tell where the posterior lies
 
 # list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`:
 # such a list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more
-# is wanted of it. `border`: share of the posterior in the outer tenth of the region from which no more is refined.
+# is wanted of it. `purpose`: what the calibration is for.
 refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
-                                 hopeless = function(fit) FALSE, border = good_border) {
+                                 hopeless = function(fit) FALSE, purpose = for_intervals) {
   if (!is.null(first)) first <- list(ensembles = list(first$ensemble), fits = list(first$fit), made = list(first$made))
   last <- refine_records(list(ensemble), list(measurements), rounds, control, seed, threads, runs, first,
-                         function(fits) hopeless(fits[[1]]), border)
+                         function(fits) hopeless(fits[[1]]), purpose)
   list(ensemble = last$ensembles[[1]], fit = last$fits[[1]], made = last$made[[1]])
 }
 
 # The same of records that share parameters: list(ensembles, fits, made), one of each for each record. All fits say in
-# `rounds` and `runs_made` what was spent on all.
+# `rounds` and `runs_made` what was spent on all. Where the last round is no better than one before it, that one stays.
 refine_records <- function(ensembles, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
-                           hopeless = function(fits) FALSE, border = good_border) {
+                           hopeless = function(fits) FALSE, purpose = for_intervals) {
   runs <- runs %||% max(vapply(ensembles, function(e) regional_runs(e$parameters), 0))
   runs_made <- 0
   round <- 0L
@@ -122,8 +125,11 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
       result <- calibrated(ensembles, control$calibration, emulators)
     }
   }
+  best <- NULL
   repeat {
-    if (!all(mapply(settled, result$fits, result$made, border)) && round < rounds) {
+    enough <- all(mapply(settled, result$fits, result$made, list(purpose)))
+    if (!coarse && (enough || is.null(best) || !better_checked(best$fits, result$fits))) best <- result
+    if (!enough && round < rounds) {
       if (hopeless(result$fits)) break
       # A coarse sampler is enough to see where the posterior lies, until the check passes.
       next_round()
@@ -141,6 +147,7 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
       coarse <- FALSE
     } else break
   }
+  if (!coarse) result <- best
   result$fits <- lapply(result$fits, function(fit) {
     fit$rounds <- round
     fit$runs_made <- runs_made
@@ -149,10 +156,25 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
   result
 }
 
-# Whether a record asks for no more runs: its check passed with enough to spare, or nothing can be run.
-settled <- function(fit, made, border) {
+# Whether a record asks for no more runs: its check passed with enough to spare for the purpose, or nothing can be run.
+settled <- function(fit, made, purpose) {
   check <- fit$check
-  is.null(made) || (isTRUE(check$passed) && !isTRUE(check$effective < good_effective) && check$border <= border)
+  exact <- !is.null(check) && !is.na(check$effective)
+  is.null(made) || (isTRUE(check$passed) && check$border <= purpose$border &&
+                      !(exact && (check$effective < purpose$effective || fit$standard_error > largest_error)))
+}
+
+# Whether the checks of calibrations speak for them more than those of others do for theirs.
+better_checked <- function(fits, others) {
+  score <- function(fits) min(vapply(fits, check_score, 0))
+  score(fits) > score(others)
+}
+
+# Passed ones first, among them by the effective share of the runs or, where it was not asked for, by their error.
+check_score <- function(fit) {
+  check <- fit$check
+  if (is.null(check)) return(0)
+  isTRUE(check$passed) + (if (is.na(check$effective)) 1 / (1 + check$ratio) else check$effective)
 }
 
 can_be_run <- function(ensembles) !any(vapply(ensembles, function(e) is.null(e$simulator), NA))

@@ -104,8 +104,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   warn_absent_drivers(catalogue, measurements)
   say("Calibrating the base model")
   current <- staged("base", {
-    fit <- settled_fit(fit_fully(simulator, "base", settings), "base", settings)
-    measured_model(fit, "base", NULL, NULL, settings)
+    full <- fit_fully(simulator, "base", settings)
+    c(measured_model(full$fit, "base", NULL, NULL, settings), full = list(full))
   })
   report_model(current, say)
   models <- list(current)
@@ -134,8 +134,9 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     ordered <- trial_order(catalogue[left], current$attribution)
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
+    current <- models[[length(models)]] <- trials$current
     best <- best_trial(trials$table)
-    if (!may_be_adopted(best, control)) {
+    if (!may_be_adopted(best, current$fit, control)) {
       stopped <- stop_reason(trials$table, current$attribution, control$decisive)
       break
     }
@@ -146,6 +147,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     models <- c(models, list(current))
   }
   say("Stopped: {stopped}")
+  if (length(models) == 1) models[[1]] <- settled_model(current, settings)
+  models[[1]]$full <- NULL
   models <- judge_models(models, candidates, catalogue, measurements, control, threads)
   structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
                  named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models),
@@ -168,14 +171,24 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   control
 }
 
-measured_model <- function(fit, name, parent, mechanism,
-                           settings) settings$keep(list("measured", name, plain(model_of(fit))), {
+measured_model <- function(fit, name, parent, mechanism, settings,
+                           stage = "measured") settings$keep(list(stage, name, plain(model_of(fit))), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
                                        threads = settings$threads)
   prediction <- stats::predict(fit, use = predictable(fit), seed = settings$seed, threads = settings$threads)
   list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
        prediction = prediction, scores = prediction_scores(prediction))
 })
+
+# A model that stays needs its parameters' intervals: settled_fit() of its calibration in full, `full`, if that is there.
+settled_model <- function(model, settings) {
+  if (is.null(model$full)) return(model)
+  fit <- settled_fit(model$full, model$name, settings)
+  full <- model$full
+  model$full <- NULL
+  if (identical(fit, full$fit)) return(model)
+  staged(model$name, measured_model(fit, model$name, model$parent, model$mechanism, settings, "settled"))
+}
 
 report_model <- function(model, say) {
   warn_coarse_basis(model$fit$emulator, "control$emulator$max_vectors", model$name)
@@ -224,9 +237,9 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
   screens
 }
 
-# list(fits, table) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by its full
-# calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be adopted
-# is settled, and must lead after that too.
+# list(fits, table, current) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by
+# its full calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be
+# adopted, or the present model if it stays, is settled, and must lead after that too.
 tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
   full <- list()
@@ -246,12 +259,18 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
     }
     table <- trial_table(fits, current$fit, current$name, names(full), responses)
     best <- best_trial(table)
-    if (!may_be_adopted(best, settings$control) || best$mechanism %in% settled) break
-    name <- best$mechanism
-    fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name), settings)))
-    settled <- c(settled, name)
+    if (may_be_adopted(best, current$fit, settings$control)) {
+      name <- best$mechanism
+      if (name %in% settled) break
+      fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name),
+                                                                      settings)))
+      settled <- c(settled, name)
+    } else {
+      if (is.null(current$full)) break
+      current <- settled_model(current, settings)
+    }
   }
-  list(fits = fits, table = table)
+  list(fits = fits, table = table, current = current)
 }
 
 naming_mechanism <- function(name, code) {
@@ -378,7 +397,12 @@ best_trial <- function(table) {
   open[which.max(open$log10_bf), ]
 }
 
-may_be_adopted <- function(best, control) nrow(best) > 0 && best$log10_bf >= control$decisive && best$lower95 > 0
+# Whether the evidence is decisive or, where that of the present model is not known, as runs refute its emulator to the
+# end, runs of the simulator are: the error falls by a third, with numbers that can be trusted.
+may_be_adopted <- function(best, current, control) {
+  if (!nrow(best) || best$log10_bf < control$decisive) return(FALSE)
+  best$lower95 > 0 || (isFALSE(current$check$passed) && best$trusted && isTRUE(best$error_ratio < fallen_error))
+}
 
 stop_reason <- function(table, attribution, decisive) {
   significant <- significant_conditions(attribution$table)

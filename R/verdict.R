@@ -1,6 +1,7 @@
 # Each adopted mechanism judged by itself: named, likely, or a stand-in for something that the catalogue does not hold.
 
-risen_error <- 1.02  # times the simulation's error in calibration before: from there it counts as risen
+risen_error <- 1.02   # times the simulation's error in calibration before: from there it counts as risen
+fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the evidence
 
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
 # is a stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely
