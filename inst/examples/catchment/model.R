@@ -8,8 +8,9 @@ script <- function(name) file.path(folder, name)
 least <- 0.01  # mm/d, so that a dry river has a logarithm
 basin <- new.env()
 utils::data("L0123002", package = "airGR", envir = basin)
-daily <- with(basin$BasinObs, data.frame(day = as.Date(DatesR), flow = log(pmax(Qmm, least)), rain = P,
-                                         temperature = T, evaporation = E))
+measured <- basin$BasinObs
+daily <- data.frame(day = as.Date(measured$DatesR), flow = log(pmax(measured$Qmm, least)), rain = measured$P,
+                    temperature = measured$T, evaporation = measured$E)
 daily <- daily[daily$day >= "2000-01-01" & daily$day < "2006-01-01", ]
 river <- measurements(daily, time = "day", target = "flow", unit = "ln(mm/d)", name = basin$BasinInfo$BasinName,
                       boundary = ~ rain + temperature + evaporation,
@@ -34,11 +35,13 @@ ideas <- catalogue(
             edit = function(model) {
     with_template(model, c(ground.awk = script("snow.awk")),
                   free("melt", uniform(0.5, 10), "mm/(K d)", "melt"),
-                  free("covered", lognormal(5.5, 0.7), "mm", "snow that leaves no ground bare"), boundary = "temperature")
+                  free("covered", lognormal(5.5, 0.7), "mm", "snow that leaves no ground bare"),
+                  boundary = "temperature")
   }),
   mechanism("undercatch", boundary = "rain", sentence = "Gauges catch less than falls, or more.",
             edit = function(model) {
-    with_template(model, rule("{ rain *= {{catch}} }"), free("catch", uniform(0.7, 1.6), "", "rain over what was caught"))
+    with_template(model, rule("{ rain *= {{catch}} }"),
+                  free("catch", uniform(0.7, 1.6), "", "rain over what was caught"))
   }),
   mechanism("demand", boundary = "evaporation", sentence = "Plants need more water than the formula says, or less.",
             edit = function(model) {
