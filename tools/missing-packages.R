@@ -16,9 +16,9 @@ if (runtime) {  # the package itself and its report
   name <- c(name, "roxygen2", "lintr")
   minimum <- c(minimum, "7.2.0", "3.0.0")
 }
-# Workers of the hidden-effect benchmark, a random forest among its rivals, sessions of bench/size.R, rivers.
+# Workers of the hidden-effect benchmark, a random forest among its rivals, sessions of bench/size.R.
 if (arguments[2] == "bench") {
-  extra <- c("future", "future.apply", "ranger", "callr", "airGR")
+  extra <- c("future", "future.apply", "ranger", "callr")
   name <- c(name, extra)
   minimum <- c(minimum, rep("0", length(extra)))
 }
