@@ -67,16 +67,9 @@ attribute_record <- function(fits, which, control, seed, threads) {
   draws <- engine_draws(fits)
   conditions <- fit$measurements$conditions
   alone <- seq_along(conditions)
-  attributed <- function(least) {
-    asked <- c(control, list(least = least * log(10)))
-    result <- staged("attributing the discrepancy", call_engine(
-      attribute_(records, which, draws, asked, engine_context(seed, threads))))
-    matters <- result$sets$lost / log(10) >= control$least_log10_bf
-    c(result,
-      list(significant = matters & result$adjusted <= control$level,
-           hidden = (matters & result$adjusted > control$level)[alone]))
-  }
-  result <- with_hidden_groups(attributed(control$least_log10_bf), attributed, alone)
+  asked <- c(control, list(least = control$least_log10_bf * log(10)))
+  result <- staged("attributing the discrepancy", call_engine(
+    attribute_(records, which, draws, asked, engine_context(seed, threads))))
   log10_bf <- result$sets$lost / log(10)
   significant <- result$significant
   table <- data.frame(boundary = conditions, log10_bf_dropped = log10_bf[alone],
@@ -110,17 +103,6 @@ engine_draws <- function(fits) {
   list(posterior = fits[[1]]$posterior, kept = fits[[1]]$kept, records = lapply(unname(fits), function(fit) {
     c(fit$posterior[c("setting", "variance", "t")], list(tangent = fit$tangent))
   }))
-}
-
-# Of two conditions that say the same, one may earn just enough to stay out of the search for groups, and yet no
-# surrogate misses it, as the other takes its place. Where a condition earns its evidence but no p-value, groups are
-# sought once more with it.
-with_hidden_groups <- function(first, attributed, alone) {
-  if (!any(first$hidden)) return(first)
-  again <- attributed((max(first$sets$lost[alone][first$hidden]) + 1e-6) / log(10))
-  grouped <- unlist(again$sets$conditions[-alone]) + 1L
-  # What was significant by itself keeps its own name.
-  if (length(grouped) && !any(first$significant[grouped])) again else first
 }
 
 # The largest correlation between columns of two different conditions of a group, over the calibration rows.

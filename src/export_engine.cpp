@@ -163,6 +163,7 @@ AttributionOptions attribution_options(const Rcpp::List& control) {
   AttributionOptions options;
   options.ais = convert::ais_options(control["ais"]);
   options.least = Rcpp::as<double>(control["least"]);
+  options.level = Rcpp::as<double>(control["level"]);
   options.surrogates.surrogates = control["surrogates"];
   options.surrogates.smallest_shift = control["smallest_shift"];
   return options;
@@ -261,7 +262,8 @@ Rcpp::List attribute_(const Rcpp::List& records, int which, const Rcpp::List& fi
   using Rcpp::_;
   return Rcpp::List::create(_["sets"] = list_sets(result.sets, own), _["statistic"] = result.test.statistic,
                             _["p_value"] = result.test.p_value, _["adjusted"] = result.test.adjusted,
-                            _["null_statistics"] = result.test.null_statistics, _["shares"] = result.shares);
+                            _["null_statistics"] = result.test.null_statistics, _["shares"] = result.shares,
+                            _["significant"] = result.significant);
 }
 
 // The evidence that a posterior of calibrate_() loses without conditions of each record (numbered from 0).

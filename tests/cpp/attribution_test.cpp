@@ -200,6 +200,29 @@ TEST(Attribute, ATrueConditionAndItsCopyAreNamedTogether) {
   EXPECT_LT(mean[2], 0.05);
 }
 
+// A copy that earns just enough to stay out of the search for groups hides the pair, until groups are sought
+// with it: `least` lies below what the driver's copy loses, above which no surrogate misses it.
+TEST(Attribute, AConditionThatEarnsItsEvidenceButNoPValueIsSoughtOnceMoreInGroups) {
+  const Copied record(1.0);
+  const Calibration calibration = calibrate(record.records(), {}, Context());
+  AttributionOptions options;
+  options.surrogates.surrogates = 59;
+  const Attribution found = attribute(record.records(), 0, calibration, options, Context());
+  ASSERT_EQ(found.sets.size(), 4u);
+  options.least = std::min(found.sets[0].lost, found.sets[1].lost) - 0.01;
+  ASSERT_EQ(find_groups(record.records(), 0, calibration, {found.sets.begin(), found.sets.begin() + 3},
+                        options.least)
+                .size(),
+            0u);
+  const Attribution own = attribute(record.records(), 0, calibration, options, Context());
+  ASSERT_EQ(own.sets.size(), 4u);
+  EXPECT_EQ(own.sets[3].conditions, (ConditionSet{{0, 1}}));
+  EXPECT_EQ(own.significant, (std::vector<bool>{false, false, false, true}));
+  // What is significant by itself keeps its own name.
+  options.level = 1.0;
+  EXPECT_EQ(attribute(record.records(), 0, calibration, options, Context()).sets.size(), 3u);
+}
+
 TEST(Attribute, WhereNothingActsNothingIsNamedAndFewSurrogatesSuffice) {
   const Copied record(0.0);
   const Calibration calibration = calibrate(record.records(), {}, Context());

@@ -80,29 +80,6 @@ test_that("nearly a copy is named with the driver, and what differs enough is to
   expect_length(amiss:::group_words(apart), sum(!is.na(apart$table$group)) / 2)
 })
 
-test_that("a condition that earns its evidence but no p-value is sought once more in groups", {
-  own <- 1:3
-  asked <- NULL
-  first <- list(sets = list(lost = c(1.4, 0.4, 0), conditions = list(0L, 1L, 2L)),
-                significant = c(FALSE, FALSE, FALSE), hidden = c(TRUE, FALSE, FALSE))
-  grouped <- list(sets = list(lost = c(1.4, 0.4, 0, 40), conditions = list(0L, 1L, 2L, 0:1)),
-                  significant = c(FALSE, FALSE, FALSE, TRUE), hidden = rep(FALSE, 3))
-  again <- function(least) {
-    asked <<- c(asked, least)
-    grouped
-  }
-  expect_identical(amiss:::with_hidden_groups(first, again, own), grouped)
-  expect_equal(asked, 1.4 / log(10), tolerance = 1e-5)
-  expect_gt(asked, 1.4 / log(10))  # so that the condition itself can be of the group
-  # What was significant alone keeps its own name; nothing is sought where nothing is hidden, and nothing taken where
-  # nothing is found.
-  alone <- utils::modifyList(first, list(significant = c(FALSE, TRUE, FALSE)))
-  expect_identical(amiss:::with_hidden_groups(alone, again, own), alone)
-  quiet <- utils::modifyList(first, list(hidden = rep(FALSE, 3)))
-  expect_identical(amiss:::with_hidden_groups(quiet, function(least) stop("asked"), own), quiet)
-  expect_identical(amiss:::with_hidden_groups(first, function(least) first, own), first)
-})
-
 test_that("shares are plain shares of the variance where conditions do not overlap, and add up", {
   data <- linear_data()
   data$Ti <- data$Ti + 0.004 * data$Gv

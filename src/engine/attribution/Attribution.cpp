@@ -17,6 +17,7 @@ namespace {
 
 constexpr Index kLeastGroup = 2;
 constexpr int kFewSurrogates = 39;
+constexpr double kAbove = 1e-6;  // nats by which a group must lose more than its members
 
 // Conditions of one record, none of the others.
 ConditionSet only_of(const std::vector<Record>& records, std::size_t which, std::vector<int> conditions) {
@@ -111,25 +112,17 @@ std::vector<std::vector<int>> find_groups(const std::vector<Record>& records, st
   return groups;
 }
 
-Attribution attribute(const std::vector<Record>& records, std::size_t which, const Calibration& calibration,
-                      const AttributionOptions& options, const Context& context) {
-  Attribution out;
+namespace {
+
+// The sets of an attribution, tested.
+void test_sets(const std::vector<Record>& records, std::size_t which, const Calibration& calibration,
+               const AttributionOptions& options, const Context& context, Attribution& out) {
   const HistoryModel& model = *records[which].model;
-  const AisResult& posterior = calibration.posterior;
   const RecordPosterior& own = calibration.records[which];
-  const auto drop_own = [&](std::vector<int> set) {
-    out.sets.push_back(drop(records, calibration, only_of(records, which, std::move(set)), options.ais,
-                            context, out.sets.size()));
-  };
-  for (int s = 0; s < model.conditions(); ++s) drop_own({s});
-  // By what the singles lose in truth: chains that stick may never drop one of two that say the same.
-  for (std::vector<int>& group : find_groups(records, which, calibration, out.sets, options.least))
-    drop_own(std::move(group));
   std::vector<std::vector<int>> sets;
   for (const DroppedSet& dropped : out.sets) sets.push_back(dropped.conditions[which]);
-
   Index best = 0;
-  posterior.log_likelihood.maxCoeff(&best);
+  calibration.posterior.log_likelihood.maxCoeff(&best);
   SurrogateOptions surrogates = options.surrogates;
   surrogates.settings = {own.history[static_cast<std::size_t>(best)].setting,
                          null_setting(model, own.tangent)};
@@ -139,6 +132,55 @@ Attribution attribute(const std::vector<Record>& records, std::size_t which, con
                    [&](const DroppedSet& s) { return s.lost >= options.least; }))
     surrogates.surrogates = std::min(surrogates.surrogates, kFewSurrogates);
   out.test = surrogate_test(model, own.tangent, sets, surrogates, context);
+  for (std::size_t s = 0; s < sets.size(); ++s)
+    out.significant.push_back(out.sets[s].lost >= options.least &&
+                              out.test.adjusted[static_cast<Index>(s)] <= options.level);
+}
+
+// What the single condition loses that loses most among those that earn their evidence but no p-value;
+// -infinity where there is none.
+double most_hidden(const Attribution& attribution, int conditions, double least) {
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::size_t s = 0; s < static_cast<std::size_t>(conditions); ++s) {
+    if (attribution.sets[s].lost >= least && !attribution.significant[s])
+      most = std::max(most, attribution.sets[s].lost);
+  }
+  return most;
+}
+
+}  // namespace
+
+Attribution attribute(const std::vector<Record>& records, std::size_t which, const Calibration& calibration,
+                      const AttributionOptions& options, const Context& context) {
+  const HistoryModel& model = *records[which].model;
+  const RecordPosterior& own = calibration.records[which];
+  const auto drop_own = [&](std::vector<DroppedSet>& sets, std::vector<int> set) {
+    sets.push_back(drop(records, calibration, only_of(records, which, std::move(set)), options.ais, context,
+                        sets.size()));
+  };
+  std::vector<DroppedSet> singles;
+  for (int s = 0; s < model.conditions(); ++s) drop_own(singles, {s});
+  // By what the singles lose in truth: chains that stick may never drop one of two that say the same.
+  const auto groups_by = [&](double least) {
+    return find_groups(records, which, calibration, singles, least);
+  };
+  const auto with_groups = [&](std::vector<std::vector<int>> groups) {
+    Attribution out;
+    out.sets = singles;
+    for (std::vector<int>& group : groups) drop_own(out.sets, std::move(group));
+    test_sets(records, which, calibration, options, context, out);
+    return out;
+  };
+  Attribution out = with_groups(groups_by(options.least));
+  const double hidden = most_hidden(out, model.conditions(), options.least);
+  if (std::isfinite(hidden)) {
+    std::vector<std::vector<int>> groups = groups_by(hidden + kAbove);
+    const bool told = std::any_of(groups.begin(), groups.end(), [&](const std::vector<int>& group) {
+      return std::any_of(group.begin(), group.end(),
+                         [&](int s) { return out.significant[static_cast<std::size_t>(s)]; });
+    });
+    if (!groups.empty() && !told) out = with_groups(std::move(groups));
+  }
 
   std::vector<HistoryParameters> kept;
   for (Index i : calibration.kept) kept.push_back(own.history[static_cast<std::size_t>(i)]);

@@ -11,6 +11,7 @@ struct AttributionOptions {
   AisOptions ais;               ///< of posteriors that are sampled again without a set of conditions
   SurrogateOptions surrogates;  ///< its settings are chosen here
   double least = 1.15;          ///< nats that a set of conditions must earn to matter
+  double level = 0.05;          ///< of the test
 };
 
 /// Conditions that are dropped from the discrepancies together: of each record those that are.
@@ -25,9 +26,10 @@ struct DroppedSet {
 
 /// Which conditions drive the discrepancy of a record.
 struct Attribution {
-  std::vector<DroppedSet> sets;  ///< the S single conditions, then groups that cannot be told apart
-  SurrogateTest test;            ///< of the same sets
-  Eigen::MatrixXd shares;        ///< kept draws x S
+  std::vector<DroppedSet> sets;   ///< the S single conditions, then groups that cannot be told apart
+  SurrogateTest test;             ///< of the same sets
+  std::vector<bool> significant;  ///< those that earn their evidence and their p-value
+  Eigen::MatrixXd shares;         ///< kept draws x S
 };
 
 /// The evidence lost without a set comes from the posterior's own draws: with independent priors the model
@@ -36,7 +38,10 @@ struct Attribution {
 ///
 /// Conditions that say the same hide one another: each can be dropped alone. Among those that are dropped
 /// alone without harm a set is sought that cannot be dropped together, nor be made smaller: a group. As many
-/// groups as there are, each from the conditions that the groups before it have left.
+/// groups as there are, each from the conditions that the groups before it have left. Of two that say the
+/// same, one may earn just enough to stay out of that search, and yet no surrogate misses it, as the other
+/// takes its place: where a condition earns its evidence but no p-value, groups are sought once more with it.
+/// What was significant by itself keeps its own name.
 ///
 /// @param which  the record whose conditions are dropped; the others keep theirs. Surrogates and shares take
 /// the
