@@ -23,13 +23,22 @@ check_time_options <- function(format, zone, call) {
                   call = call)
   }
   check_input(checkmate::check_string(zone, null.ok = TRUE), "time_zone", call = call)
-  if (!is.null(zone) && !zone %in% OlsonNames()) {
+  if (!is.null(zone) && !zone %in% zone_names()) {
     abort_input(c("{.arg time_zone} = {.val {zone}} is not known.",
                   i = paste("Give {.val UTC} or a name such as {.val Europe/Berlin} ({.fun OlsonNames} lists them);",
                             "for one hour ahead of UTC all year {.val Etc/GMT-1}, with that sign.")),
                   call = call)
   }
 }
+
+# Listed once for a session: each time OlsonNames() walks through a tree of folders.
+zone_names <- local({
+  names <- NULL
+  function() {
+    if (is.null(names)) names <<- OlsonNames()
+    names
+  }
+})
 
 is_pattern <- function(format) !is.null(format) && grepl("%", format, fixed = TRUE)
 

@@ -1,4 +1,4 @@
-# Line coverage of R by the first tier of the tests, with that of C++ as gcovr told it. The compiled code is not
+# Line coverage of R by the tests of tools/coverage-tests.R, with that of C++ as gcovr told it. The compiled code is not
 # instrumented anew: it is that of build/library. Usage: Rscript tools/coverage.R CPP.csv OUT LEAST
 arguments <- commandArgs(trailingOnly = TRUE)
 cpp <- utils::read.csv(arguments[1])
@@ -9,9 +9,10 @@ suppressPackageStartupMessages({
   library(testthat)
   library(amiss)
 })
-files <- sort(setdiff(list.files("R", "\\.R$", full.names = TRUE), "R/RcppExports.R"))
 traced <- covr::environment_coverage(asNamespace("amiss"), test_files = "tools/coverage-tests.R")
 r <- as.data.frame(covr::tally_coverage(traced, by = "line"))
+r$filename <- file.path("R", basename(r$filename))
+r <- r[r$filename != "R/RcppExports.R", ]  # made by a machine
 r <- do.call(rbind, lapply(split(r, r$filename), function(x) {
   data.frame(language = "R", file = x$filename[1], lines = nrow(x), covered = sum(x$value > 0))
 }))

@@ -37,7 +37,7 @@ test_that("a gradient with respect to the parameters is taken through every kind
                      normal(0, 1, lower = 0.05))) {
     exact <- log(stats::integrate(function(x) prior_density(prior, x) * exp(-0.5 * x^2 / 0.01), max(prior$lower, -1),
                                   min(prior$upper, 1), rel.tol = 1e-8)$value)
-    result <- ais(f, list(a = prior, b = prior), seed = 4, gradient = function(z) -z / 0.01)
+    result <- ais(f, list(a = prior, b = prior), quick_ais$ais, seed = 4, gradient = function(z) -z / 0.01)
     # Four standard errors: exceeded by chance once in 16,000.
     expect_lt(abs(result$log_evidence - 2 * exact), 4 * result$standard_error)
   }

@@ -30,17 +30,17 @@ test_that("a planted effect is found in the right condition, and none where ther
   expect_true(found$table$significant[1])
   expect_gt(found$table$log10_bf_dropped[1], 2)
   expect_true(all(is.na(found$table$group)))
-  none <- attribute_discrepancy(linear_fit(), list(surrogates = 99), seed = 1)
+  none <- attribute_discrepancy(plain_linear_fit(), list(surrogates = 99), seed = 1)
   expect_false(any(none$table$significant))
   expect_length(none$groups, 0)
   expect_match(printed(none), "no boundary condition is significant")
 })
 
 test_that("one true condition among fifteen is found, and it alone", {
-  found <- attribute_discrepancy(linear_fit(fifteen(0.1)), list(surrogates = 99), seed = 1)
-  # The step-down method's least p-value does not grow with the number of conditions: Holm's would be 15 / 100.
+  found <- attribute_discrepancy(linear_fit(fifteen(0.1)), list(surrogates = 39), seed = 1)
+  # The step-down method's least p-value does not grow with the number of conditions: Holm's would be 15 / 40.
   expect_identical(significant_conditions(found$table), "X05")
-  expect_equal(found$table$p_value[1], 1 / 100)
+  expect_equal(found$table$p_value[1], 1 / 40)
   expect_setequal(found$table$boundary, fifteen(0.1)$conditions)
 })
 
@@ -96,7 +96,7 @@ test_that("shares are plain shares of the variance where conditions do not overl
 })
 
 test_that("two threads give the bits of one", {
-  fit <- linear_fit()
+  fit <- plain_linear_fit()
   expect_identical(attribute_discrepancy(fit, list(surrogates = 19), seed = 1, threads = 2)$table,
                    attribute_discrepancy(fit, list(surrogates = 19), seed = 1, threads = 1)$table)
 })

@@ -327,11 +327,21 @@ rows_of_study <- function() {
                list(screening = list(chains = -1))))
 }
 
+expect_refused <- function(rows) {
+  told <- vapply(rows, study_outcome, "")
+  expect_identical(paste(vapply(rows, row_name, ""), told)[nzchar(told)], character())
+}
+
 test_that("every field of a study is checked before anything is computed", {
-  told <- vapply(rows_of_study(), study_outcome, "")
-  expect_identical(paste(vapply(rows_of_study(), row_name, ""), told)[nzchar(told)], character())
-  fields <- vapply(rows_of_study(), `[[`, "", "arg")
+  rows <- rows_of_study()
+  fields <- vapply(rows, `[[`, "", "arg")
   expect_identical(setdiff(unlist(study_fields), c(fields, "models")), character())
+  expect_refused(rows[!duplicated(fields)])
+})
+
+test_that("every value that a field of a study cannot take is refused", {
+  skip_on_cran()  # second tier: tools/test --quick
+  expect_refused(rows_of_study())
 })
 
 test_that("the command refuses bad words with status 2, and bad studies with 1", {

@@ -62,6 +62,7 @@ test_that("what cannot be written is told and does not stop the run", {
 })
 
 test_that("a process killed while it writes leaves nothing that is taken for whole", {
+  skip_on_cran()  # second tier: tools/test --quick
   skip_on_os("windows")
   folder <- withr::local_tempdir()
   kill <- "function(object, file) { writeBin(as.raw(1:99), file); tools::pskill(Sys.getpid(), 9); Sys.sleep(9) }"

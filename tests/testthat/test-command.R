@@ -16,10 +16,12 @@ test_that("the command ends with 0 when the study ran, with the seed that it was
 })
 
 test_that("the command ends with 2 when a word lacks", {
+  skip_on_cran()  # second tier: tools/test --quick
   expect_equal(exit_code("run", shQuote(write_study_file(withr::local_tempdir()))), 2)
 })
 
 test_that("the command ends with 0 when it was asked for help", {
+  skip_on_cran()  # second tier: tools/test --quick
   expect_equal(exit_code("run", "--help"), 0)
 })
 

@@ -75,6 +75,7 @@ borehole_runs <- function(runs = 70) {
 }
 
 test_that("95 % intervals of runs left out hold 95 % of them, coefficients and series", {
+  skip_on_cran()  # second tier: tools/test --quick
   study <- suppressWarnings(read_study(twinhouse_study("O5")))
   runs <- c(lapply(paste0("M", 1:6), box_runs),
             list(borehole_runs(), simulate_design(study$model, study$measurements, runs = 150, seed = 1)))

@@ -46,6 +46,7 @@ test_that("the targets pipeline runs", {
 })
 
 test_that("the batch job runs both houses and refuses to guess where to write", {
+  skip_on_cran()  # second tier: tools/test --quick
   expect_match(run_example(example_file("batch.R"))$stderr, "usage: Rscript batch.R OUT")
   skip_if_not(identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true"), "the long forms (AMISS_EXTENDED_TESTS)")
   skip_if_not_installed("future")

@@ -112,7 +112,7 @@ test_that("the size of the error that remains asks for a check of the noise", {
 })
 
 test_that("a calibration tells what it does not know", {
-  fit <- linear_fit()
+  fit <- plain_linear_fit()
   told <- calibration_inspections(fit)
   expect_match(about(told, "cause"), "attribute_discrepancy")
   fit$values[, "gain"] <- (fit$values[, "offset"] - 10) / 40

@@ -1,4 +1,4 @@
-fit <- linear_fit()
+fit <- plain_linear_fit()
 upgrade <- small_upgrade()
 last <- upgrade$models[[2]]$fit
 paper <- calibrate_paper(fit$emulator, fit$measurements,

@@ -12,11 +12,11 @@ paper_measurements <- function(data) {
   measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv + circular(Wd), noise_sd = 0.1, unit = "K")
 }
 
-paper_fit <- function(data = paper_data_frame(), control = list(), seed = 3, threads = 2) {
+paper_fit <- made_once(function(data = paper_data_frame(), control = list(), seed = 3, threads = 2) {
   m <- paper_measurements(data)
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
   calibrate_paper(emulator, m, utils::modifyList(quick_ais, control), seed = seed, threads = threads)
-}
+})
 
 sun <- function(data) 1.5 * sin(data$Gv / 100)
 

@@ -39,8 +39,9 @@ test_that("stages have figures of their own", {
   upgrade <- small_upgrade()
   model <- upgrade$models[[1]]
   for (x in list(upgrade, model$fit, model$attribution, discrepancy(model$fit), upgrade$measurements)) {
-    expect_true(ggplot2::is.ggplot(withVisible(plot(x))$value))
-    expect_false(withVisible(plot(x))$visible)
+    drawn <- withVisible(plot(x))
+    expect_true(ggplot2::is.ggplot(drawn$value))
+    expect_false(drawn$visible)
   }
   expect_error(plot(upgrade, "nonsense"), class = "amiss_error_input")
 })

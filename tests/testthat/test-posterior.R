@@ -1,4 +1,4 @@
-fit <- linear_fit()
+fit <- plain_linear_fit()
 w <- fit$weights / sum(fit$weights)
 
 # The smallest value below which a share p of the weight lies, by a search.

@@ -1,6 +1,6 @@
 # What is measured answers linearly to Tn, of which the simulator knows nothing.
 hidden <- withr::with_seed(6, as.numeric(stats::filter(rnorm(480), 0.9, "recursive")))
-lacking <- function(reach = c(13, 300, Inf), ...) {
+lacking <- made_once(function(reach = c(13, 300, Inf), ...) {
   data <- linear_data(480)
   data$Tn <- hidden
   data$Ti <- data$Ti + 0.3 * lagged(hidden, 3)
@@ -8,7 +8,7 @@ lacking <- function(reach = c(13, 300, Inf), ...) {
                            validate = data$hour > 320)
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
   calibrate(emulator, m, c(quick_ais, list(reach = reach), ...), seed = 3)
-}
+})
 
 scores <- function(p) amiss:::prediction_scores(p)$validate
 
@@ -112,7 +112,7 @@ test_that("what cannot be carried is refused", {
   expect_error(predict(paper, discrepancy = TRUE), "needs a fit of `calibrate\\(\\)`", class = "amiss_error_input")
   expect_s3_class(predict(paper, use = "calibrate"), "data.frame")
   expect_error(predict(lacking(), discrepancy = "yes"), "discrepancy", class = "amiss_error_input")
-  expect_error(predict(linear_fit(), use = "validate"), "no row", class = "amiss_error_input")
+  expect_error(predict(plain_linear_fit(), use = "validate"), "no row", class = "amiss_error_input")
 })
 
 as_new <- function(data) data.frame(time = data$hour, data[setdiff(names(data), "hour")])
@@ -185,7 +185,7 @@ test_that("simulated errors have their variance and memory, and forget it betwee
   for (i in 1:5) for (j in seq_len(i - 1)) expected[i, j] <- expected[j, i] <- prod(kept[(j + 1):i])
   expect_lt(max(abs(cov(t(x)) - expected)), 5 * sqrt(2 / 4000))
   # A draw whose error has parts of 3 and 10 times the white variance.
-  fit <- linear_fit()
+  fit <- plain_linear_fit()
   ratios <- fit$control$error_ratios
   fit$posterior$setting[1] <- (match(3, ratios) - 1) + length(ratios) * (match(10, ratios) - 1)
   expect_identical(amiss:::error_ratios_of(fit, 1), matrix(c(3, 10), 1))

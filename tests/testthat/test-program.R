@@ -36,6 +36,7 @@ test_that("a program gives what the same function gives, and no run is made twic
 })
 
 test_that("runs in parallel are the same", {
+  skip_on_cran()  # second tier: tools/test --quick
   skip_if_not_installed("future")
   serial <- simulate_runs(rc_program(), rc_values, rc_drivers, 1)
   withr::defer(future::plan(future::sequential))
@@ -53,16 +54,17 @@ test_that("failed runs are NaN, told with directory and stderr; the others are k
   only <- function(what) paste("NR == 5 && {{lag}} == 5 {", what, "}")
   runs <- fails(only("print \"no wall\" > \"/dev/stderr\"; exit 3"), "1 of 3.*Run 2.*exit status 3.*failed-.*no wall")
   expect_true(all(is.finite(runs[, -2])))
-  fails(only("while (1) x = x"), "did not end within 0.5 s", time_limit = 0.5)
-  fails(only("print \"1,nonsense\""), "not numeric")
-  fails(only("print \"1,20\""), "49 rows, where 48")
-  fails(only("getline; getline"), "46 rows, where 48")
   expect_warning(simulate_runs(rc_program(lines = "BEGIN { } {{lag}} { }"), rc_values, rc_drivers, 1),
                  "3 of 3.*wrote nothing")
   missing <- rc_program()
   missing$command[1] <- "no-such-program"
   expect_error(simulate_runs(missing, rc_values, rc_drivers, 1), "no-such-program.*not there",
                class = "amiss_error_input")
+  skip_on_cran()  # second tier: tools/test --quick
+  fails(only("while (1) x = x"), "did not end within 0.5 s", time_limit = 0.5)
+  fails(only("print \"1,nonsense\""), "not numeric")
+  fails(only("print \"1,20\""), "49 rows, where 48")
+  fails(only("getline; getline"), "46 rows, where 48")
 })
 
 test_that("a failed run is tried again, and a changed script runs anew", {
@@ -90,6 +92,7 @@ test_that("a placeholder and a parameter need each other", {
 })
 
 test_that("a mechanism edits templates, and the extended program is calibrated", {
+  skip_on_cran()  # second tier: tools/test --quick
   sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters.", edit = function(model) {
     with_template(model,
                   list(model.awk = function(lines) sub("gain * x", "gain * x + {{sun}} * $4", lines, fixed = TRUE)),

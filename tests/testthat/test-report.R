@@ -239,7 +239,7 @@ test_that("a report of one calibration has its tables in Word, too", {
   skip_without_pandoc()
   skip_if_not_installed("xml2")
   file <- withr::local_tempfile(fileext = ".docx")
-  fit <- linear_fit()
+  fit <- plain_linear_fit()
   expect_identical(report(fit, file), file)
   body <- word_body(file)
   text <- xml2::xml_text(body)

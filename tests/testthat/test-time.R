@@ -94,8 +94,12 @@ local_text <- function(from, zone, minutes, n) format(at(from) + 60 * minutes * 
 test_that("both changes of daylight saving are read in their zone", {
   zones <- c("Europe/Berlin", "Europe/London", "America/New_York", "Australia/Sydney", "America/Santiago",
              "Australia/Lord_Howe", "UTC")
-  for (zone in zones) for (minutes in c(10, 30, 60))
-    for (day in c("03-10", "03-31", "04-07", "09-08", "10-06", "10-27", "11-03")) {
+  days <- c("03-10", "03-31", "04-07", "09-08", "10-06", "10-27", "11-03")
+  steps <- c(10, 30, 60)
+  for (i in seq_along(zones)) for (j in seq_along(days)) {
+    zone <- zones[i]
+    day <- days[j]
+    minutes <- steps[1 + (i + j) %% 3]
     from <- paste0("2024-", day, " 00:00")
     n <- 30 * 60 / minutes
     time <- read(local_text(from, zone, minutes, n), zone = zone)
