@@ -23,8 +23,8 @@ first_runs <- function(simulator, runs, settings) {
   simulate_design(simulator, settings$measurements, runs, seed = settings$seed, threads = settings$threads)
 }
 
-# A model simulated, trained and calibrated by `settings$calibrate`; calibrate_paper() has no refinements. Every model of
-# a study is drawn on the same design seed: differences between models are not the design's.
+# A model simulated, trained and calibrated by `settings$calibrate`; calibrate_paper() has no refinements. Every model
+# of a study is drawn on the same design seed: differences between models are not the design's.
 fit_model <- function(simulator, name, settings) {
   settings$keep(list("fit", name, plain(simulator)), {
     ensemble <- first_runs(simulator, settings$runs, settings)
@@ -39,8 +39,8 @@ fit_model <- function(simulator, name, settings) {
   })
 }
 
-# refine_until_checked() as a study asks for it; what was spent on the model `before` counts. Of a coarse basis tells who
-# asks for the model.
+# refine_until_checked() as a study asks for it; what was spent on the model `before` counts. Of a coarse basis tells
+# who asks for the model.
 fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, before = NULL, ...) {
   rounds <- settings$control$rounds %||% refining_control$rounds
   left <- min(rounds, max(least_rounds, rounds - (before$rounds %||% 0)))

@@ -5,7 +5,8 @@
 #' tenth of the emulator's region, runs are made in the region of that posterior ([refine_ensemble()]; those of the
 #' check join them), an emulator is trained for this region, and all is done again, up to a number of rounds. Where the
 #' emulator was surer than it was right, the error that the check saw is added to the noise before the region is drawn,
-#' so that the region is as wide as the emulator deserves.
+#' so that the region is as wide as the emulator deserves. Of rounds that all leave something to ask for, that with the
+#' best check stays.
 #'
 #' @param ensemble An ensemble: [simulate_design()], [refine_ensemble()], [ensemble()] (which can be checked, but not
 #'   refined).

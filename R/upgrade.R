@@ -21,10 +21,14 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' parameters, two thirds of all, and compared with the present model calibrated in the same way; then in full, with the
 #' other runs made where the coarse posterior lies ([refine_ensemble()]; none where the coarse calibration was refined
 #' there already) and the emulator checked by runs of the simulator and refined ([calibrate_refined()]), those that
-#' could come within `margin` both of the best and of being decisive: the coarse evidence is taken as uncertain by three
-#' standard errors and, if `screening` asks for a second estimator, by what annealing lags behind it. Candidates that
-#' stay behind keep their coarse Bayes factor; `candidates$judged_by` is `"screening"` for them, and `"calibration"` for
-#' those calibrated in full.
+#' could come within `margin` both of the best and of being decisive (a third of it where runs of the simulator have
+#' confirmed the coarse calibration): the coarse evidence is taken as uncertain by three standard errors and, if
+#' `screening` asks for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their
+#' coarse Bayes factor; `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those calibrated in
+#' full. What is to be adopted, or the present model if it stays, is refined further, until the intervals of its
+#' parameters hold, and must lead after that too. Where the present model's evidence is not known, as runs refute its
+#' emulator to the end, a mechanism with trusted numbers is adopted (and told as likely) if the simulation's error falls
+#' by a third.
 #'
 #' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,
@@ -35,11 +39,11 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies;
-#'   1/3, 0 for none), `rounds` (of refinement where the check by runs asks for it; 8), `decisive` (log10 Bayes factor
-#'   that a mechanism must earn, with its interval above zero; 2), `runs_total` (budget: once so many runs of the
-#'   simulator have been made, no further mechanism is calibrated than those begun; `NULL`: none), lists `emulator`,
-#'   `calibration` and `attribution` for the stages, `screening` (sampler of the first calibration of a mechanism, as
-#'   `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
+#'   1/3, 0 for none), `rounds` (of refinement of a model where the check by runs asks for it; 8), `decisive` (log10
+#'   Bayes factor that a mechanism must earn, with its interval above zero; 2), `runs_total` (budget: once so many runs
+#'   of the simulator have been made, no further mechanism is calibrated than those begun; `NULL`: none), lists
+#'   `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the first calibration of a
+#'   mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
 #' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
@@ -180,7 +184,8 @@ measured_model <- function(fit, name, parent, mechanism, settings,
        prediction = prediction, scores = prediction_scores(prediction))
 })
 
-# A model that stays needs its parameters' intervals: settled_fit() of its calibration in full, `full`, if that is there.
+# A model that stays needs its parameters' intervals: settled_fit() of its calibration in full, `full`, if that is
+# there.
 settled_model <- function(model, settings) {
   if (is.null(model$full)) return(model)
   fit <- settled_fit(model$full, model$name, settings)
@@ -288,9 +293,9 @@ seen_responses <- function(current, trials, settings) {
                 response_factors(current$fit, trials, settings$threads))
 }
 
-# Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is worth
-# its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it too
-# coarse, if `far` decades and three standard errors would not be enough.
+# Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is
+# worth its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it
+# too coarse, if `far` decades and three standard errors would not be enough.
 hopeless <- function(fits, reference, control, far = 3) {
   needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
   function(fit) {

@@ -106,3 +106,53 @@ test_that("bad arguments are refused", {
                "control\\$calibration\\$check` = 1.5",
                class = "amiss_error_input")
 })
+
+checked_by_hand <- function(passed = TRUE, effective = 0.5, border = 0, ratio = 0.1, standard_error = 0.1) {
+  list(check = list(passed = passed, effective = effective, border = border, ratio = ratio),
+       standard_error = standard_error)
+}
+
+test_that("the evidence asks for what the check asks for, intervals for more", {
+  settled <- function(fit, purpose) amiss:::settled(fit, list(), purpose)
+  evidence <- amiss:::for_evidence
+  intervals <- amiss:::for_intervals
+  expect_true(settled(checked_by_hand(), intervals))
+  for (tails in list(checked_by_hand(border = 0.03), checked_by_hand(effective = 0.2))) {
+    expect_true(settled(tails, evidence))
+    expect_false(settled(tails, intervals))
+  }
+  expect_false(settled(checked_by_hand(passed = FALSE), evidence))
+  expect_false(settled(checked_by_hand(standard_error = 1.5), evidence))
+  # A coarse round asks for no exact evidence; its error is the sampler's.
+  expect_true(settled(checked_by_hand(effective = NA, standard_error = 1.5), evidence))
+  expect_true(amiss:::settled(checked_by_hand(passed = FALSE), NULL, intervals))  # nothing can be run
+})
+
+test_that("of rounds the one with the best check is the better one", {
+  better <- function(a, b) amiss:::better_checked(list(a), list(b))
+  expect_true(better(checked_by_hand(effective = 0.2), checked_by_hand(passed = FALSE, effective = 0.9)))
+  expect_true(better(checked_by_hand(effective = 0.6), checked_by_hand(effective = 0.5)))
+  expect_false(better(checked_by_hand(), checked_by_hand()))
+  expect_true(better(checked_by_hand(effective = NA, ratio = 0.1), checked_by_hand(effective = NA, ratio = 0.2)))
+  # Of several records the worst check counts.
+  expect_true(amiss:::better_checked(list(checked_by_hand(), checked_by_hand(effective = 0.4)),
+                                     list(checked_by_hand(effective = 0.9), checked_by_hand(effective = 0.3))))
+})
+
+test_that("where the last round is worse, the one before it stays", {
+  m <- bent_measurements()
+  runs <- suppressWarnings(simulate_design(bent_simulator(), m, runs = 6, seed = 1))
+  rounds <- 0
+  # Every calibration is told to have a worse check than the one before it.
+  sets <- amiss:::calibrate_sets
+  local_mocked_bindings(calibrate_sets = function(...) {
+    found <- sets(...)
+    rounds <<- rounds + 1
+    found$fits[[1]]$check[c("passed", "effective", "border")] <- list(TRUE, 0.3 / rounds, 0)
+    found
+  }, .package = "amiss")
+  fit <- calibrate_refined(runs, m, rounds = 2, control = list(calibration = quick_ais), seed = 1)
+  expect_gt(rounds, 1)
+  expect_equal(fit$check$effective, 0.3)
+  expect_equal(fit$rounds, 2L)
+})

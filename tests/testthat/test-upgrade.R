@@ -121,6 +121,23 @@ test_that("what is to be adopted is settled, and must lead after that too", {
   expect_equal(tried$fits$a$log_evidence, tried$fits$b$log_evidence - log(10))
 })
 
+test_that("where the present model's evidence is not known, runs of the simulator may decide", {
+  row <- function(log10_bf = 10, lower95 = -290, trusted = TRUE, error_ratio = 0.1) {
+    data.frame(log10_bf, lower95, trusted, error_ratio)
+  }
+  adopted <- function(best, passed = FALSE) {
+    amiss:::may_be_adopted(best, list(check = list(passed = passed)), list(decisive = 2))
+  }
+  expect_true(adopted(row()))
+  expect_false(adopted(row(), passed = TRUE))  # a known evidence decides by itself
+  expect_true(adopted(row(lower95 = 9), passed = TRUE))
+  expect_false(adopted(row(log10_bf = 1)))
+  expect_false(adopted(row(trusted = FALSE)))
+  expect_false(adopted(row(error_ratio = 0.8)))
+  expect_false(adopted(row(error_ratio = NA)))
+  expect_false(adopted(row()[0, ]))
+})
+
 test_that("the evidence of a fit that runs confirmed needs a smaller margin, and nothing below it is refined", {
   control <- list(margin = 3, decisive = 2)
   confirmed <- function(passed, log10_evidence, ratio = 0.1) {
