@@ -30,8 +30,15 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,
 #' and held-out rows are predicted by emulators of the runs given there.
 #'
-#' @param simulator The base model: a simulator, or an [ensemble()] of given runs.
-#' @param measurements The [measurements()].
+#' *Several records.* Two or more series that share parameters ([calibrate_jointly()]) go through the same loop: give
+#' named lists of simulators and measurements. The `edit` of a mechanism is applied to the simulator of each record in
+#' turn; one of two arguments gets the record's name as the second, so that it may act on some of them only
+#' ([mechanism()]). Every model is calibrated on all records, and what is compared is the evidence of all. Scores, the
+#' error in calibration and the gain held out are those of all records together, each in units of its noise; a
+#' mechanism with which the error of one record rises is likely at most. Runs count for each record.
+#'
+#' @param simulator The base model: a simulator, or an [ensemble()] of given runs; of several records a named list.
+#' @param measurements The [measurements()]; of several records a list with the same names.
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies;
@@ -50,7 +57,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
 #'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
 #'   place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those that it
-#'   brought: other parts of the model that could do the same.
+#'   brought: other parts of the model that could do the same. Of several records `fit` is what [calibrate_jointly()]
+#'   gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
@@ -84,21 +92,25 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1,
                           quiet = FALSE,
                           checkpoint = NULL) {
-  given <- inherits(simulator, "amiss_ensemble")
-  if (!given) check_simulator(simulator)
-  check_object(measurements, "amiss_measurements", "measurements")
-  check_target_varies(measurements, used_rows(measurements, "calibrate"))
+  started <- upgrade_start(simulator, measurements)
+  simulator <- started$simulator
+  measurements <- started$measurements
+  for (m in each_record(measurements)) check_target_varies(m, used_rows(m, "calibrate"))
   check_object(catalogue, "amiss_catalogue", "catalogue")
-  check_given(c(if (given) list(base = simulator), lapply(catalogue, `[[`, "edit")), measurements)
+  check_given_models(simulator, catalogue, measurements)
   control <- fill_upgrade_control(control, measurements)
-  check_runs_asked(runs, measurements, control$rounds, control$refine)
-  if (!given) check_enough_runs(runs - round(control$refine * runs), length(free_parameters(simulator)), of = runs)
+  for (m in each_record(measurements)) check_runs_asked(runs, m, control$rounds, control$refine)
+  if (!is_given(simulator)) {
+    parameters <- unique(unlist(lapply(in_list(simulator), function(s) names(free_parameters(s)))))
+    check_enough_runs(runs - round(control$refine * runs), length(parameters), of = runs)
+  }
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   say <- progress(quiet)
   settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed,
                    threads = threads)
   before <- runs_so_far()
+  settings$record <- started$record
   settings$spent <- function() !is.null(control$runs_total) && runs_so_far() - before >= control$runs_total
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   warn_absent_drivers(catalogue, measurements)
@@ -117,7 +129,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
                  else "the catalogue is empty"
       break
     }
-    settings$adopted <- setdiff(names(current$fit$emulator$parameters), names(models[[1]]$fit$emulator$parameters))
+    settings$adopted <- setdiff(names(drawn_parameters(current$fit)), names(drawn_parameters(models[[1]]$fit)))
     left <- left[vapply(catalogue[left], applies, NA, settings$adopted)]
     if (!length(left)) {
       stopped <- "no runs that are left hold what has been adopted"
@@ -157,6 +169,47 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
                  measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
 }
 
+# list(simulator, measurements, record): of one record as they are, with its name; of several a list of simulators and
+# their measurements together (new_records()).
+upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
+  check_model <- function(x) if (!inherits(x, "amiss_ensemble")) check_simulator(x, call)
+  if (!rlang::is_bare_list(simulator) && !rlang::is_bare_list(measurements)) {
+    check_model(simulator)
+    check_object(measurements, "amiss_measurements", "measurements", call = call)
+    return(list(simulator = simulator, measurements = measurements, record = measurements$name))
+  }
+  for (name in c("simulator", "measurements")) {
+    check_input(if (rlang::is_bare_list(get(name))) TRUE else "it is no list", name,
+                "Of several records give named lists of both, one element for each record.", call = call)
+  }
+  check_records(simulator, measurements, "simulator", check_model, least = 1, call = call)
+  names <- names(simulator)
+  if (length(names) == 1) {
+    return(list(simulator = simulator[[1]], measurements = measurements[[1]], record = names))
+  }
+  given <- vapply(simulator, inherits, NA, "amiss_ensemble")
+  if (any(given) && !all(given)) {
+    abort_input(c("Of the records {.val {names[given]}} runs are given, of {.val {names[!given]}} simulators.",
+                  i = "Give simulators of all records, or an {.fun ensemble} of each."), call = call)
+  }
+  check_one_prior(lapply(simulator, free_parameters), call)
+  list(simulator = simulator, measurements = new_records(measurements[names]), record = names)
+}
+
+# Ensembles among the models, base and mechanisms, stand at the rows of their record.
+check_given_models <- function(simulator, catalogue, measurements, call = rlang::caller_env()) {
+  edits <- Filter(function(edit) inherits(edit, "amiss_ensemble"), lapply(catalogue, `[[`, "edit"))
+  if (!is_several(measurements)) {
+    return(check_given(c(if (is_given(simulator)) list(base = simulator), edits), measurements, call))
+  }
+  if (length(edits)) {
+    abort_input(c("The mechanism {.val {names(edits)}} is one set of runs, and there are several records.",
+                  i = "Let its {.code edit} be a function of the model and the record's name that returns the runs."),
+                call = call)
+  }
+  for (name in names(simulator)) check_given(simulator[name], measurements$records[[name]], call)
+}
+
 fill_upgrade_control <- function(control, measurements, call = rlang::caller_env()) {
   control <- merge_control(upgrade_control, control, call = call)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps", call = call)
@@ -175,12 +228,28 @@ measured_model <- function(fit, name, parent, mechanism, settings,
                            stage = "measured") settings$keep(list(stage, name, plain(model_of(fit))), {
   attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
                                        threads = settings$threads)
-  prediction <- stats::predict(fit, use = predictable(fit), seed = settings$seed, threads = settings$threads)
-  list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
-       prediction = prediction, scores = prediction_scores(prediction))
+  c(list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution),
+    predicted_record(fit, settings))
 })
 
-# A model that stays needs its parameters' intervals: settled_fit() of its calibration in full, `full`, if that is there.
+# list(prediction, scores), of several records in units of each one's noise, with `records`, the same of each as it is.
+predicted_record <- function(fit, settings) {
+  each <- lapply(record_fits(fit), function(one) {
+    prediction <- stats::predict(one, use = predictable(one), seed = settings$seed, threads = settings$threads)
+    list(prediction = prediction, scores = prediction_scores(prediction))
+  })
+  if (!inherits(fit, "amiss_joint")) return(each[[1]])
+  scaled <- c("observed", "mean", "lower95", "upper95", "crps")
+  in_noise <- Map(function(name, one) {
+    noise_sd <- fit$records[[name]]$measurements$noise_sd
+    data.frame(record = name, one$prediction[c("use", "segment")], one$prediction[scaled] / noise_sd)
+  }, names(each), each)
+  together <- do.call(rbind, unname(in_noise))
+  list(prediction = together, scores = prediction_scores(together), records = each)
+}
+
+# A model that stays needs its parameters' intervals: settled_fit() of its calibration in full, `full`, if that is
+# there.
 settled_model <- function(model, settings) {
   if (is.null(model$full)) return(model)
   fit <- settled_fit(model$full, model$name, settings)
@@ -191,7 +260,11 @@ settled_model <- function(model, settings) {
 }
 
 report_model <- function(model, say) {
-  warn_coarse_basis(model$fit$emulator, "control$emulator$max_vectors", model$name)
+  fits <- record_fits(model$fit)
+  for (k in seq_along(fits)) {
+    warn_coarse_basis(fits[[k]]$emulator, "control$emulator$max_vectors", paste(c(model$name, names(fits)[k]),
+                                                                                 collapse = ", "))
+  }
   first <- model$attribution$table[1, ]
   say(paste("{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
             "{signif(model$scores$validate[['rmse']], 3)} held out; discrepancy answers most to",
@@ -210,12 +283,22 @@ trial_order <- function(catalogue, attribution) {
 
 # Every mechanism as an extension of the current model: fits of those worth one, and the table of all Bayes factors.
 try_mechanisms <- function(current, catalogue, settings, say) {
-  trials <- lapply(catalogue, extend, simulator = model_of(current$fit), adopted = settings$adopted)
+  trials <- lapply(catalogue, extended_model, model_of(current$fit), settings)
   if (is.null(settings$control$screening)) return(tried_in_full(current, trials, NULL, settings, say))
   responses <- staged("responses of the mechanisms", seen_responses(current, trials, settings))
   if (!is.null(responses)) say("  {sum(responses$runs)} runs show in which order mechanisms are tried")
   screens <- screened_mechanisms(current, trials, responses, settings, say)
   tried_in_full(current, trials, screens, settings, say, responses)
+}
+
+# Of several records the simulator of each in turn; what was adopted may act on some of them only.
+extended_model <- function(mechanism, model, settings) {
+  if (is.object(model)) return(extend(model, mechanism, settings$adopted, settings$record))
+  extended <- Map(function(simulator, record) {
+    extend(simulator, mechanism, intersect(settings$adopted, names(free_parameters(simulator))), record)
+  }, model, names(model))
+  check_one_prior(lapply(extended, free_parameters))
+  extended
 }
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
@@ -283,13 +366,13 @@ naming_mechanism <- function(name, code) {
 # What the mechanisms could explain (response_factors()), a row for each; NULL where runs are given and none can be
 # made.
 seen_responses <- function(current, trials, settings) {
-  if (inherits(trials[[1]], "amiss_ensemble")) return(NULL)
+  if (is_given(trials[[1]])) return(NULL)
   settings$keep(list("responses", current$name, lapply(trials, plain)),
                 response_factors(current$fit, trials, settings$threads))
 }
 
-# Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is worth
-# its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it too
+# Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is
+# worth its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it too
 # coarse, if `far` decades and three standard errors would not be enough.
 hopeless <- function(fits, reference, control, far = 3) {
   needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
@@ -322,7 +405,7 @@ standing <- function(fits, current, full) {
 }
 
 # The simulation's own error in calibration over that of the fit `current`.
-error_ratio <- function(fit, current) sqrt(mean(stats::residuals(fit)^2) / mean(stats::residuals(current)^2))
+error_ratio <- function(fit, current) sqrt(mean(left_by_simulation(fit)^2) / mean(left_by_simulation(current)^2))
 
 raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > risen_error
 
@@ -352,7 +435,7 @@ trial_table <- function(fits, current, from, full, responses = NULL) {
     row <- data.frame(from = from, mechanism = name, standing(fits[name], current, full),
                       error_ratio = error_ratio(fits[[name]], current), trusted = fits[[name]]$trust$trusted,
                       judged_by = if (name %in% full) "calibration" else "screening")
-    if (!name %in% full) row <- as_far_as_emulated(row, fits[[name]]$check, length(current$rows))
+    if (!name %in% full) row <- as_far_as_emulated(row, fits[[name]]$check, stats::nobs(current))
     row$parameters <- list(added_parameters(fits[[name]], current))
     row
   })
@@ -387,7 +470,7 @@ as_far_as_emulated <- function(row, check, rows) {
 # Estimates of the parameters that a mechanism brought with it.
 added_parameters <- function(fit, parent) {
   table <- parameter_table(fit)
-  table[!table$name %in% names(parent$emulator$parameters), ]
+  table[!table$name %in% names(drawn_parameters(parent)), ]
 }
 
 # The row of highest evidence among the mechanisms that may be adopted: they were calibrated (responses alone decide
