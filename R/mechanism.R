@@ -72,10 +72,8 @@ knows_record <- function(edit) is.function(edit) && length(setdiff(names(formals
 # The extended simulator. An edit may replace parameters of the base model, but not drop what was adopted.
 extend <- function(simulator, mechanism, adopted = character(), record = NULL, call = rlang::caller_env()) {
   edit <- mechanism$edit
-  edited <- function() {
-    if (!is.function(edit)) edit else if (knows_record(edit)) edit(simulator, record) else edit(simulator)
-  }
-  extended <- tryCatch(edited(), error = function(e) {
+  of_record <- if (knows_record(edit)) function(simulator) edit(simulator, record) else edit
+  extended <- tryCatch(if (is.function(edit)) edited(simulator, of_record) else edit, error = function(e) {
     abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"),
                 call = call)
   })

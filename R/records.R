@@ -12,10 +12,10 @@ new_records <- function(measurements) {
 
 is_several <- function(measurements) inherits(measurements, "amiss_records")
 
-# The measurements of each record; of one a list without a name.
-each_record <- function(measurements) if (is_several(measurements)) measurements$records else list(measurements)
+# The measurements of each record, also of a bare list of them; of one a list without a name.
+each_record <- function(measurements) if (is_several(measurements)) measurements$records else in_list(measurements)
 
-# Models, ensembles or calibrations of each record: one alone is an object, several are a bare list.
+# What there is of each record: one alone is an object, several are a bare list.
 in_list <- function(x) if (is.object(x)) list(x) else x
 
 #' @export

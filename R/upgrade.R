@@ -372,8 +372,8 @@ seen_responses <- function(current, trials, settings) {
 }
 
 # Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is
-# worth its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it too
-# coarse, if `far` decades and three standard errors would not be enough.
+# worth its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it
+# too coarse, if `far` decades and three standard errors would not be enough.
 hopeless <- function(fits, reference, control, far = 3) {
   needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
   function(fit) {

@@ -124,6 +124,20 @@ test_that("an edit of two arguments gets the record's name, also of a single rec
                class = "amiss_error_input")
 })
 
+test_that("an edit gets the simulator with its own names, and its parameters go by the others again", {
+  apart <- rename_parameters(room("base a"), gain = "gain of c")
+  extended <- amiss:::extend(apart, sun)
+  expect_named(amiss:::free_parameters(extended), c("gain of c", "base a", "sun"))
+  drivers <- cbind(Te = 1:3, Gv = c(0, 100, 0))
+  values <- cbind(`gain of c` = 0.5, `base a` = 20, sun = 0.01)
+  expect_equal(simulate_runs(extended, values, drivers, 1)[, 1], 20 + 0.5 * 1:3 + c(0, 1, 0))
+  twice <- mechanism("twice", function(model) shining(model, "gain of c"), "Gv", "It acts.")
+  expect_error(amiss:::extend(apart, twice), "two parameters", class = "amiss_error_input")
+  # One that goes by another name may be replaced.
+  anew <- mechanism("anew", function(model) room("base"), "Te", "It acts.")
+  expect_named(amiss:::free_parameters(amiss:::extend(apart, anew)), c("gain of c", "base"))
+})
+
 test_that("what an upgrade is asked is answered for several records", {
   upgrade <- both_sunny()
   expect_lte(length(utils::capture.output(print(upgrade))), 15)
@@ -209,4 +223,87 @@ test_that("given runs of several records are looped over too", {
   upgrade <- looped(measured, with_sun, simulators = given)
   expect_identical(upgrade$models[[2]]$mechanism, "sun")
   expect_identical(upgrade$runs_total, 0)
+})
+
+# ---- a study file
+
+write_rooms_study <- function(folder, records = NULL, drop = character(), ...) {
+  measured <- two_rooms(c(a = 0.01, b = 0.01))
+  for (name in names(measured)) {
+    raw <- measured[[name]]$raw
+    utils::write.csv(data.frame(hour = raw$hours, raw$drivers[, c("Te", "Gv")], warmth = raw$y),
+                     file.path(folder, paste0(name, ".csv")), row.names = FALSE)
+  }
+  writeLines('room <- function(base) {
+    function_simulator(function(values, drivers) values[[base]] + values[["gain"]] * drivers[, "Te"],
+                       free("gain", uniform(0, 1)), free(base, uniform(15, 25), "K"), boundary = "Te")
+  }
+  list(a = room("base a"), b = room("base b"))', file.path(folder, "models.R"))
+  writeLines('function(measurements) function_simulator(
+    function(values, drivers) values[["own"]] + values[["gain"]] * drivers[, "Te"],
+    free("gain", uniform(0, 1)), free("own", uniform(15, 25)), boundary = "Te", name = measurements$name)',
+    file.path(folder, "own.R"))
+  writeLines('catalogue(mechanism("sun", function(model, record) {
+    with_parameters(model, free("sun", uniform(0, 0.05), "K m2/W"), boundary = "Gv",
+                    f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+  }, "Gv", "Sun enters both rooms."))', file.path(folder, "catalogue.R"))
+  fields <- list(study = "two rooms", time = "hour", target = "warmth", boundary = list("Te", "Gv"), unit = "K",
+                 calibrate = "hour <= 168", validate = "hour > 168", model = "models.R", catalogue = "catalogue.R",
+                 runs = 24, seed = 1, control = c(quick, list(max_steps = 1)),
+                 records = records %||% list(a = list(data = "a.csv", noise_sd = 0.1),
+                                             b = list(data = "b.csv", noise_sd = 0.2)), ...)
+  path <- file.path(folder, "study.yml")
+  yaml::write_yaml(fields[setdiff(names(fields), drop)], path)
+  path
+}
+
+test_that("a study of several records is read: fields outside are those of all", {
+  folder <- withr::local_tempdir()
+  study <- read_study(write_rooms_study(folder), trust = TRUE)
+  expect_identical(vapply(study$measurements, `[[`, 0, "noise_sd"), c(a = 0.1, b = 0.2))
+  expect_identical(vapply(study$measurements, `[[`, "", "name"), c(a = "a", b = "b"))
+  expect_identical(vapply(study$measurements, `[[`, "", "unit"), c(a = "K", b = "K"))
+  expect_named(study$model$b$parameters, c("gain", "base b"))
+  own <- list(a = list(data = "a.csv", noise_sd = 0.1), b = list(data = "b.csv", model = "own.R", noise_sd = 0.2))
+  study <- read_study(write_rooms_study(folder, own), trust = TRUE)
+  expect_named(study$model$b$parameters, c("gain", "own"))
+  expect_identical(study$model$b$name, "b")
+  expect_error(read_study(write_rooms_study(folder, own)), class = "amiss_error_trust")
+})
+
+test_that("records of a study that say too little or too much are refused", {
+  folder <- withr::local_tempdir()
+  refused <- function(what, ...) {
+    expect_error(read_study(write_rooms_study(folder, ...), trust = TRUE), what, class = "amiss_error_input")
+  }
+  refused("record \"b\", lacks field data", list(a = list(data = "a.csv"), b = list(noise_sd = 1)))
+  refused("record.*\"b\".*unknown field seed", list(a = list(data = "a.csv"), b = list(data = "b.csv", seed = 2)))
+  refused("no mapping", list("a.csv", "b.csv"))
+  refused("no mapping", list(a = "a.csv"))
+  refused("no simulator of the record.*c", list(a = list(data = "a.csv", noise_sd = 1),
+                                               c = list(data = "b.csv", noise_sd = 1)))
+  refused("Record \"b\" could not be read", list(a = list(data = "a.csv", noise_sd = 1), b = list(data = "b.csv")))
+  refused("go through the loop only", models = "models.R", drop = c("model", "catalogue"))
+  refused("does not exist", list(a = list(data = "a.csv"), b = list(data = "lost.csv")))
+  refused("lacks field target", drop = "target")
+})
+
+test_that("a study of several records runs to its report, whose figures are of each record", {
+  skip_if_not(rmarkdown::pandoc_available("2.0"), "pandoc")
+  folder <- withr::local_tempdir()
+  out <- file.path(folder, "out")
+  result <- run_study(write_rooms_study(folder), out = out, quiet = TRUE, trust = TRUE)
+  expect_identical(result$named_cause$mechanism, "sun")
+  expect_setequal(list.files(out), c("report.html", "figures", "result.rds", "result.json"))
+  expect_true(all(c("gain.png", "fit_of_a.png", "fit_of_b.png") %in% list.files(file.path(out, "figures"))))
+  model <- jsonlite::read_json(file.path(out, "result.json"))$models[[2]]
+  expect_identical(vapply(model$records, `[[`, "", "name"), c("a", "b"))
+  own <- result$models[[2]]$records$b
+  expect_equal(model$records[[2]]$rmse_calibration, own$scores$calibrate[["rmse"]])
+  expect_equal(model$records[[2]]$held_out_gain, own$held_out_gain[c("mean", "standard_error")])
+  expect_equal(model$rmse_calibration, result$models[[2]]$scores$calibrate[["rmse"]])
+  page <- paste(readLines(file.path(out, "report.html"), encoding = "UTF-8"), collapse = "\n")
+  for (told in c("fit of a: ", "fit of b: ", "discrepancy of b: ", "times the noise", "Sun enters both rooms")) {
+    expect_match(page, told, fixed = TRUE)
+  }
 })
