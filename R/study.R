@@ -149,11 +149,10 @@ study_records <- function(study, path, call = rlang::caller_env()) {
 }
 
 # An error in one of several records says in which.
-naming_record <- function(name, code) {
+naming_record <- function(name, code, call = rlang::caller_env()) {
   if (!nzchar(name)) return(code)
-  rlang::try_fetch(code, amiss_error = function(e) {
-    rlang::abort(paste0("Record \"", name, "\" could not be read."), parent = e,
-                 class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
+  tryCatch(code, amiss_error_input = function(e) {
+    abort_input(c("The record {.val {name}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
   })
 }
 
