@@ -282,7 +282,8 @@ test_that("records of a study that say too little or too much are refused", {
   refused("no mapping", list(a = "a.csv"))
   refused("no simulator of the record.*c", list(a = list(data = "a.csv", noise_sd = 1),
                                                c = list(data = "b.csv", noise_sd = 1)))
-  refused("record \"b\" cannot be read.*noise_sd", list(a = list(data = "a.csv", noise_sd = 1), b = list(data = "b.csv")))
+  refused("record \"b\" cannot be read.*noise_sd", list(a = list(data = "a.csv", noise_sd = 1),
+                                                       b = list(data = "b.csv")))
   refused("go through the loop only", models = "models.R", drop = c("model", "catalogue"))
   refused("does not exist", list(a = list(data = "a.csv"), b = list(data = "lost.csv")))
   refused("lacks field target", drop = "target")
