@@ -227,9 +227,10 @@ reach_words <- function(fit) {
   sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)
 }
 
-# What a discrepancy that reaches that far says of the parameters; NULL where it does not.
+# What a discrepancy that reaches that far, in one record at least, says of the parameters; NULL where it does not.
 reach_sentence <- function(fit) {
-  if (length(fit$reach) > 1 && free_probability(fit) > 0.9)
+  hides <- function(fit) length(fit$reach) > 1 && free_probability(fit) > 0.9
+  if (any(vapply(record_fits(fit), hides, NA)))
     paste("What remains reaches into what the parameters can do: they may hide a part of it, so do not read their",
           "values as physical.")
 }

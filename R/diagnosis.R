@@ -10,7 +10,8 @@
 #'   sentences `note`, `sure`, `change`, `gain`, `remains` and `inspect` (what to inspect next, to settle what is open);
 #'   `mechanisms`, for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits
 #'   `also` and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`, `attribution` and
-#'   `method`.
+#'   `method`. Of several records the sentences and `scores` are in units of each one's noise, and `records` and
+#'   `of_records` have the scores of each in its own unit.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -40,7 +41,10 @@ summary.amiss_upgrade <- function(object, ...) {
                    changes = changes_table(object), candidates = candidates_words(object),
                    parameters = parameters_words(last$fit), attribution = last$attribution$table,
                    method = method_table(object),
-                   stopped_because = object$stopped_because, seed = object$seed)), class = "summary.amiss_upgrade")
+                   stopped_because = object$stopped_because, seed = object$seed),
+              if (is_several(object$measurements)) list(of_records = record_sentences(object),
+                                                        records = record_scores(object))),
+            class = "summary.amiss_upgrade")
 }
 
 #' @rdname summary.amiss_upgrade
@@ -48,7 +52,7 @@ summary.amiss_upgrade <- function(object, ...) {
 print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$tag}")
   cli::cli_text("{x$headline}")
-  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = x$gain,
+  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = c(x$gain, x$of_records),
                 "What remains" = x$remains,
                 "What to inspect next" = x$inspect)
   say_parts(parts)
@@ -179,7 +183,7 @@ raised_sentence <- function(row) {
 }
 
 unjudged_sentence <- function(fit) {
-  remedy <- if (is.null(fit$emulator$simulator)) "more runs where the posterior lies, or narrower priors"
+  remedy <- if (is_given(model_of(fit))) "more runs where the posterior lies, or narrower priors"
             else "more runs, narrower priors or a shorter record"
   sprintf("No odds can be given for or against any mechanism: %s. What would change it: %s.",
           gsub("not trusted: ", "", fit$trust$verdict), remedy)
@@ -221,7 +225,8 @@ size_note <- function(upgrade) {
   seen <- score_of(upgrade, "calibrate", "rmse")
   held <- score_of(upgrade, "validate", "rmse")
   told <- function(x) with_unit(short(x), m$unit)
-  noise <- sprintf("the stated measurement noise is %s", told(m$noise_sd))
+  noise <- if (is_several(m)) "each record counts in units of its stated noise"
+           else sprintf("the stated measurement noise is %s", told(m$noise_sd))
   if (length(seen) < 2) return(sprintf("The model's typical error is %s; %s.", told(seen), noise))
   change <- if (length(upgrade$models) > 2) "changes" else "change"
   if (!improves_held_out(upgrade)) {
@@ -316,12 +321,20 @@ gain_sentences <- function(upgrade) {
                                     narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
 }
 
+# What each of several records gains, in its own unit.
+record_sentences <- function(upgrade) {
+  vapply(names(upgrade$measurements$records), function(name) {
+    paste0(name, ": ", gain_sentences(record_upgrade(upgrade, name))[1])
+  }, "", USE.NAMES = FALSE)
+}
+
 # Too few measurements in the band: because the simulation lies to one side of them, or all round.
 narrow_words <- function(upgrade) {
   p <- upgrade$models[[length(upgrade$models)]]$prediction
   p <- p[p$use == if (has_validation(upgrade)) "validate" else "calibrate", ]
   bias <- mean(p$observed - p$mean)
-  if (abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
+  several <- is_several(upgrade$measurements)
+  if (several || abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
   sprintf("the simulation is on average %s too %s there", with_unit(short(abs(bias)), upgrade$measurements$unit),
           if (bias > 0) "low" else "high")
 }
@@ -370,7 +383,8 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   errors <- function(rmse) if (length(adopted)) paste(signif(rmse, 3), collapse = " -> ") else signif(rmse[1], 3)
   cli::cli_bullets(c("*" = paste0("RMSE {errors(g$rmse_calibration)} in calibration, ",
                                   if (has_validation(x)) "{errors(g$rmse_validation)} held out"
-                                  else "no data held out"),
+                                  else "no data held out",
+                                  if (is_several(x$measurements)) paste(",", noise_unit)),
                      "*" = "stopped because {x$stopped_because}",
                      ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
 })

@@ -10,7 +10,7 @@ changes_table <- function(upgrade) {
   models <- upgrade$models
   last <- parameters_words(models[[length(models)]]$fit)
   rows <- lapply(seq_along(models)[-1], function(k) {
-    new <- setdiff(names(models[[k]]$fit$emulator$parameters), names(models[[k - 1]]$fit$emulator$parameters))
+    new <- setdiff(names(drawn_parameters(models[[k]]$fit)), names(drawn_parameters(models[[k - 1]]$fit)))
     brought <- last[last$name %in% new, ]
     if (nrow(brought)) cbind(mechanism = models[[k]]$mechanism, brought)
   })
@@ -50,10 +50,20 @@ candidates_words <- function(upgrade) {
 # Over that of the model before.
 error_words <- function(ratio) ifelse(is.na(ratio), "", paste(short(ratio), "times"))
 
-# What each adopted model was computed with.
+# The scores of each of several records, in its own unit.
+record_scores <- function(upgrade) {
+  names <- names(upgrade$measurements$records)
+  tables <- lapply(names, function(name) cbind(record = name, scores_table(record_upgrade(upgrade, name))))
+  columns <- unique(unlist(lapply(tables, names)))
+  do.call(rbind, lapply(tables, function(table) {
+    table[setdiff(columns, names(table))] <- ""
+    table[columns]
+  }))
+}
+
+# What each adopted model was computed with; of several records each has a column.
 method_table <- function(upgrade) {
-  value <- function(model) {
-    fit <- model$fit
+  value <- function(fit) {
     unit <- fit$measurements$unit
     c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
       with_unit(short(c(fit$measurements$noise_sd, fit$emulator$basis$discarded_rms)), unit),
@@ -61,8 +71,10 @@ method_table <- function(upgrade) {
              signed(fit$interval[2] / log(10)), ")"),
       fit$check$verdict %||% "not checked", fit$trust$verdict)
   }
-  columns <- lapply(upgrade$models, value)
-  names(columns) <- vapply(upgrade$models, `[[`, "", "name")
+  columns <- unlist(lapply(upgrade$models, function(model) {
+    fits <- record_fits(model$fit)
+    stats::setNames(lapply(fits, value), paste0(model$name, if (length(names(fits))) paste(":", names(fits))))
+  }), recursive = FALSE)
   cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M",
                      "stated measurement noise",
                      "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)",

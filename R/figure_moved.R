@@ -16,7 +16,7 @@ density_table <- function(fit) {
   rows <- parameter_rows(fit)
   tables <- lapply(seq_len(nrow(rows)), function(k) {
     name <- rows$name[k]
-    prior <- prior_points(fit$emulator$parameters[[name]]$prior, rows$prior_lower[k], rows$prior_upper[k])
+    prior <- prior_points(drawn_parameters(fit)[[name]]$prior, rows$prior_lower[k], rows$prior_upper[k])
     posterior <- posterior_points(fit$values[, name], fit$weights, rows$prior_lower[k], rows$prior_upper[k])
     data.frame(panel = axis_label(rows$label[k], rows$unit[k]), value = prior$value,
                prior = prior$density / max(prior$density), posterior = posterior$density / max(posterior$density))

@@ -17,6 +17,17 @@ calibrated_record <- function(fit) UseMethod("calibrated_record")
 #' @export
 calibrated_record.amiss_fit <- function(fit) fit$measurements$y[fit$rows]
 
+# The calibrations of each record: of several that were calibrated together, each with the evidence of all, as
+# calibrate_sets() gave them.
+record_fits <- function(fit) {
+  if (!inherits(fit, "amiss_joint")) return(list(fit))
+  lapply(fit$records, function(one) {
+    one[c("log_evidence", "standard_error", "interval")] <- fit[c("log_evidence", "standard_error", "interval")]
+    one$part <- NULL
+    one
+  })
+}
+
 # A fit of one of several records that were calibrated together: the evidence is not its own.
 as_part <- function(fit) {
   fit$log_evidence <- fit$standard_error <- NA_real_

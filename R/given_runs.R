@@ -7,8 +7,15 @@ free_parameters.amiss_ensemble <- function(simulator) simulator$parameters
 #' @export
 driver_names.amiss_ensemble <- function(simulator) character()
 
-# What a fit is a fit of: its simulator or, where that is not known, the ensemble of its runs.
-model_of <- function(fit) fit$emulator$simulator %||% fit$emulator$given
+# What a fit is a fit of: its simulator or, where that is not known, the ensemble of its runs. Of several records a
+# list.
+model_of <- function(fit) {
+  if (inherits(fit, "amiss_joint")) return(lapply(fit$records, model_of))
+  fit$emulator$simulator %||% fit$emulator$given
+}
+
+# Whether a model, or that of each record, is runs that were made elsewhere.
+is_given <- function(model) inherits(in_list(model)[[1]], "amiss_ensemble")
 
 # The uses whose rows a fit can predict.
 predictable <- function(fit) {

@@ -50,6 +50,12 @@ comparison_inspections <- function(comparison) {
 # ---- can the numbers be trusted
 
 trust_inspections <- function(fit, name) {
+  if (inherits(fit, "amiss_joint")) {
+    of_each <- Map(trust_inspections, record_fits(fit), paste(name, names(fit$records), sep = ", "))
+    told <- do.call(c, unname(of_each))
+    # They share one sampler.
+    return(told[names(told) != "sampler" | !duplicated(names(told))])
+  }
   runs <- nrow(fit$emulator$processes$inputs)
   sampler <- sampler_said(fit)  # of the paper's calibration
   more <- if (is.null(fit$emulator$simulator)) "give more runs where the posterior lies"
@@ -84,6 +90,12 @@ held_out_inspection <- function(model, measurements) {
 
 # Share of the held-out steps at which a condition lies outside of its range in calibration, if a tenth or more.
 uncovered_conditions <- function(measurements) {
+  if (is_several(measurements)) {
+    each <- lapply(measurements$records, uncovered_conditions)
+    shares <- unlist(unname(each))
+    names(shares) <- paste(names(shares), "of", rep(names(each), lengths(each)), recycle0 = TRUE)
+    return(shares)
+  }
   share <- vapply(measurements$conditions, function(name) {
     value <- condition_values(measurements, name)
     seen <- range(value[measurements$use == "calibrate"], na.rm = TRUE)
@@ -130,6 +142,7 @@ separating_words <- function(upgrade, trials, a, b) {
 }
 
 correlation_words <- function(measurements, a, b) {
+  if (is_several(measurements)) return("")
   pairs <- expand.grid(a = intersect(a, measurements$conditions), b = intersect(b, measurements$conditions),
                        stringsAsFactors = FALSE)
   pairs <- pairs[pairs$a != pairs$b, ]
@@ -150,7 +163,7 @@ called_for <- function(parameters) {
 confounded_inspection <- function(upgrade, model) {
   others <- model$confounded_with
   parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
-  new <- setdiff(names(model$fit$emulator$parameters), names(parent$fit$emulator$parameters))
+  new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
   if (!length(others) || !length(new)) return(NULL)
   labels <- parameter_labels(model$fit, others)
   sprintf("What %s brings (%s) trades off against %s: measure %s to see how much is due to it.", model$mechanism,
@@ -271,6 +284,13 @@ loose_inspections <- function(fit) {
 # ---- what is left of the error
 
 remainder_inspection <- function(model, measurements) {
+  if (is_several(measurements)) {
+    views <- each_view(model, measurements)
+    each <- lapply(views, function(view) remainder_inspection(view$model, view$measurements))
+    told <- do.call(c, unname(each))
+    if (length(told)) told[] <- paste0(rep(names(each), lengths(each)), ": ", told)
+    return(told)
+  }
   left <- remaining_error(model, measurements)
   noise <- with_unit(short(measurements$noise_sd), measurements$unit)
   if (left$large && is.null(left$pattern)) {

@@ -27,7 +27,8 @@
 #'   given.
 #' @source The joint posterior is that of [calibrate()] with the product of the records' likelihoods;
 #'   `vignette("algorithm", "amiss")`, *Several records*.
-#' @seealso [attribute_discrepancy()] tells which conditions drive the discrepancy of each record, and of all.
+#' @seealso [attribute_discrepancy()] tells which conditions drive the discrepancy of each record, and of all;
+#'   [upgrade_model()] takes several records as well.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
@@ -98,11 +99,11 @@ simulate_jointly <- function(simulators, measurements, runs = 150, seed = NULL, 
   }, simulators, each, measurements[names(simulators)])
 }
 
-check_records <- function(x, measurements, name, check_one, call = rlang::caller_env()) {
-  check_input(checkmate::check_list(x, min.len = 2, names = "unique"), name,
+check_records <- function(x, measurements, name, check_one, least = 2, call = rlang::caller_env()) {
+  check_input(checkmate::check_list(x, min.len = least, names = "unique"), name,
               "Give a named list, one element for each record.", call = call)
   for (one in x) check_one(one)
-  check_input(checkmate::check_list(measurements, min.len = 2, names = "unique"), "measurements",
+  check_input(checkmate::check_list(measurements, min.len = least, names = "unique"), "measurements",
               "Give a named list, one element for each record.", call = call)
   for (m in measurements) check_object(m, "amiss_measurements", "measurements", call = call)
   if (!setequal(names(x), names(measurements))) {
@@ -132,11 +133,34 @@ new_joint <- function(fits) {
   verdict <- if (!length(untrusted)) first$trust$verdict else {
     paste(vapply(untrusted, function(name) paste0(name, ": ", fits[[name]]$trust$verdict), ""), collapse = "; ")
   }
+  posterior <- first$posterior[setdiff(names(first$posterior), c("setting", "variance", "t"))]
+  units <- do.call(cbind, unname(lapply(fits, posterior_unit)))
+  named <- unlist(lapply(fits, function(fit) names(fit$emulator$parameters)))
+  posterior$unit <- unname(units[, match(names(parameters), named), drop = FALSE])
   structure(list(format_version = format_version, records = lapply(fits, as_part), parameters = parameters,
-                 values = values, weights = first$weights, log_evidence = first$log_evidence,
-                 standard_error = first$standard_error, interval = first$interval,
+                 values = values, weights = first$weights, posterior = posterior, log_evidence = first$log_evidence,
+                 standard_error = first$standard_error, interval = first$interval, check = joint_check(fits),
                  trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
                  runs_made = first$runs_made, seed = first$seed), class = "amiss_joint")
+}
+
+# What the checks say of all records: passed where each has, with the largest error in units of the noise.
+joint_check <- function(fits) {
+  checks <- Filter(Negate(is.null), lapply(fits, `[[`, "check"))
+  if (!length(checks)) return(NULL)
+  list(ratio = max(vapply(checks, `[[`, 0, "ratio")), effective = checks[[1]]$effective,
+       border = max(vapply(checks, `[[`, 0, "border")), passed = all(vapply(checks, `[[`, NA, "passed")),
+       verdict = paste0(names(checks), ": ", vapply(checks, `[[`, "", "verdict"), collapse = "; "))
+}
+
+# Of one record its calibration, of several all of them together.
+joined_fit <- function(fits) if (length(fits) == 1) fits[[1]] else new_joint(fits)
+
+# What the simulation leaves of all records, of several each in units of its noise.
+left_by_simulation <- function(fit) {
+  fits <- record_fits(fit)
+  if (length(fits) == 1) return(stats::residuals(fits[[1]]))
+  unlist(lapply(unname(fits), function(one) stats::residuals(one) / one$measurements$noise_sd))
 }
 
 #' @export
@@ -149,7 +173,7 @@ print.amiss_joint <- function(x, ...) on_stdout(x, {
     fit <- x$records[[name]]
     cli::cli_bullets(c("*" = "{name} ({length(fit$rows)} rows): {fit$check$verdict}"))
   }
-  cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, or {.code $records} one by one"))
+  cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun upgrade_model}, or {.code $records} one by one"))
 })
 
 #' @export
@@ -174,6 +198,62 @@ tidy.amiss_joint <- function(x, conf.level = 0.95, ...) tidy.amiss_fit(x, conf.l
 as.data.frame.amiss_joint <- function(x, row.names = NULL, optional = FALSE, draws = nrow(x$values), ...) {
   as.data.frame.amiss_fit(x, row.names, optional, draws, ...)
 }
+
+# By record, as predict() has it.
+#' @export
+fitted.amiss_joint <- function(object, ...) lapply(object$records, stats::fitted, ...)
+
+#' @export
+residuals.amiss_joint <- function(object, ...) lapply(object$records, stats::residuals, ...)
+
+#' @export
+simulate.amiss_joint <- function(object, nsim = 1, seed = NULL, ...) {
+  seed <- pick_seed(seed)
+  lapply(object$records, stats::simulate, nsim, seed, ...)
+}
+
+#' @export
+nobs.amiss_joint <- function(object, ...) {
+  rlang::check_dots_empty()
+  sum(vapply(object$records, stats::nobs, 0L))
+}
+
+#' @export
+logLik.amiss_joint <- function(object, ...) logLik.amiss_fit(object, ...)
+
+# Of the emulators the largest numbers; `sigma` is in units of the noise.
+#' @export
+glance.amiss_joint <- function(x, ...) {
+  rlang::check_dots_empty()
+  decades <- c(x$log_evidence, x$interval) / log(10)
+  each <- lapply(unname(x$records), generics::glance)
+  largest <- function(column) max(vapply(each, function(g) as.numeric(g[[column]]), 0))
+  left <- left_by_simulation(x)
+  data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
+             emulator_error = x$check$ratio %||% NA_real_,
+             sigma = sqrt(sum(left^2) / max(1, length(left) - length(x$parameters))), nobs = stats::nobs(x),
+             vectors = largest("vectors"), runs = largest("runs"), records = length(x$records))
+}
+
+# Records need not share conditions nor clocks: a list by record.
+#' @export
+augment.amiss_joint <- function(x, data = NULL, newdata = NULL, ...) {
+  lapply(stats::setNames(nm = names(x$records)), function(name) {
+    generics::augment(x$records[[name]], data = data[[name]], newdata = newdata[[name]], ...)
+  })
+}
+
+#' @export
+as.matrix.amiss_joint <- function(x, draws = nrow(x$values), ...) as.matrix.amiss_fit(x, draws, ...)
+
+#' @exportS3Method posterior::as_draws_matrix
+as_draws_matrix.amiss_joint <- function(x, draws = nrow(x$values), ...) as_draws_matrix.amiss_fit(x, draws, ...)
+
+#' @exportS3Method posterior::as_draws_df
+as_draws_df.amiss_joint <- function(x, draws = nrow(x$values), ...) as_draws_df.amiss_fit(x, draws, ...)
+
+#' @exportS3Method posterior::as_draws
+as_draws.amiss_joint <- as_draws_df.amiss_joint
 
 #' @export
 predict.amiss_joint <- function(object, newdata = NULL, ...) {
@@ -202,7 +282,8 @@ attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, 
     staged(names(fits)[which], attribute_record(unname(fits), which, control, seed, threads))
   })
   structure(list(format_version = format_version, records = each,
-                 table = together_table(fits, each, control, seed, threads), seed = seed),
+                 table = together_table(fits, each, control, seed, threads),
+                 groups = do.call(c, unname(lapply(each, `[[`, "groups"))), seed = seed),
             class = "amiss_joint_attribution")
 }
 
@@ -222,7 +303,7 @@ together_table <- function(fits, each, control, seed, threads) {
     significant <- dropped$lost / log(10) >= filled$least_log10_bf && p <= filled$level
     data.frame(boundary = condition, log10_bf_dropped = dropped$lost / log(10),
                standard_error = dropped$standard_error / log(10), p_value = p, significant = significant,
-               trusted = dropped$trusted,
+               trusted = dropped$trusted, group = NA_character_,
                records = paste(names(Filter(function(row) any(row$significant), own)), collapse = ", "))
   })
   table <- do.call(rbind, rows)

@@ -7,7 +7,9 @@
 #' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared by
 #'   [free()]: an edit of a [zone()], or [with_parameters()]. Of a model that is an [ensemble()] of given runs, another
 #'   ensemble, of runs with the mechanism, or a function of the present ensemble that returns one. An ensemble is tried
-#'   while it has the parameters of all that was adopted before it.
+#'   while it has the parameters of all that was adopted before it. A function of two arguments gets the name of the
+#'   record as the second: of several records it is called for each in turn, and may return the simulator as it is where
+#'   the mechanism does not act. Of a single record that is not given in a list it is the name of the measurements.
 #' @param boundary Names of the boundary conditions that drive the mechanism.
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
 #' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class `amiss_catalogue`.
@@ -24,7 +26,9 @@
 #' @export
 mechanism <- function(name, edit, boundary, sentence) {
   check_input(checkmate::check_string(name, min.chars = 1), "name")
-  if (!inherits(edit, "amiss_ensemble")) check_input(checkmate::check_function(edit, nargs = 1), "edit")
+  if (!inherits(edit, "amiss_ensemble")) {
+    check_input(checkmate::check_function(edit, nargs = if (knows_record(edit)) 2 else 1), "edit")
+  }
   check_columns_named(boundary)
   check_input(checkmate::check_string(sentence, min.chars = 1), "sentence")
   structure(list(name = name, edit = edit, boundary = boundary, sentence = sentence), class = "amiss_mechanism")
@@ -62,10 +66,14 @@ print.amiss_catalogue <- function(x, ...) on_stdout(x, {
   cli::cli_bullets(c(">" = "next: {.fun upgrade_model}"))
 })
 
+# Whether an edit asks for the name of the record beside the model.
+knows_record <- function(edit) is.function(edit) && length(setdiff(names(formals(args(edit))), "...")) == 2
+
 # The extended simulator. An edit may replace parameters of the base model, but not drop what was adopted.
-extend <- function(simulator, mechanism, adopted = character(), call = rlang::caller_env()) {
+extend <- function(simulator, mechanism, adopted = character(), record = NULL, call = rlang::caller_env()) {
   edit <- mechanism$edit
-  extended <- tryCatch(if (is.function(edit)) edit(simulator) else edit, error = function(e) {
+  of_record <- if (knows_record(edit)) function(simulator) edit(simulator, record) else edit
+  extended <- tryCatch(if (is.function(edit)) edited(simulator, of_record) else edit, error = function(e) {
     abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"),
                 call = call)
   })

@@ -1,4 +1,5 @@
-# One model taken down the line: its runs, its emulator, its calibration, coarse at first and then in full.
+# One model taken down the line: its runs, its emulator, its calibration, coarse at first and then in full. Of several
+# records it is a named list of simulators; ensembles, and the runs of their checks, are lists of the same names then.
 
 # How runs are spent where a model is calibrated twice.
 refining_control <- list(refine = 1 / 3, rounds = 8,
@@ -10,6 +11,10 @@ least_rounds <- 3     # of refinement that are left to each calibration of a mod
 
 # The options of the stages, as these will take them.
 check_stage_controls <- function(control, measurements, method = "history", call = rlang::caller_env()) {
+  for (m in each_record(measurements)) check_controls_of(control, m, method, call)
+}
+
+check_controls_of <- function(control, measurements, method, call) {
   fill_emulator_control(control$emulator, "control$emulator", call)
   n <- length(used_rows(measurements, "calibrate"))
   if (method == "paper") return(fill_paper_control(control$calibration, n, "control$calibration", call))
@@ -19,8 +24,14 @@ check_stage_controls <- function(control, measurements, method = "history", call
 }
 
 first_runs <- function(simulator, runs, settings) {
-  if (inherits(simulator, "amiss_ensemble")) return(simulator)
-  simulate_design(simulator, settings$measurements, runs, seed = settings$seed, threads = settings$threads)
+  if (is_given(simulator)) return(simulator)
+  simulate <- if (is.object(simulator)) simulate_design else simulate_jointly
+  simulate(simulator, settings_records(settings), runs, seed = settings$seed, threads = settings$threads)
+}
+
+# The record, or a named list of several.
+settings_records <- function(settings) {
+  if (is_several(settings$measurements)) settings$measurements$records else settings$measurements
 }
 
 # A model simulated, trained and calibrated by `settings$calibrate`; calibrate_paper() has no refinements. Every model
@@ -39,18 +50,38 @@ fit_model <- function(simulator, name, settings) {
   })
 }
 
-# refine_until_checked() as a study asks for it; what was spent on the model `before` counts. Of a coarse basis tells
-# who asks for the model.
-fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, before = NULL, ...) {
+# list(ensemble, fit, made): refine_records() as a study asks for it, of one record (or a list of one) each an object,
+# of several a list and their joint calibration. What was spent on the model `before` counts; `first` is such a list. Of
+# a coarse basis tells who asks for the model.
+fit_runs <- function(ensemble, settings, calibration = settings$control$calibration, before = NULL, first = NULL,
+                     hopeless = function(fit) FALSE, purpose = for_intervals) {
+  ensembles <- in_list(ensemble)
   rounds <- settings$control$rounds %||% refining_control$rounds
   left <- min(rounds, max(least_rounds, rounds - (before$rounds %||% 0)))
   control <- list(emulator = as.list(settings$control$emulator), calibration = as.list(calibration))
-  found <- without_basis_warnings(refine_until_checked(
-    ensemble, settings$measurements, left, control, settings$seed, settings$threads,
-    runs = regional_runs(ensemble$parameters, refined_runs(settings)), ...))
-  for (spent in c("rounds", "runs_made")) found$fit[[spent]] <- found$fit[[spent]] + (before[[spent]] %||% 0L)
-  found
+  together <- function(fits) joined_fit(stats::setNames(fits, names(ensembles)))
+  if (!is.null(first)) {
+    first <- list(ensembles = unname(in_list(first$ensemble)), fits = unname(record_fits(first$fit)),
+                  made = unname(made_of(first)))
+  }
+  found <- without_basis_warnings(refine_records(
+    unname(ensembles), unname(each_record(settings$measurements)), left, control, settings$seed, settings$threads,
+    runs = max(vapply(ensembles, function(e) regional_runs(e$parameters, refined_runs(settings)), 0)), first,
+    function(fits) hopeless(together(fits)), purpose))
+  fits <- lapply(found$fits, function(fit) {
+    for (spent in c("rounds", "runs_made")) fit[[spent]] <- fit[[spent]] + (before[[spent]] %||% 0L)
+    fit
+  })
+  if (length(fits) == 1) return(list(ensemble = found$ensembles[[1]], fit = fits[[1]], made = found$made[[1]]))
+  list(ensemble = stats::setNames(found$ensembles, names(ensembles)), fit = together(fits),
+       made = stats::setNames(found$made, names(ensembles)))
 }
+
+# The runs of the checks of what fit_runs() found, by record.
+made_of <- function(found) if (inherits(found$fit, "amiss_joint")) found$made else list(found$made)
+
+# settled() of all records of what fit_runs() found.
+all_settled <- function(found, purpose) all(mapply(settled, record_fits(found$fit), made_of(found), list(purpose)))
 
 # The coarse calibration of a model, on the runs that fill its parameters' space; it keeps them. A few runs at posterior
 # draws tell how far its evidence is off, correct it, and join them where it is too far. It is for the evidence: tails
@@ -79,15 +110,16 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
       full <- fit_runs(first_runs(simulator, settings$runs, settings), settings, purpose = for_evidence)
     } else {
       first <- first %||% screen_model(simulator, name, settings)
-      full <- if (is.null(first$ensemble$simulator)) {
+      full <- if (!can_be_run(in_list(first$ensemble))) {
         fit_runs(first$ensemble, settings, before = first$fit)
-      } else if (!settled(first$fit, first$made, for_evidence)) {
+      } else if (!all_settled(first, for_evidence)) {
         fit_runs(first$ensemble, settings, before = first$fit, first = first, purpose = for_evidence)
       } else {
-        ensemble <- with_checked_runs(first$ensemble, first$fit, first$made)
-        if (more > 0 && is.null(ensemble$region))
-          ensemble <- refine_ensemble(ensemble, first$fit, more, threads = settings$threads)
-        fit_runs(ensemble, settings, before = first$fit, purpose = for_evidence)
+        fits <- record_fits(first$fit)
+        ensembles <- Map(with_checked_runs, in_list(first$ensemble), fits, made_of(first))
+        if (more > 0 && any(vapply(ensembles, function(e) is.null(e$region), NA)))
+          ensembles <- Map(refine_ensemble, ensembles, fits, more, threads = settings$threads)
+        fit_runs(ensembles, settings, before = first$fit, purpose = for_evidence)
       }
       full$fit$coarse <- first$fit[c("log_evidence", "standard_error")]
     }
@@ -98,10 +130,45 @@ fit_fully <- function(simulator, name, settings, first = NULL) {
 # The fit that fit_fully() gave, refined where tails of the posterior lie at the end of the region: a model that is kept
 # needs its parameters' intervals. What its rounds could not mend is left.
 settled_fit <- function(full, name, settings) {
-  if (isFALSE(full$fit$check$passed) || settled(full$fit, full$made, for_intervals)) return(full$fit)
+  if (isFALSE(full$fit$check$passed) || all_settled(full, for_intervals)) return(full$fit)
   settings$keep(list("settled", name, plain(model_of(full$fit))), {
     fit <- fit_runs(full$ensemble, settings, before = full$fit, first = full)$fit
     fit$coarse <- full$fit$coarse
     fit
   })
+}
+
+measured_model <- function(fit, name, parent, mechanism, settings,
+                           stage = "measured") settings$keep(list(stage, name, plain(model_of(fit))), {
+  attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
+                                       threads = settings$threads)
+  c(list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution),
+    predicted_record(fit, settings))
+})
+
+# list(prediction, scores), of several records in units of each one's noise, with `records`, the same of each as it is.
+predicted_record <- function(fit, settings) {
+  each <- lapply(record_fits(fit), function(one) {
+    prediction <- stats::predict(one, use = predictable(one), seed = settings$seed, threads = settings$threads)
+    list(prediction = prediction, scores = prediction_scores(prediction))
+  })
+  if (!inherits(fit, "amiss_joint")) return(each[[1]])
+  scaled <- c("observed", "mean", "lower95", "upper95", "crps")
+  in_noise <- Map(function(name, one) {
+    noise_sd <- fit$records[[name]]$measurements$noise_sd
+    data.frame(record = name, one$prediction[c("use", "segment")], one$prediction[scaled] / noise_sd)
+  }, names(each), each)
+  together <- do.call(rbind, unname(in_noise))
+  list(prediction = together, scores = prediction_scores(together), records = each)
+}
+
+# A model that stays needs its parameters' intervals: settled_fit() of its calibration in full, `full`, if that is
+# there.
+settled_model <- function(model, settings) {
+  if (is.null(model$full)) return(model)
+  fit <- settled_fit(model$full, model$name, settings)
+  full <- model$full
+  model$full <- NULL
+  if (identical(fit, full$fit)) return(model)
+  staged(model$name, measured_model(fit, model$name, model$parent, model$mechanism, settings, "settled"))
 }

@@ -2,6 +2,9 @@ figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy
                   "priors",
                   "moved", "steps", "missing", "emulator", "sampler")
 
+# Of several records each has its own.
+record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_day", "missing", "emulator")
+
 #' Figures
 #'
 #' `plot()` draws a figure and returns it invisibly; `autoplot()` of ggplot2 returns it undrawn, to be changed or saved.
@@ -14,7 +17,8 @@ figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy
 #'   brought), `"missing"` (the response that the first model lacks, by boundary condition), `"emulator"` (its errors on
 #'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`, `"criteria"` (ranks by
 #'   each), `"attribution"`, `"fit"` (measured and simulated), `"discrepancy"` (over time), `"parameters"`,
-#'   `"heat_loss"` (of zones) or `"held_out"` (where rows validate).
+#'   `"heat_loss"` (of zones) or `"held_out"` (where rows validate). Of an upgrade of several records, figures that show
+#'   a series are of one record: `"fit of NAME"`, with `"fit"` for that of the first.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A ggplot.
 #' @examples
@@ -113,6 +117,15 @@ draw <- function(figure) {
 }
 
 upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
+  if (is_several(upgrade$measurements)) {
+    names <- names(upgrade$measurements$records)
+    if (checkmate::test_choice(which, record_figure_names)) which <- paste(which, "of", names[1])
+    check_input(checkmate::check_choice(which, figures_of(upgrade)), "which", call = call)
+    for (name in names) {
+      one <- match(which, paste(record_figure_names, "of", name))
+      if (!is.na(one)) return(upgrade_figure(record_upgrade(upgrade, name), record_figure_names[one], call))
+    }
+  }
   check_input(checkmate::check_choice(which, figure_names), "which", call = call)
   stages <- upgrade_stages(upgrade)
   switch(which,
@@ -136,12 +149,16 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
 figures_of <- function(x) UseMethod("figures_of")
 
 #' @export
-figures_of.amiss_upgrade <- function(x) figure_names
+figures_of.amiss_upgrade <- function(x) {
+  if (!is_several(x$measurements)) return(figure_names)
+  of_records <- outer(record_figure_names, names(x$measurements$records), paste, sep = " of ")
+  c(setdiff(figure_names, record_figure_names), of_records)
+}
 
 # Writes every figure as a PNG; returns the paths.
 save_figures <- function(x, folder, width = canvas_width, dpi = 120) {
   vapply(figures_of(x), function(which) {
-    path <- file.path(folder, paste0(which, ".png"))
+    path <- file.path(folder, paste0(gsub("[^[:alnum:]_.-]+", "_", which), ".png"))
     save_figure(ggplot2::autoplot(x, which), path, width, dpi)
     path
   }, "")

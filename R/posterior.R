@@ -179,7 +179,7 @@ equal_draws <- function(fit, n, call = rlang::caller_env()) {
 # Parameters of a calibration with their priors; `at_edge` as edge_of_prior() has it.
 parameter_rows <- function(fit) {
   table <- parameter_table(fit)
-  declared <- fit$emulator$parameters[table$name]
+  declared <- drawn_parameters(fit)[table$name]
   side <- function(u, fallback) vapply(declared, function(p) {
     limit <- prior_quantile(p$prior, u)
     if (is.finite(limit)) limit else prior_quantile(p$prior, fallback)
@@ -212,6 +212,6 @@ posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, co
 # Share of the prior's 95 % interval that the posterior's takes.
 narrowing <- function(fit) {
   rows <- parameter_rows(fit)
-  width <- vapply(fit$emulator$parameters[rows$name], function(p) diff(prior_quantile(p$prior, c(0.025, 0.975))), 0)
+  width <- vapply(drawn_parameters(fit)[rows$name], function(p) diff(prior_quantile(p$prior, c(0.025, 0.975))), 0)
   stats::setNames((rows$upper95 - rows$lower95) / width, rows$label)
 }

@@ -44,8 +44,8 @@ calibrate_refined <- function(ensemble, measurements, rounds = 8, runs = NULL, c
   fill_emulator_control(control$emulator, "control$emulator")
   n <- length(used_rows(measurements, "calibrate"))
   fill_calibration_control(control$calibration, measurements, n, "control$calibration")
-  fit <- refine_until_checked(ensemble, measurements, rounds, control, pick_seed(seed), check_threads(threads),
-                              runs = runs)$fit
+  fit <- refine_records(list(ensemble), list(measurements), rounds, control, pick_seed(seed), check_threads(threads),
+                        runs)$fits[[1]]
   warn_coarse_basis(fit$emulator, "control$emulator$max_vectors")
   fit
 }
@@ -58,19 +58,11 @@ for_intervals <- list(effective = 1 / 3, border = 0.01)
 
 lost <- 3  # error over noise from which an emulator does not even tell where the posterior lies
 
-# list(ensemble, fit, made): the last calibration, the ensemble it was made with, and the runs of its check. `first`:
-# such a list for the ensemble, if there is one already. `hopeless`: a function of a coarse fit that tells that no more
-# is wanted of it. `purpose`: what the calibration is for.
-refine_until_checked <- function(ensemble, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
-                                 hopeless = function(fit) FALSE, purpose = for_intervals) {
-  if (!is.null(first)) first <- list(ensembles = list(first$ensemble), fits = list(first$fit), made = list(first$made))
-  last <- refine_records(list(ensemble), list(measurements), rounds, control, seed, threads, runs, first,
-                         function(fits) hopeless(fits[[1]]), purpose)
-  list(ensemble = last$ensembles[[1]], fit = last$fits[[1]], made = last$made[[1]])
-}
-
-# The same of records that share parameters: list(ensembles, fits, made), one of each for each record. All fits say in
-# `rounds` and `runs_made` what was spent on all. Where the last round is no better than one before it, that one stays.
+# Of one record, or of several that share parameters: list(ensembles, fits, made), one of each for each record: the last
+# calibration, the ensemble it was made with, and the runs of its check. `first`: such a list for the ensembles, if one
+# is there already. `hopeless`: a function of coarse fits that tells that no more is wanted of them. `purpose`: what the
+# calibration is for. All fits say in `rounds` and `runs_made` what was spent on all. Where the last round is no better
+# than one before it, that one stays.
 refine_records <- function(ensembles, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
                            hopeless = function(fits) FALSE, purpose = for_intervals) {
   runs <- runs %||% max(vapply(ensembles, function(e) regional_runs(e$parameters), 0))

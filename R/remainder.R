@@ -7,10 +7,23 @@ remaining_error <- function(model, measurements) {
   p <- model$prediction[model$prediction$use == "calibrate", ]
   r <- p$observed - p$mean
   # As in error_sd(): fitted parameters do not count as agreement.
-  q <- length(model$fit$emulator$parameters)
+  q <- length(drawn_parameters(model$fit))
   ratio <- sqrt(sum(r^2) / max(1, length(r) - q)) / measurements$noise_sd
   list(ratio = ratio, large = ratio > large_remainder,
-       pattern = if (ratio > large_remainder) remainder_pattern(r, model$fit$rows, measurements))
+       pattern = if (ratio > large_remainder) {
+         if (is_several(measurements)) worst_pattern(model, measurements)
+         else remainder_pattern(r, model$fit$rows, measurements)
+       })
+}
+
+# The pattern in that of several records of which most remains.
+worst_pattern <- function(model, measurements) {
+  each <- lapply(each_view(model, measurements), function(view) remaining_error(view$model, view$measurements))
+  seen <- Filter(function(left) !is.null(left$pattern), each)
+  if (!length(seen)) return(NULL)
+  worst <- names(which.max(vapply(seen, `[[`, 0, "ratio")))
+  pattern <- seen[[worst]]$pattern
+  list(what = paste0("in ", worst, ": ", pattern$what), where = pattern$where)
 }
 
 # What it is and where to look, in words; NULL if the calendar explains less than half.
@@ -58,12 +71,20 @@ daily_share <- function(r, hours, clock) {
 }
 
 # TRUE where the evidence for all that was adopted is not decisively above that for a drift: a parabola in time beside
-# the base model, in amounts of the order of what that leaves or less (responses_factor()).
+# the base model, in amounts of the order of what that leaves or less (responses_factor()); of several records in those
+# that ask for it, in one at least.
 drift_rivals <- function(models, control, threads) {
   base <- models[[1]]$fit
+  of_record <- unlist(lapply(record_fits(base), drift_evidence, threads))
+  if (!length(of_record)) return(FALSE)
+  drift <- if (any(of_record > 0)) sum(of_record[of_record > 0]) else max(of_record)
+  bayes_factor(models[[length(models)]]$fit, base)$log10_bf < drift + control$decisive
+}
+
+# Its log10 Bayes factor; NULL for a record too short to show one.
+drift_evidence <- function(base, threads) {
   hours <- base$measurements$hours[base$rows]
-  if (length(hours) < 10) return(FALSE)
+  if (length(hours) < 10) return(NULL)
   parabola <- error_sd(base) * sqrt(length(hours)) * stats::poly(hours, 2)
-  drift <- responses_factor(base, threads)(parabola)
-  bayes_factor(models[[length(models)]]$fit, base)$log10_bf < drift$log10_bf + control$decisive
+  responses_factor(base, threads)(parabola)$log10_bf
 }

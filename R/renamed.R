@@ -7,7 +7,8 @@
 #'
 #' @param simulator Any simulator.
 #' @param ... New names by the old ones: `door = "door of O5"`.
-#' @return An object of class `amiss_renamed`: a simulator that is the same but for the names.
+#' @return An object of class `amiss_renamed`: a simulator that is the same but for the names. The `edit` of a
+#'   [mechanism()] gets the simulator with its own names.
 #' @section Errors: `amiss_error_input` if the simulator has no such parameter, or a new name is there already.
 #' @examples
 #' linear <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
@@ -48,6 +49,20 @@ free_parameters.amiss_renamed <- function(simulator) {
   names(parameters)[at] <- simulator$to
   for (name in simulator$to) parameters[[name]]$name <- name
   parameters
+}
+
+# What an edit makes of a simulator: of one whose parameters go by other names, the simulator itself is edited, which is
+# what the edit knows, and those that it keeps go by the other names again.
+edited <- function(simulator, edit, call = rlang::caller_env()) {
+  if (class(simulator)[1] != "amiss_renamed") return(edit(simulator))
+  inside <- edited(simulator$simulator, edit, call)
+  check_simulator(inside, call)
+  names <- names(free_parameters(inside))
+  to <- simulator$to[names(simulator$to) %in% names]
+  twice <- intersect(to, setdiff(names, names(to)))
+  if (length(twice)) abort_input("There would be two parameters {.val {twice[1]}}.", call = call)
+  simulator[c("simulator", "to")] <- list(inside, to)
+  simulator
 }
 
 #' @export

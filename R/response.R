@@ -25,8 +25,30 @@ responses_factor <- function(fit, threads, scales = response_scales) {
   }
 }
 
-# responses_factor() of the responses that trials show, a row for each, and the runs made. NA where its runs failed.
+# responses_factor() of the responses that trials show, a row for each, and the runs made. NA where its runs failed. Of
+# several records each has amounts of its own, so that their factors multiply.
 response_factors <- function(fit, trials, threads) {
+  factors <- unname(lapply(record_fits(fit), trial_factor, threads))
+  rows <- Map(function(trial, name) {
+    each <- Map(function(factor, simulator) factor(simulator), factors, unname(in_list(trial)))
+    if (all(vapply(each, `[[`, NA, "silent"))) warn_no_response(name)
+    product_of_factors(lapply(each, `[[`, "row"))
+  }, trials, names(trials))
+  do.call(rbind, rows)
+}
+
+product_of_factors <- function(rows) {
+  if (length(rows) == 1) return(rows[[1]])
+  of <- function(column) vapply(rows, `[[`, 0, column)
+  log10_bf <- sum(of("log10_bf"))
+  half <- sqrt(sum((of("upper95") - of("log10_bf"))^2))
+  word <- if (is.na(log10_bf)) NA_character_ else evidence_word(log10_bf - half, log10_bf + half)
+  data.frame(log10_bf = log10_bf, lower95 = log10_bf - half, upper95 = log10_bf + half, word = word,
+             runs = sum(of("runs")))
+}
+
+# A function of a trial of one record: list(row, silent), `silent` if it changes nothing.
+trial_factor <- function(fit, threads) {
   emulator <- fit$emulator
   simulated <- function(simulator, values) {
     suppress_run_warnings(simulate_measured(simulator, values, fit$measurements, "calibrate", threads))
@@ -34,16 +56,15 @@ response_factors <- function(fit, trials, threads) {
   centre <- unit_to_values(stats::pnorm(matrix(posterior_centre(fit), 1)), emulator$parameters)
   present <- simulated(emulator$simulator, centre)[, 1]
   factor <- responses_factor(fit, threads)
-  rows <- Map(function(trial, name) {
+  function(trial) {
     values <- response_design(trial, centre)
     responses <- simulated(trial, values) - present
     responses <- responses[, colSums(!is.finite(responses)) == 0, drop = FALSE]
-    if (ncol(responses) && all(responses == 0)) warn_no_response(name)
-    if (!ncol(responses)) return(data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_,
-                                            word = NA_character_, runs = nrow(values)))
-    cbind(factor(responses), runs = nrow(values))
-  }, trials, names(trials))
-  do.call(rbind, rows)
+    row <- if (ncol(responses)) factor(responses) else {
+      data.frame(log10_bf = NA_real_, lower95 = NA_real_, upper95 = NA_real_, word = NA_character_)
+    }
+    list(row = cbind(row, runs = nrow(values)), silent = ncol(responses) > 0 && all(responses == 0))
+  }
 }
 
 warn_no_response <- function(mechanism) {

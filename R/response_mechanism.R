@@ -221,7 +221,7 @@ print.amiss_responding <- function(x, ...) on_stdout(x, {
 description_sentence <- function(entry, fit) {
   if (!describes(entry)) return(NULL)
   response <- entry$response
-  m <- fit$measurements
+  m <- record_fits(fit)[[1]]$measurements
   rows <- parameter_rows(fit)
   number <- function(name) {
     row <- rows[rows$name == name, ]

@@ -82,22 +82,45 @@ table_rows <- function(table) lapply(seq_len(NROW(table)), function(i) as.list(t
 
 #' @export
 result_list.amiss_upgrade <- function(x) {
+  # What the fit of one record says, and what one model says of it.
+  made_with <- function(fit) {
+    list(Q = ncol(fit$emulator$basis$vectors), N = length(fit$rows), M = nrow(fit$emulator$processes$inputs),
+         noise_sd = fit$measurements$noise_sd, discarded_rms = fit$emulator$basis$discarded_rms)
+  }
+  checked <- function(fit) {
+    list(emulator_error = fit$check$error, emulator_ratio = fit$check$ratio, emulator_checked = fit$check$passed)
+  }
+  scored <- function(scores) {
+    list(rmse_calibration = scores$calibrate[["rmse"]], rmse_validation = scores$validate[["rmse"]],
+         coverage95_validation = scores$validate[["coverage95"]], crps_calibration = scores$calibrate[["crps"]],
+         crps_validation = scores$validate[["crps"]])
+  }
+  answers <- function(attribution) {
+    table <- attribution$table
+    table_rows(table[intersect(c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group",
+                                 "records"), names(table))])
+  }
   model_list <- function(model) {
     fit <- model$fit
-    list(name = model$name, parent = model$parent, mechanism = model$mechanism, Q = ncol(fit$emulator$basis$vectors),
-         N = length(fit$rows), M = nrow(fit$emulator$processes$inputs), noise_sd = fit$measurements$noise_sd,
-         discarded_rms = fit$emulator$basis$discarded_rms, log10_evidence = fit$log_evidence / log(10),
-         log10_evidence_interval = fit$interval / log(10), trusted = fit$trust$trusted, trust = fit$trust$verdict,
-         verdict = model$verdict, doubts = as.list(model$doubts), confounded_with = as.list(model$confounded_with),
-         held_out_gain = model$held_out_gain[c("mean", "standard_error")], emulator_error = fit$check$error,
-         emulator_ratio = fit$check$ratio,
-         emulator_checked = fit$check$passed, refinements = fit$rounds, reach = as.list(fit$reach),
-         rmse_calibration = model$scores$calibrate[["rmse"]], rmse_validation = model$scores$validate[["rmse"]],
-         coverage95_validation = model$scores$validate[["coverage95"]],
-         crps_calibration = model$scores$calibrate[["crps"]],
-         crps_validation = model$scores$validate[["crps"]], parameters = table_rows(parameter_table(fit)),
-         attribution = table_rows(model$attribution$table[c("boundary", "log10_bf_dropped", "share", "p_value",
-                                                            "significant", "group")]))
+    several <- inherits(fit, "amiss_joint")
+    listed <- c(
+      list(name = model$name, parent = model$parent, mechanism = model$mechanism), if (!several) made_with(fit),
+      list(log10_evidence = fit$log_evidence / log(10), log10_evidence_interval = fit$interval / log(10),
+           trusted = fit$trust$trusted, trust = fit$trust$verdict, verdict = model$verdict,
+           doubts = as.list(model$doubts), confounded_with = as.list(model$confounded_with),
+           held_out_gain = model$held_out_gain[c("mean", "standard_error")]),
+      checked(fit), list(refinements = fit$rounds), if (!several) list(reach = as.list(fit$reach)),
+      scored(model$scores),
+      list(parameters = table_rows(parameter_table(fit)), attribution = answers(model$attribution)))
+    if (several) listed$records <- lapply(names(fit$records), record_list, model)
+    listed
+  }
+  record_list <- function(name, model) {
+    own <- record_model(model, name)
+    c(list(name = name, target = own$fit$measurements$target, unit = own$fit$measurements$unit), made_with(own$fit),
+      checked(own$fit), list(reach = as.list(own$fit$reach)), scored(own$scores),
+      list(held_out_gain = model$records[[name]]$held_out_gain[c("mean", "standard_error")],
+           attribution = answers(own$attribution)))
   }
   candidate_list <- function(i) {
     row <- x$candidates[i, ]

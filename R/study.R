@@ -3,7 +3,11 @@ study_fields <- list(
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
   optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
-               "fill_gaps_h", "runs", "seed", "control", "title"))
+               "fill_gaps_h", "runs", "seed", "control", "title", "records"))
+
+# What each of several records may have of its own.
+record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h", "calibrate", "validate",
+                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h")
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
@@ -20,6 +24,12 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'
 #' The value of `model` and of `catalogue` may also be a function of the [measurements()] that returns the piece: so a
 #' study can have given runs ([ensemble()]) as its model, and [responses()] as its catalogue.
+#'
+#' *Several records.* `records` maps the name of each record to the fields that it has of its own, of `data`, `time`,
+#' `target`, `boundary`, `model`, `noise_sd`, `average_h`, `calibrate`, `validate`, `warmup_h`, `unit`, `time_format`,
+#' `time_zone` and `fill_gaps_h`; those outside are for all that do not say otherwise. The value of a `model` may also
+#' be a list of simulators by the names of the records ([outputs_of()]). A catalogue that is a function gets the list of
+#' measurements. The loop is then that of [upgrade_model()] over several records.
 #'
 #' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
 #' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`,
@@ -88,24 +98,72 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
   check_input(checkmate::check_flag(quiet), "quiet")
   check_input(checkmate::check_flag(trust), "trust")
   study <- read_study_file(path)
-  check_study_fields(study, path)
+  records <- study_records(study, path)
   folder <- dirname(normalizePath(path))
-  files <- study_files(study, folder)
+  of_each <- lapply(records, study_files, folder)
+  files <- do.call(c, unname(of_each))
+  files <- files[!duplicated(paste(names(files), files))]
   require_trust(files, folder, trust)
-  data <- study_data(files[["data"]])
-  rows <- function(field) row_condition(study[[field]], data, field)
-  measure <- function() {
-    measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
-                 noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
-                 validate = rows("validate"),
-                 warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
-                 time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0)
-  }
+  measure <- function() Map(function(record, files, name) {
+    naming_record(name, study_measurements(record, files))
+  }, records, of_each, names(records) %||% "")
   measured <- if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure()
-  pieces <- if (is.null(study$models)) upgrade_pieces(files, measured) else comparison_pieces(files, study$method)
+  if (is.null(study$records)) measured <- measured[[1]]
+  pieces <- if (is.null(study$models)) upgrade_pieces(of_each, measured) else comparison_pieces(files, study$method)
   c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150,
          control = study$control),
     pieces, list(measurements = measured, code = content_hash(lapply(files[is_code(files)], study_code))))
+}
+
+# The fields of each record, checked; of a study without `records` its own.
+study_records <- function(study, path, call = rlang::caller_env()) {
+  if (is.null(study$records)) {
+    check_study_fields(study, path, call = call)
+    return(list(study))
+  }
+  own <- study$records
+  if (!is.list(own) || !length(own) || !checkmate::test_named(own, "unique") ||
+        !all(vapply(own, function(x) is.null(x) || checkmate::test_list(x, names = "unique"), NA))) {
+    abort_input(c("{.field records} of the study file {.file {path}} is no mapping of names to fields.",
+                  i = "Write the name of each record, and indented below it what is its own."), call = call)
+  }
+  foreign <- intersect(names(study), study_fields$comparison)
+  if (length(foreign)) {
+    abort_input(c("The study file {.file {path}} has {.field records} and {.field {foreign}}.",
+                  i = "Several records go through the loop only: name {.field model} and {.field catalogue}."),
+                call = call)
+  }
+  Map(function(fields, name) {
+    unknown <- setdiff(names(fields), record_fields)
+    if (length(unknown)) {
+      abort_input(c(paste("The record {.val {name}} of the study file {.file {path}} has {cli::qty(unknown)}unknown",
+                          "field{?s} {.field {unknown}}."),
+                    i = "What a record can have of its own: {.field {record_fields}}."), call = call)
+    }
+    record <- study[names(study) != "records"]
+    record[names(fields)] <- fields
+    check_study_fields(record, path, paste0(", record \"", name, "\","), call)
+    record$study <- name
+    record
+  }, own, names(own))
+}
+
+# An error in one of several records says in which.
+naming_record <- function(name, code, call = rlang::caller_env()) {
+  if (!nzchar(name)) return(code)
+  tryCatch(code, amiss_error_input = function(e) {
+    abort_input(c("The record {.val {name}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
+  })
+}
+
+study_measurements <- function(study, files) {
+  data <- study_data(files[["data"]])
+  rows <- function(field) row_condition(study[[field]], data, field)
+  measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
+               noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
+               validate = rows("validate"),
+               warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
+               time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0)
 }
 
 # The options that can be checked before anything is computed.
@@ -114,7 +172,8 @@ check_study_control <- function(study, call = rlang::caller_env()) {
   else fill_comparison_control(study$control, study$measurements, study$method, call)
 }
 
-check_study_fields <- function(study, path, call = rlang::caller_env()) {
+# `of`: the record in words, if the fields are of one of several.
+check_study_fields <- function(study, path, of = "", call = rlang::caller_env()) {
   if (!is.list(study) || is.null(names(study)))
     abort_input("The study file {.file {path}} holds no fields.", call = call)
   unknown <- setdiff(names(study), unlist(study_fields))
@@ -132,7 +191,7 @@ check_study_fields <- function(study, path, call = rlang::caller_env()) {
   }
   absent <- setdiff(c(study_fields$needed, if (!compares) study_fields$upgrade), names(study))
   if (length(absent)) {
-    abort_input(c("The study file {.file {path}} lacks {cli::qty(absent)}field{?s} {.field {absent}}.",
+    abort_input(c("The study file {.file {path}}{of} lacks {cli::qty(absent)}field{?s} {.field {absent}}.",
                   i = if (any(absent %in% study_fields$upgrade)) "Or name {.field models}, to compare several."),
                   call = call)
   }
@@ -182,12 +241,31 @@ study_data <- function(path, call = rlang::caller_env()) {
   })
 }
 
+# `files`: those of each record.
 upgrade_pieces <- function(files, measurements, call = rlang::caller_env()) {
-  model <- source_value(files[["model"]], "model", call, measurements)
-  if (!inherits(model, "amiss_ensemble")) check_simulator(model, call)
-  catalogue <- source_value(files[["catalogue"]], "catalogue", call, measurements)
+  several <- !is.object(measurements)
+  model <- if (several) record_models(files, measurements, call)
+           else source_value(files[[1]][["model"]], "model", call, measurements)
+  for (one in if (several) model else list(model)) if (!inherits(one, "amiss_ensemble")) check_simulator(one, call)
+  catalogue <- source_value(files[[1]][["catalogue"]], "catalogue", call, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", call = call)
   list(model = model, catalogue = catalogue)
+}
+
+# A file that several records name is evaluated once, so that simulators that share their runs go on doing so.
+record_models <- function(files, measurements, call) {
+  paths <- vapply(files, `[[`, "", "model")
+  made <- lapply(stats::setNames(nm = unique(paths)), source_value, "model", call)
+  Map(function(path, name) {
+    value <- made[[path]]
+    if (is.function(value)) return(source_value(path, "model", call, measurements[[name]]))
+    if (!rlang::is_bare_list(value)) return(value)
+    if (!name %in% names(value)) {
+      abort_input(c("The {.field model} file {.file {path}} has no simulator of the record {.val {name}}.",
+                    i = "Those of its list are of {.val {names(value)}}."), call = call)
+    }
+    value[[name]]
+  }, paths, names(paths))
 }
 
 comparison_pieces <- function(files, method, call = rlang::caller_env()) {

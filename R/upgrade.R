@@ -34,8 +34,15 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,
 #' and held-out rows are predicted by emulators of the runs given there.
 #'
-#' @param simulator The base model: a simulator, or an [ensemble()] of given runs.
-#' @param measurements The [measurements()].
+#' *Several records.* Two or more series that share parameters ([calibrate_jointly()]) go through the same loop: give
+#' named lists of simulators and measurements. The `edit` of a mechanism is applied to the simulator of each record in
+#' turn; one of two arguments gets the record's name as the second, so that it may act on some of them only
+#' ([mechanism()]). Every model is calibrated on all records, and what is compared is the evidence of all. Scores, the
+#' error in calibration and the gain held out are those of all records together, each in units of its noise; a
+#' mechanism with which the error of one record rises is likely at most. Runs count for each record.
+#'
+#' @param simulator The base model: a simulator, or an [ensemble()] of given runs; of several records a named list.
+#' @param measurements The [measurements()]; of several records a list with the same names.
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs of the simulator for each model that is calibrated in full.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies;
@@ -54,7 +61,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
 #'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
 #'   place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those that it
-#'   brought: other parts of the model that could do the same.
+#'   brought: other parts of the model that could do the same. Of several records `fit` is what [calibrate_jointly()]
+#'   gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
@@ -88,21 +96,25 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 upgrade_model <- function(simulator, measurements, catalogue, runs = 150, control = NULL, seed = NULL, threads = 1,
                           quiet = FALSE,
                           checkpoint = NULL) {
-  given <- inherits(simulator, "amiss_ensemble")
-  if (!given) check_simulator(simulator)
-  check_object(measurements, "amiss_measurements", "measurements")
-  check_target_varies(measurements, used_rows(measurements, "calibrate"))
+  started <- upgrade_start(simulator, measurements)
+  simulator <- started$simulator
+  measurements <- started$measurements
+  for (m in each_record(measurements)) check_target_varies(m, used_rows(m, "calibrate"))
   check_object(catalogue, "amiss_catalogue", "catalogue")
-  check_given(c(if (given) list(base = simulator), lapply(catalogue, `[[`, "edit")), measurements)
+  check_given_models(simulator, catalogue, measurements)
   control <- fill_upgrade_control(control, measurements)
-  check_runs_asked(runs, measurements, control$rounds, control$refine)
-  if (!given) check_enough_runs(runs - round(control$refine * runs), length(free_parameters(simulator)), of = runs)
+  for (m in each_record(measurements)) check_runs_asked(runs, m, control$rounds, control$refine)
+  if (!is_given(simulator)) {
+    parameters <- unique(unlist(lapply(in_list(simulator), function(s) names(free_parameters(s)))))
+    check_enough_runs(runs - round(control$refine * runs), length(parameters), of = runs)
+  }
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   say <- progress(quiet)
   settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed,
                    threads = threads)
   before <- runs_so_far()
+  settings$record <- started$record
   settings$spent <- function() !is.null(control$runs_total) && runs_so_far() - before >= control$runs_total
   settings$keep <- checkpoint_keeper(checkpoint, settings[c("measurements", "runs", "control", "seed")])
   warn_absent_drivers(catalogue, measurements)
@@ -121,7 +133,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
                  else "the catalogue is empty"
       break
     }
-    settings$adopted <- setdiff(names(current$fit$emulator$parameters), names(models[[1]]$fit$emulator$parameters))
+    settings$adopted <- setdiff(names(drawn_parameters(current$fit)), names(drawn_parameters(models[[1]]$fit)))
     left <- left[vapply(catalogue[left], applies, NA, settings$adopted)]
     if (!length(left)) {
       stopped <- "no runs that are left hold what has been adopted"
@@ -161,6 +173,47 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
                  measurements = measurements, seed = seed, control = control), class = "amiss_upgrade")
 }
 
+# list(simulator, measurements, record): of one record as they are, with its name; of several a list of simulators and
+# their measurements together (new_records()).
+upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
+  check_model <- function(x) if (!inherits(x, "amiss_ensemble")) check_simulator(x, call)
+  if (!rlang::is_bare_list(simulator) && !rlang::is_bare_list(measurements)) {
+    check_model(simulator)
+    check_object(measurements, "amiss_measurements", "measurements", call = call)
+    return(list(simulator = simulator, measurements = measurements, record = measurements$name))
+  }
+  for (name in c("simulator", "measurements")) {
+    check_input(if (rlang::is_bare_list(get(name))) TRUE else "it is no list", name,
+                "Of several records give named lists of both, one element for each record.", call = call)
+  }
+  check_records(simulator, measurements, "simulator", check_model, least = 1, call = call)
+  names <- names(simulator)
+  if (length(names) == 1) {
+    return(list(simulator = simulator[[1]], measurements = measurements[[1]], record = names))
+  }
+  given <- vapply(simulator, inherits, NA, "amiss_ensemble")
+  if (any(given) && !all(given)) {
+    abort_input(c("Of the records {.val {names[given]}} runs are given, of {.val {names[!given]}} simulators.",
+                  i = "Give simulators of all records, or an {.fun ensemble} of each."), call = call)
+  }
+  check_one_prior(lapply(simulator, free_parameters), call)
+  list(simulator = simulator, measurements = new_records(measurements[names]), record = names)
+}
+
+# Ensembles among the models, base and mechanisms, stand at the rows of their record.
+check_given_models <- function(simulator, catalogue, measurements, call = rlang::caller_env()) {
+  edits <- Filter(function(edit) inherits(edit, "amiss_ensemble"), lapply(catalogue, `[[`, "edit"))
+  if (!is_several(measurements)) {
+    return(check_given(c(if (is_given(simulator)) list(base = simulator), edits), measurements, call))
+  }
+  if (length(edits)) {
+    abort_input(c("The mechanism {.val {names(edits)}} is one set of runs, and there are several records.",
+                  i = "Let its {.code edit} be a function of the model and the record's name that returns the runs."),
+                call = call)
+  }
+  for (name in names(simulator)) check_given(simulator[name], measurements$records[[name]], call)
+}
+
 fill_upgrade_control <- function(control, measurements, call = rlang::caller_env()) {
   control <- merge_control(upgrade_control, control, call = call)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps", call = call)
@@ -175,238 +228,16 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   control
 }
 
-measured_model <- function(fit, name, parent, mechanism, settings,
-                           stage = "measured") settings$keep(list(stage, name, plain(model_of(fit))), {
-  attribution <- attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
-                                       threads = settings$threads)
-  prediction <- stats::predict(fit, use = predictable(fit), seed = settings$seed, threads = settings$threads)
-  list(name = name, parent = parent, mechanism = mechanism, fit = fit, attribution = attribution,
-       prediction = prediction, scores = prediction_scores(prediction))
-})
-
-# A model that stays needs its parameters' intervals: settled_fit() of its calibration in full, `full`, if that is
-# there.
-settled_model <- function(model, settings) {
-  if (is.null(model$full)) return(model)
-  fit <- settled_fit(model$full, model$name, settings)
-  full <- model$full
-  model$full <- NULL
-  if (identical(fit, full$fit)) return(model)
-  staged(model$name, measured_model(fit, model$name, model$parent, model$mechanism, settings, "settled"))
-}
-
 report_model <- function(model, say) {
-  warn_coarse_basis(model$fit$emulator, "control$emulator$max_vectors", model$name)
+  fits <- record_fits(model$fit)
+  for (k in seq_along(fits)) {
+    warn_coarse_basis(fits[[k]]$emulator, "control$emulator$max_vectors", paste(c(model$name, names(fits)[k]),
+                                                                                 collapse = ", "))
+  }
   first <- model$attribution$table[1, ]
   say(paste("{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
             "{signif(model$scores$validate[['rmse']], 3)} held out; discrepancy answers most to",
             "{.field {first$boundary}} (log10 Bayes factor {round(first$log10_bf_dropped, 1)})"))
-}
-
-# Mechanisms driven by what the attribution names come first.
-trial_order <- function(catalogue, attribution) {
-  table <- attribution$table
-  weight <- vapply(catalogue, function(m) {
-    lost <- table$log10_bf_dropped[table$boundary %in% m$boundary & table$significant]
-    if (length(lost)) max(lost) else 0
-  }, 0)
-  names(catalogue)[order(-weight)]
-}
-
-# Every mechanism as an extension of the current model: fits of those worth one, and the table of all Bayes factors.
-try_mechanisms <- function(current, catalogue, settings, say) {
-  trials <- lapply(catalogue, extend, simulator = model_of(current$fit), adopted = settings$adopted)
-  if (is.null(settings$control$screening)) return(tried_in_full(current, trials, NULL, settings, say))
-  responses <- staged("responses of the mechanisms", seen_responses(current, trials, settings))
-  if (!is.null(responses)) say("  {sum(responses$runs)} runs show in which order mechanisms are tried")
-  screens <- screened_mechanisms(current, trials, responses, settings, say)
-  tried_in_full(current, trials, screens, settings, say, responses)
-}
-
-trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
-
-# Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined
-# no further. A budget leaves out the last.
-screened_mechanisms <- function(current, trials, responses, settings, say) {
-  coarse <- as_coarse(current$fit)
-  screens <- list()
-  ordered <- if (is.null(responses)) names(trials) else names(trials)[order(-responses$log10_bf, na.last = FALSE)]
-  turn <- turns("mechanism", length(ordered))
-  for (name in ordered) {
-    fits <- lapply(screens, `[[`, "fit")
-    if (length(fits) && settings$spent()) break
-    screens[[name]] <- staged(turn(name), naming_mechanism(name, screen_model(
-      trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
-    report_candidate(name, screens[[name]]$fit, coarse, say)
-  }
-  screens
-}
-
-# list(fits, table, current) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by
-# its full calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be
-# adopted, or the present model if it stays, is settled, and must lead after that too.
-tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
-  fits <- lapply(screens, `[[`, "fit")
-  full <- list()
-  settled <- character()
-  repeat {
-    left <- if (is.null(screens)) setdiff(names(trials), names(full))
-            else contenders(fits, current$fit, names(full), settings$control)
-    if (length(left)) {
-      turn <- turns("mechanism in full", length(left))
-      for (name in left) {
-        full[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
-          trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
-        fits[[name]] <- full[[name]]$fit
-        report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
-      }
-      next
-    }
-    table <- trial_table(fits, current$fit, current$name, names(full), responses)
-    best <- best_trial(table)
-    if (may_be_adopted(best, current$fit, settings$control)) {
-      name <- best$mechanism
-      if (name %in% settled) break
-      fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name),
-                                                                      settings)))
-      settled <- c(settled, name)
-    } else {
-      if (is.null(current$full)) break
-      current <- settled_model(current, settings)
-    }
-  }
-  list(fits = fits, table = table, current = current)
-}
-
-naming_mechanism <- function(name, code) {
-  rlang::try_fetch(code, amiss_error = function(e) {
-    rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e,
-                 class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
-  })
-}
-
-# What the mechanisms could explain (response_factors()), a row for each; NULL where runs are given and none can be
-# made.
-seen_responses <- function(current, trials, settings) {
-  if (inherits(trials[[1]], "amiss_ensemble")) return(NULL)
-  settings$keep(list("responses", current$name, lapply(trials, plain)),
-                response_factors(current$fit, trials, settings$threads))
-}
-
-# Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is
-# worth its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it
-# too coarse, if `far` decades and three standard errors would not be enough.
-hopeless <- function(fits, reference, control, far = 3) {
-  needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
-  function(fit) {
-    above <- if (isTRUE(fit$check$passed)) uncertainty(fit, reference, control)
-             else 3 * fit$standard_error / log(10) + far
-    fit$check$ratio <= 1 && fit$log_evidence + above * log(10) < needed
-  }
-}
-
-# The fit with the evidence of its coarse calibration, with which other coarse ones are compared.
-as_coarse <- function(fit) {
-  fit[names(fit$coarse)] <- fit$coarse
-  fit
-}
-
-report_candidate <- function(what, fit, reference, say) {
-  bf <- bayes_factor(fit, reference)
-  say(
-    "  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
-}
-
-# Bayes factors against the fit `current`: of the candidates calibrated in full (`full`) beside its full calibration, of
-# the others beside its coarse one.
-standing <- function(fits, current, full) {
-  rows <- lapply(names(fits), function(name) {
-    bayes_factor(fits[[name]], if (name %in% full) current else as_coarse(current))
-  })
-  do.call(rbind, rows)
-}
-
-# The simulation's own error in calibration over that of the fit `current`.
-error_ratio <- function(fit, current) sqrt(mean(stats::residuals(fit)^2) / mean(stats::residuals(current)^2))
-
-raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > risen_error
-
-# Candidates not calibrated in full whose evidence could come near the best that may be adopted, if any could come near
-# adoption.
-contenders <- function(fits, current, full, control) {
-  if (!length(fits)) return(character())
-  bf <- standing(fits, current, full)
-  reach <- bf$log10_bf + vapply(fits, uncertainty, 0, as_coarse(current), control)
-  barred <- vapply(names(fits), function(name) name %in% full && error_ratio(fits[[name]], current) > risen_error, NA)
-  setdiff(names(fits)[reach >= max(bf$log10_bf[!barred], control$decisive)], full)
-}
-
-# By how many decades the coarse evidence of a fit, beside that of a reference, may lie too low: three standard errors,
-# the nats that annealing lies behind the second estimator (where chains lag, a mode may be missed), and the margin, of
-# which a third is enough where runs of the simulator have confirmed the fit.
-uncertainty <- function(fit, reference, control) {
-  lag <- max(0, fit$posterior$second[[1]] - fit$posterior$annealed[[1]], na.rm = TRUE)
-  margin <- if (isTRUE(fit$check$passed)) control$margin / 3 else control$margin
-  (3 * sqrt(fit$standard_error^2 + reference$standard_error^2) + lag) / log(10) + margin
-}
-
-# Bayes factors of all mechanisms against the current model: in full, by the coarse calibration, or by the responses
-# alone.
-trial_table <- function(fits, current, from, full, responses = NULL) {
-  rows <- lapply(names(fits), function(name) {
-    row <- data.frame(from = from, mechanism = name, standing(fits[name], current, full),
-                      error_ratio = error_ratio(fits[[name]], current), trusted = fits[[name]]$trust$trusted,
-                      judged_by = if (name %in% full) "calibration" else "screening")
-    if (!name %in% full) row <- as_far_as_emulated(row, fits[[name]]$check, length(current$rows))
-    row$parameters <- list(added_parameters(fits[[name]], current))
-    row
-  })
-  by_response <- responses[!rownames(responses) %in% names(fits), ]
-  if (NROW(by_response)) {
-    seen <- data.frame(from = from, mechanism = rownames(by_response),
-                       by_response[names(by_response) != "runs"], error_ratio = NA_real_, trusted = FALSE,
-                       judged_by = "response", row.names = NULL)
-    seen$parameters <- rep(list(added_parameters(current, current)), nrow(seen))
-    rows <- c(rows, list(seen))
-  }
-  table <- do.call(rbind, rows)
-  table$screened <- table$judged_by != "calibration"
-  # Equal prior probability for no change and for each mechanism.
-  log_odds <- c(0, table$log10_bf) * log(10)
-  probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))
-  table$probability <- probability[-1]
-  table
-}
-
-# The interval of a candidate whose emulator runs refute holds the error e that they saw, in units of the noise: over N
-# rows it takes N e^2 / 2 nats from the log-likelihood of what the emulator says, and moves it by sqrt(N) e at random.
-as_far_as_emulated <- function(row, check, rows) {
-  if (!isFALSE(check$passed)) return(row)
-  error <- check$ratio
-  row$upper95 <- row$upper95 + (0.5 * rows * error^2 + 1.96 * sqrt(rows) * error) / log(10)
-  row$lower95 <- row$lower95 - 1.96 * sqrt(rows) * error / log(10)
-  row$word <- evidence_word(row$lower95, row$upper95)
-  row
-}
-
-# Estimates of the parameters that a mechanism brought with it.
-added_parameters <- function(fit, parent) {
-  table <- parameter_table(fit)
-  table[!table$name %in% names(parent$emulator$parameters), ]
-}
-
-# The row of highest evidence among the mechanisms that may be adopted: they were calibrated (responses alone decide
-# nothing), and the simulation's own error does not rise with them. No row if there is none.
-best_trial <- function(table) {
-  open <- table[table$judged_by != "response" & !raises_error(table), ]
-  open[which.max(open$log10_bf), ]
-}
-
-# Whether the evidence is decisive or, where that of the present model is not known, as runs refute its emulator to the
-# end, runs of the simulator are: the error falls by a third, with numbers that can be trusted.
-may_be_adopted <- function(best, current, control) {
-  if (!nrow(best) || best$log10_bf < control$decisive) return(FALSE)
-  best$lower95 > 0 || (isFALSE(current$check$passed) && best$trusted && isTRUE(best$error_ratio < fallen_error))
 }
 
 stop_reason <- function(table, attribution, decisive) {

@@ -13,7 +13,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     parent <- models[[k - 1]]
     trials <- candidates[candidates$from == parent$name, ]
     row <- trials[trials$mechanism == model$mechanism, ]
-    new <- setdiff(names(model$fit$emulator$parameters), names(parent$fit$emulator$parameters))
+    new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
     gain <- held_out_gain(parent, model)
     no_gain <- isFALSE(gain$improves)
     doubts <- c(
@@ -21,14 +21,16 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (row$probability < 0.95) "other causes are possible",
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (no_gain) "data held out do not gain by it",
-      if (model$scores$calibrate[["rmse"]] > risen_error * parent$scores$calibrate[["rmse"]])
-        "the error in calibration rose with it",
+      risen_words(parent, model),
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
         "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
       if (remains) "a good part of the error remains",
       if (k == 2 && drift_rivals(models, control, threads)) "a drifting sensor would explain the error as well")
     models[[k]]$held_out_gain <- gain
+    for (name in names(model$records)) {
+      models[[k]]$records[[name]]$held_out_gain <- held_out_gain(record_model(parent, name), record_model(model, name))
+    }
     models[[k]]$confounded_with <- confounded_parameters(model$fit, new)
     models[[k]]$doubts <- doubts
     models[[k]]$verdict <- if (no_gain) "stand-in" else if (length(doubts)) "likely" else "named"
@@ -36,18 +38,29 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
   models
 }
 
+# Where the simulation's error in calibration rose, in words: over all, or in some of several records.
+risen_words <- function(parent, model) {
+  rises <- function(parent, model) {
+    model$scores$calibrate[["rmse"]] > risen_error * parent$scores$calibrate[["rmse"]]
+  }
+  if (rises(parent, model)) return("the error in calibration rose with it")
+  where <- Filter(function(name) rises(parent$records[[name]], model$records[[name]]), names(model$records))
+  if (length(where)) paste("the error in calibration rose with it in", listed(where))
+}
+
 # By how much the mean square of the error held out falls, and its standard error, from sums over days (or eighths of
-# a short record): errors within a day hang together.
+# a short record): errors within a day hang together, those of several records too. Of several the error is in units of
+# each one's noise.
 held_out_gain <- function(parent, model) {
   before <- parent$prediction[parent$prediction$use == "validate", ]
   after <- model$prediction[model$prediction$use == "validate", ]
   if (!nrow(before)) return(list(mean = NA_real_, standard_error = NA_real_, improves = NA))
   fall <- (before$observed - before$mean)^2 - (after$observed - after$mean)^2
   n <- length(fall)
-  measurements <- model$fit$measurements
-  hours <- measurements$hours[used_rows(measurements, "validate")]
-  block <- floor((hours - hours[1]) / 24)
-  if (length(unique(block)) < 8) block <- floor(8 * (seq_len(n) - 1) / n)
+  predicted <- Filter(function(fit) "validate" %in% predictable(fit), record_fits(model$fit))
+  hours <- lapply(predicted, function(fit) fit$measurements$hours[used_rows(fit$measurements, "validate")])
+  block <- floor((unlist(hours) - min(unlist(hours))) / 24)
+  if (length(unique(block)) < 8) block <- unlist(lapply(lengths(hours), function(n) floor(8 * (seq_len(n) - 1) / n)))
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)

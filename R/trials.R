@@ -1,0 +1,120 @@
+# The mechanisms of a catalogue tried as extensions of the present model: by the responses that they show, by a coarse
+# calibration and, those that could lead, in full.
+
+# Mechanisms driven by what the attribution names come first.
+trial_order <- function(catalogue, attribution) {
+  table <- attribution$table
+  weight <- vapply(catalogue, function(m) {
+    lost <- table$log10_bf_dropped[table$boundary %in% m$boundary & table$significant]
+    if (length(lost)) max(lost) else 0
+  }, 0)
+  names(catalogue)[order(-weight)]
+}
+
+# Every mechanism as an extension of the current model: fits of those worth one, and the table of all Bayes factors.
+try_mechanisms <- function(current, catalogue, settings, say) {
+  trials <- lapply(catalogue, extended_model, model_of(current$fit), settings)
+  if (is.null(settings$control$screening)) return(tried_in_full(current, trials, NULL, settings, say))
+  responses <- staged("responses of the mechanisms", seen_responses(current, trials, settings))
+  if (!is.null(responses)) say("  {sum(responses$runs)} runs show in which order mechanisms are tried")
+  screens <- screened_mechanisms(current, trials, responses, settings, say)
+  tried_in_full(current, trials, screens, settings, say, responses)
+}
+
+# Of several records the simulator of each in turn; what was adopted may act on some of them only.
+extended_model <- function(mechanism, model, settings) {
+  if (is.object(model)) return(extend(model, mechanism, settings$adopted, settings$record))
+  extended <- Map(function(simulator, record) {
+    extend(simulator, mechanism, intersect(settings$adopted, names(free_parameters(simulator))), record)
+  }, model, names(model))
+  check_one_prior(lapply(extended, free_parameters))
+  extended
+}
+
+trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
+
+# Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined
+# no further. A budget leaves out the last.
+screened_mechanisms <- function(current, trials, responses, settings, say) {
+  coarse <- as_coarse(current$fit)
+  screens <- list()
+  ordered <- if (is.null(responses)) names(trials) else names(trials)[order(-responses$log10_bf, na.last = FALSE)]
+  turn <- turns("mechanism", length(ordered))
+  for (name in ordered) {
+    fits <- lapply(screens, `[[`, "fit")
+    if (length(fits) && settings$spent()) break
+    screens[[name]] <- staged(turn(name), naming_mechanism(name, screen_model(
+      trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
+    report_candidate(name, screens[[name]]$fit, coarse, say)
+  }
+  screens
+}
+
+# list(fits, table, current) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by
+# its full calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be
+# adopted, or the present model if it stays, is settled, and must lead after that too.
+tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
+  fits <- lapply(screens, `[[`, "fit")
+  full <- list()
+  settled <- character()
+  repeat {
+    left <- if (is.null(screens)) setdiff(names(trials), names(full))
+            else contenders(fits, current$fit, names(full), settings$control)
+    if (length(left)) {
+      turn <- turns("mechanism in full", length(left))
+      for (name in left) {
+        full[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
+          trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
+        fits[[name]] <- full[[name]]$fit
+        report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
+      }
+      next
+    }
+    table <- trial_table(fits, current$fit, current$name, names(full), responses)
+    best <- best_trial(table)
+    if (may_be_adopted(best, current$fit, settings$control)) {
+      name <- best$mechanism
+      if (name %in% settled) break
+      fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name),
+                                                                      settings)))
+      settled <- c(settled, name)
+    } else {
+      if (is.null(current$full)) break
+      current <- settled_model(current, settings)
+    }
+  }
+  list(fits = fits, table = table, current = current)
+}
+
+naming_mechanism <- function(name, code) {
+  rlang::try_fetch(code, amiss_error = function(e) {
+    rlang::abort(paste0("Mechanism \"", name, "\" could not be tried."), parent = e,
+                 class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
+  })
+}
+
+# What the mechanisms could explain (response_factors()), a row for each; NULL where runs are given and none can be
+# made.
+seen_responses <- function(current, trials, settings) {
+  if (is_given(trials[[1]])) return(NULL)
+  settings$keep(list("responses", current$name, lapply(trials, plain)),
+                response_factors(current$fit, trials, settings$threads))
+}
+
+# Whether a candidate lies so far behind the best before it, or behind what adoption asks for, that no refinement is
+# worth its runs: where runs have confirmed it, if it is no contender (uncertainty()); where its check still finds it
+# too coarse, if `far` decades and three standard errors would not be enough.
+hopeless <- function(fits, reference, control, far = 3) {
+  needed <- max(reference$log_evidence + control$decisive * log(10), vapply(fits, `[[`, 0, "log_evidence"))
+  function(fit) {
+    above <- if (isTRUE(fit$check$passed)) uncertainty(fit, reference, control)
+             else 3 * fit$standard_error / log(10) + far
+    fit$check$ratio <= 1 && fit$log_evidence + above * log(10) < needed
+  }
+}
+
+report_candidate <- function(what, fit, reference, say) {
+  bf <- bayes_factor(fit, reference)
+  say(
+    "  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
+}
