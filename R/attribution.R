@@ -13,9 +13,9 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' as stationary over the record, in mean, variance and autocorrelation. Of a condition that only rises or falls no
 #' shift is alike; nothing checks that.
 #'
-#' *What it does not see.* Responses are linear in each condition's history: an effect that is a product of two conditions
-#' shows only as far as one of them tells of it. A mechanism that holds such a product is judged by its own runs
-#' ([upgrade_model()]), and can be found where no condition is significant.
+#' *What it does not see.* Responses are linear in each condition's history: an effect that is a product of two
+#' conditions shows only as far as one of them tells of it. A mechanism that holds such a product is judged by its own
+#' runs ([upgrade_model()]), and can be found where no condition is significant.
 #'
 #' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those
 #' that can be dropped alone a set is sought that cannot be dropped together, nor be made smaller. Such a group is

@@ -144,7 +144,8 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
       break
     }
     if (length(models) > control$max_steps) {
-      stopped <- sprintf("the limit of %d step%s was reached", control$max_steps, if (control$max_steps == 1) "" else "s")
+      stopped <- sprintf("the limit of %d step%s was reached", control$max_steps,
+                         if (control$max_steps == 1) "" else "s")
       break
     }
     ordered <- trial_order(catalogue[left], current$attribution)
