@@ -20,6 +20,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (describes(catalogue[[model$mechanism]])) "it describes what is missing and does not explain it",
       if (row$probability < 0.95) "other causes are possible",
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
+      if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))

@@ -42,6 +42,10 @@ test_that("each doubt makes a mechanism likely", {
       u
     })
   }
+  expect_doubt("the evidence is not known", function(u) {
+    u$candidates$lower95 <- -290
+    u
+  })
   expect_doubt("the error in calibration rose with it", function(u) {
     u$models[[2]]$scores$calibrate[["rmse"]] <- 1.03 * u$models[[1]]$scores$calibrate[["rmse"]]
     u
