@@ -19,7 +19,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #'
 #' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those
 #' that can be dropped alone a set is sought that cannot be dropped together, nor be made smaller. Such a group is
-#' tested like a condition, and its members are named together: what they say cannot be told apart in this record.
+#' tested like a condition, and its members are named together: what they say cannot be told apart in this record. Of
+#' several records a group of one of them is dropped from all: another record may tell its members apart.
 #'
 #' *Share.* A set of conditions takes a part of the misfit away, its sum of squares weighed by the covariance of error
 #' and simulator. The share of a condition is its Shapley value: what it adds to those before it, averaged over all
@@ -87,6 +88,17 @@ attribute_record <- function(fits, which, control, seed, threads) {
          significant = significant[k],
          correlation = largest_correlation(fit, members))
   })
+  table <- with_groups(table, groups)
+  table <- table[order(-table$log10_bf_dropped, -table$share), ]
+  rownames(table) <- NULL
+  structure(list(format_version = format_version, table = table, groups = groups,
+                 surrogates = nrow(result$null_statistics),
+                 statistic = result$statistic, null_statistics = result$null_statistics,
+                 control = control, seed = seed), class = "amiss_attribution")
+}
+
+# The members of a group are told as what the group is.
+with_groups <- function(table, groups) {
   for (group in groups) {
     members <- table$boundary %in% group$conditions
     table$group[members] <- listed(group$conditions, "or")
@@ -94,12 +106,7 @@ attribute_record <- function(fits, which, control, seed, threads) {
     table$log10_bf_dropped[members] <- pmax(table$log10_bf_dropped[members], group$log10_bf_dropped)
     table$p_value[members] <- group$p_value
   }
-  table <- table[order(-table$log10_bf_dropped, -table$share), ]
-  rownames(table) <- NULL
-  structure(list(format_version = format_version, table = table, groups = groups,
-                 surrogates = nrow(result$null_statistics),
-                 statistic = result$statistic, null_statistics = result$null_statistics,
-                 control = control, seed = seed), class = "amiss_attribution")
+  table
 }
 
 # A posterior of calibrate_sets() as the engine takes it.

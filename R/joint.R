@@ -272,7 +272,7 @@ predict.amiss_joint <- function(object, newdata = NULL, ...) {
 #' @export
 calibrated_record.amiss_joint <- function(fit) lapply(fit$records, calibrated_record)
 
-# Which conditions drive the discrepancies: of each record, and the same condition in all that have it.
+# Which conditions drive the discrepancies: of each record, and the same conditions in all that have them.
 #' @export
 attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, threads = 1) {
   seed <- pick_seed(seed)
@@ -281,35 +281,48 @@ attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, 
   each <- lapply(stats::setNames(seq_along(fits), names(fits)), function(which) {
     staged(names(fits)[which], attribute_record(unname(fits), which, control, seed, threads))
   })
-  structure(list(format_version = format_version, records = each,
-                 table = together_table(fits, each, control, seed, threads),
-                 groups = do.call(c, unname(lapply(each, `[[`, "groups"))), seed = seed),
+  together <- attributed_together(fits, each, control, seed, threads)
+  structure(c(list(format_version = format_version, records = each), together, list(seed = seed)),
             class = "amiss_joint_attribution")
 }
 
-# One row for each condition that any record has: the evidence lost if it is dropped from all discrepancies, and the
-# least p-value among the records, times their number (Bonferroni).
-together_table <- function(fits, each, control, seed, threads) {
+# list(table, groups): a row for each condition that any record has, with the evidence lost if it is dropped from all
+# discrepancies, and the least p-value among the records, times their number (Bonferroni); and the same of groups that
+# some record cannot tell apart, where the records together cannot either.
+attributed_together <- function(fits, each, control, seed, threads) {
   records <- engine_records(fits)
   draws <- engine_draws(fits)
   filled <- fill_attribution_control(control, fits[[1]]$control$ais, length(fits[[1]]$measurements$conditions))
-  conditions <- unique(unlist(lapply(fits, function(fit) fit$measurements$conditions)))
-  rows <- lapply(conditions, function(condition) {
-    at <- lapply(unname(fits), function(fit) which(fit$measurements$conditions == condition) - 1L)
+  # `own`: of each record that has them, its row or group of the same conditions.
+  dropped_from_all <- function(conditions, own) {
+    at <- lapply(unname(fits), function(fit) which(fit$measurements$conditions %in% conditions) - 1L)
     dropped <- staged("attributing the discrepancies together", call_engine(
       drop_conditions_(records, draws, at, filled$ais, engine_context(seed, threads))))
-    own <- lapply(each, function(a) a$table[a$table$boundary == condition, ])
-    p <- min(1, sum(lengths(at) > 0) * min(vapply(own, function(row) min(row$p_value, 1), 0)))
-    significant <- dropped$lost / log(10) >= filled$least_log10_bf && p <= filled$level
-    data.frame(boundary = condition, log10_bf_dropped = dropped$lost / log(10),
-               standard_error = dropped$standard_error / log(10), p_value = p, significant = significant,
-               trusted = dropped$trusted, group = NA_character_,
-               records = paste(names(Filter(function(row) any(row$significant), own)), collapse = ", "))
+    p <- min(1, sum(lengths(at) > 0) * min(1, vapply(own, `[[`, 0, "p_value")))
+    list(log10_bf_dropped = dropped$lost / log(10), standard_error = dropped$standard_error / log(10), p_value = p,
+         significant = dropped$lost / log(10) >= filled$least_log10_bf && p <= filled$level,
+         trusted = dropped$trusted)
+  }
+  conditions <- unique(unlist(lapply(fits, function(fit) fit$measurements$conditions)))
+  rows <- lapply(conditions, function(condition) {
+    own <- Filter(nrow, lapply(each, function(a) a$table[a$table$boundary == condition, ]))
+    data.frame(boundary = condition, dropped_from_all(condition, own), group = NA_character_,
+               records = paste(names(Filter(function(row) row$significant, own)), collapse = ", "))
   })
   table <- do.call(rbind, rows)
+  seen <- do.call(c, unname(lapply(each, `[[`, "groups")))
+  groups <- lapply(unique(lapply(seen, `[[`, "conditions")), function(conditions) {
+    own <- Filter(function(group) identical(group$conditions, conditions), seen)
+    c(list(conditions = conditions), dropped_from_all(conditions, own),
+      list(correlation = min(vapply(own, `[[`, 0, "correlation"))))
+  })
+  # A member that earns its evidence by itself is known apart.
+  alone <- table$boundary[table$log10_bf_dropped >= filled$least_log10_bf]
+  groups <- Filter(function(group) group$significant && !any(group$conditions %in% alone), groups)
+  table <- with_groups(table, groups)
   table <- table[order(-table$log10_bf_dropped), ]
   rownames(table) <- NULL
-  table
+  list(table = table, groups = groups)
 }
 
 #' @export
@@ -321,6 +334,8 @@ print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
     cli::cli_bullets(c("*" = if (length(named)) "{name}: driven by {.field {named}}"
                              else "{name}: no boundary condition is significant"))
   }
+  said <- group_words(x)
+  cli::cli_bullets(stats::setNames(said, rep("!", length(said))))
 })
 
 #' @export

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "ais_helpers.hpp"
 
 namespace amiss {

@@ -1,19 +1,16 @@
 #pragma once
-#include <algorithm>
-#include <cmath>
 #include <functional>
 #include <limits>
-#include <random>
+#include <utility>
 #include <vector>
 
-#include "engine/ais/StandardNormal.hpp"
 #include "engine/ais/Target.hpp"
 #include "engine/error/ErrorModel.hpp"
 #include "engine/linalg/Eigen.hpp"
 #include "engine/linalg/constants.hpp"
-#include "engine/linalg/log_sum_exp.hpp"
 
-/// Independent, dense and slow computations that the tests compare the engine with.
+/// Independent, dense and slow computations that the tests compare the engine with. In a file of their own,
+/// as the compiler takes seconds for what they need of Eigen.
 namespace amiss::test {
 
 using Eigen::Index;
@@ -23,89 +20,29 @@ using Eigen::VectorXd;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Standard normal numbers that do not come from the engine's own streams.
-inline MatrixXd normal_matrix(Index rows, Index columns, unsigned seed) {
-  std::mt19937_64 engine(seed);
-  std::normal_distribution<double> normal;
-  return MatrixXd::NullaryExpr(rows, columns, [&] { return normal(engine); });
-}
+MatrixXd normal_matrix(Index rows, Index columns, unsigned seed);
 
-inline VectorXd normal_vector(Index n, unsigned seed) { return normal_matrix(n, 1, seed); }
+VectorXd normal_vector(Index n, unsigned seed);
 
-inline MatrixXd uniform_matrix(Index rows, Index columns, unsigned seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<double> uniform;
-  return MatrixXd::NullaryExpr(rows, columns, [&] { return uniform(engine); });
-}
+MatrixXd uniform_matrix(Index rows, Index columns, unsigned seed);
 
 /// log N(y; mean, covariance) by a dense eigen-decomposition.
-inline double log_normal_density(const VectorXd& y, const VectorXd& mean, const MatrixXd& covariance) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
-  const VectorXd z = eigen.eigenvectors().transpose() * (y - mean);
-  return -0.5 * (static_cast<double>(y.size()) * kLogTwoPi + eigen.eigenvalues().array().log().sum() +
-                 (z.array().square() / eigen.eigenvalues().array()).sum());
-}
+double log_normal_density(const VectorXd& y, const VectorXd& mean, const MatrixXd& covariance);
 
 /// Covariance of the error with sigma = 1, from its definition; independent across segments.
-inline MatrixXd error_covariance(const TimeAxis& axis, const VectorXd& correlation_times,
-                                 const VectorXd& ratios) {
-  const Index n = axis.size();
-  std::vector<int> segment(static_cast<std::size_t>(n));
-  int current = 0;
-  for (Index i = 0; i < n; ++i) segment[i] = current += axis.new_segment[i] ? 1 : 0;
-  MatrixXd c = MatrixXd::Identity(n, n);
-  for (Index i = 0; i < n; ++i) {
-    for (Index j = 0; j < n; ++j) {
-      if (segment[i] != segment[j]) continue;
-      for (Index k = 0; k < ratios.size(); ++k) {
-        c(i, j) += ratios[k] * std::exp(-std::abs(axis.time[i] - axis.time[j]) / correlation_times[k]);
-      }
-    }
-  }
-  return c;
-}
+MatrixXd error_covariance(const TimeAxis& axis, const VectorXd& correlation_times, const VectorXd& ratios);
 
 /// n values at unequal steps between 0.2 and 1.2, broken at `breaks`; time restarts at a break.
-inline TimeAxis uneven_axis(Index n, const std::vector<Index>& breaks, unsigned seed = 4) {
-  TimeAxis axis{VectorXd(n), std::vector<bool>(static_cast<std::size_t>(n), false)};
-  const VectorXd steps = (uniform_matrix(n, 1, seed).array() + 0.2).matrix();
-  axis.new_segment[0] = true;
-  for (Index b : breaks) axis.new_segment[static_cast<std::size_t>(b)] = true;
-  for (Index i = 0; i < n; ++i) axis.time[i] = axis.new_segment[i] ? 0.0 : axis.time[i - 1] + steps[i];
-  return axis;
-}
+TimeAxis uneven_axis(Index n, const std::vector<Index>& breaks, unsigned seed = 4);
 
-inline TimeAxis even_axis(Index n) {
-  TimeAxis axis{VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1)),
-                std::vector<bool>(static_cast<std::size_t>(n), false)};
-  axis.new_segment[0] = true;
-  return axis;
-}
+TimeAxis even_axis(Index n);
 
 /// Derivative of f at x by central differences.
-inline VectorXd numerical_gradient(const std::function<double(const VectorXd&)>& f, const VectorXd& x,
-                                   double h = 1e-5) {
-  VectorXd gradient(x.size());
-  for (Index i = 0; i < x.size(); ++i) {
-    VectorXd up = x, down = x;
-    up[i] += h;
-    down[i] -= h;
-    gradient[i] = (f(up) - f(down)) / (2 * h);
-  }
-  return gradient;
-}
+VectorXd numerical_gradient(const std::function<double(const VectorXd&)>& f, const VectorXd& x,
+                            double h = 1e-5);
 
 /// Largest distance between the empirical distribution of a sample and `cdf`.
-inline double kolmogorov_distance(std::vector<double> sample, const std::function<double(double)>& cdf) {
-  std::sort(sample.begin(), sample.end());
-  const double n = static_cast<double>(sample.size());
-  double distance = 0.0;
-  for (std::size_t i = 0; i < sample.size(); ++i) {
-    const double p = cdf(sample[i]);
-    distance = std::max(
-        {distance, std::abs(p - static_cast<double>(i) / n), std::abs(p - static_cast<double>(i + 1) / n)});
-  }
-  return distance;
-}
+double kolmogorov_distance(std::vector<double> sample, const std::function<double(double)>& cdf);
 
 /// A target given by a function of one point.
 class FunctionTarget : public Target {
@@ -113,11 +50,7 @@ class FunctionTarget : public Target {
   FunctionTarget(Index dimension, std::function<double(const VectorXd&)> f)
       : dimension_(dimension), f_(std::move(f)) {}
   Index dimension() const override { return dimension_; }
-  VectorXd log_likelihood(const MatrixXd& x) const override {
-    VectorXd values(x.cols());
-    for (Index i = 0; i < x.cols(); ++i) values[i] = f_(x.col(i));
-    return values;
-  }
+  VectorXd log_likelihood(const MatrixXd& x) const override;
 
  private:
   Index dimension_;
@@ -126,16 +59,6 @@ class FunctionTarget : public Target {
 
 /// Log evidence of a target of two coordinates: trapezoidal rule over prior times likelihood, accurate to
 /// rounding for a smooth integrand.
-inline double evidence_by_quadrature(const Target& target) {
-  const int m = 400;
-  const double h = 16.0 / m;
-  VectorXd log_terms((m + 1) * (m + 1));
-  MatrixXd row(2, m + 1);
-  for (int i = 0; i <= m; ++i) {
-    for (int j = 0; j <= m; ++j) row.col(j) = Eigen::Vector2d(-8 + h * i, -8 + h * j);
-    log_terms.segment(i * (m + 1), m + 1) = target.log_likelihood(row) + StandardNormal::at(row);
-  }
-  return log_sum_exp(log_terms) + 2.0 * std::log(h);
-}
+double evidence_by_quadrature(const Target& target);
 
 }  // namespace amiss::test

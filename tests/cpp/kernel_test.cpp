@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <random>
 
 #include "engine/ais/Sampler.hpp"
 #include "engine/discrepancy/KernelSampling.hpp"

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "engine/linalg/triangular.hpp"
 #include "helpers.hpp"
 

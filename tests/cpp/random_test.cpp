@@ -2,6 +2,7 @@
 
 #include <boost/math/distributions/gamma.hpp>
 #include <boost/math/distributions/normal.hpp>
+#include <cmath>
 #include <set>
 
 #include "engine/random/Stream.hpp"
