@@ -299,6 +299,20 @@ check_enough_runs <- function(runs, parameters, of = runs, call = rlang::caller_
   }
 }
 
+# How far a simulator can move under the priors, of which the reach of its discrepancy is a matter, is measured by the
+# runs that fill their space: with fewer than these for each parameter, evidences were decades off
+# (`vignette("measured")`, What a verdict costs in runs).
+runs_per_parameter <- 5
+
+few_runs <- function(runs, parameters) runs < runs_per_parameter * parameters
+
+warn_few_runs <- function(runs, parameters) {
+  if (!few_runs(runs, parameters)) return(invisible())
+  warn_result(c(paste("{runs} runs fill the space of {parameters} parameter{?s}, fewer than {runs_per_parameter} for",
+                      "each: evidences may be decades off, as they say too little of how far the simulator can move."),
+                i = "Ten times the number of parameters is a good start."), class = "amiss_warning_runs")
+}
+
 unit_to_values <- function(unit, parameters) {
   values <- vapply(seq_along(parameters), function(p) prior_quantile(parameters[[p]]$prior, unit[, p]),
                    numeric(nrow(unit)))

@@ -44,7 +44,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' @param simulator The base model: a simulator, or an [ensemble()] of given runs; of several records a named list.
 #' @param measurements The [measurements()]; of several records a list with the same names.
 #' @param catalogue A [catalogue()] of mechanisms.
-#' @param runs Runs of the simulator for each model that is calibrated in full.
+#' @param runs Runs of the simulator for each model that is calibrated in full; two thirds of them fill the space of its
+#'   parameters (`refine`), ten or more for each.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies;
 #'   1/3, 0 for none), `rounds` (of refinement of a model where the check by runs asks for it; 8), `decisive` (log10
 #'   Bayes factor that a mechanism must earn, with its interval above zero; 2), `runs_total` (budget: once so many runs
@@ -106,7 +107,9 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   for (m in each_record(measurements)) check_runs_asked(runs, m, control$rounds, control$refine)
   if (!is_given(simulator)) {
     parameters <- unique(unlist(lapply(in_list(simulator), function(s) names(free_parameters(s)))))
-    check_enough_runs(runs - round(control$refine * runs), length(parameters), of = runs)
+    first <- runs - round(control$refine * runs)
+    check_enough_runs(first, length(parameters), of = runs)
+    warn_few_runs(first, length(parameters))
   }
   seed <- pick_seed(seed)
   threads <- check_threads(threads)

@@ -20,6 +20,8 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (describes(catalogue[[model$mechanism]])) "it describes what is missing and does not explain it",
       if (row$probability < 0.95) "other causes are possible",
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
+      if (row$lower95 < control$decisive + few_runs_error && from_few_runs(model$fit))
+        "the runs over the priors are too few for evidence of that size",
       if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),
@@ -37,6 +39,14 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     models[[k]]$verdict <- if (no_gain) "stand-in" else if (length(doubts)) "likely" else "named"
   }
   models
+}
+
+few_runs_error <- 3  # decades by which evidence was off with too few runs
+
+# Whether the runs that fill the space of a model's parameters are few_runs(), of one record at least.
+from_few_runs <- function(fit) {
+  few <- function(fit) few_runs(nrow(emulator_over_priors(fit$emulator)$unit), length(fit$emulator$parameters))
+  any(vapply(record_fits(fit), few, NA))
 }
 
 # Where the simulation's error in calibration rose, in words: over all, or in some of several records.

@@ -219,9 +219,10 @@ test_that("coarse calibrations are corrected by a few runs", {
 test_that("models with a poor design are refined where the check fails, as often as the control allows", {
   m <- bent_measurements()
   loop <- function(rounds) {
-    upgrade_model(bent_simulator(), m, catalogue(), runs = 6, seed = 1, quiet = TRUE,
-                  control = list(rounds = rounds, refine = 0, screening = NULL, calibration = quick_ais,
-                                 attribution = list(surrogates = 19)))
+    suppressWarnings(classes = "amiss_warning_runs", upgrade_model(
+      bent_simulator(), m, catalogue(), runs = 6, seed = 1, quiet = TRUE,
+      control = list(rounds = rounds, refine = 0, screening = NULL, calibration = quick_ais,
+                     attribution = list(surrogates = 19))))
   }
   refined <- loop(2)
   expect_gte(refined$models[[1]]$fit$rounds, 1L)
@@ -326,4 +327,17 @@ test_that("why the loop stops is told: nothing decisive, or evidence too uncerta
                "no mechanism lowers the error decisively \\(b has a log10 Bayes factor of 3.0, but raises it\\)")
   table$error_ratio[1] <- 2
   expect_equal(nrow(amiss:::best_trial(table)), 0)
+})
+
+test_that("runs that are too few to say how far the simulator can move are told", {
+  table <- linear_data(60)
+  m <- linear_measurements(table, calibrate = table$hour <= 42, validate = table$hour > 42)
+  base <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+                             free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
+  loop <- function(runs) {
+    upgrade_model(base, m, catalogue(), runs = runs, seed = 1, quiet = TRUE,
+                  control = list(calibration = quick_ais, attribution = list(surrogates = 19)))
+  }
+  expect_warning(loop(12), "8 runs fill the space of 2 parameters", class = "amiss_warning_runs")
+  expect_no_warning(loop(15), class = "amiss_warning_runs")
 })

@@ -15,8 +15,8 @@ judged <- function(change = function(upgrade) upgrade) {
   rejudged(change(small_upgrade()))$models[[2]][c("verdict", "doubts")]
 }
 
-expect_doubt <- function(pattern, change, verdict = "likely") {
-  own <- judged(change)
+expect_doubt <- function(pattern, change, verdict = "likely", ...) {
+  own <- judged(function(upgrade) change(upgrade, ...))
   expect_identical(own$verdict, verdict)
   expect_length(own$doubts, 1)
   expect_match(own$doubts, pattern)
@@ -42,6 +42,15 @@ test_that("each doubt makes a mechanism likely", {
       u
     })
   }
+  few <- function(u, lower95) {
+    emulator <- amiss:::emulator_over_priors(u$models[[2]]$fit$emulator)
+    emulator$unit <- emulator$unit[1:14, ]
+    u$models[[2]]$fit$emulator <- emulator
+    u$candidates$lower95 <- lower95
+    u
+  }
+  expect_doubt("runs over the priors are too few", few, lower95 = 4.9)
+  expect_identical(judged(function(u) few(u, 5.1))$verdict, "named")
   expect_doubt("the evidence is not known", function(u) {
     u$candidates$lower95 <- -290
     u
