@@ -75,7 +75,7 @@ extend <- function(simulator, mechanism, adopted = character(), record = NULL, c
   of_record <- if (knows_record(edit)) function(simulator) edit(simulator, record) else edit
   extended <- tryCatch(if (is.function(edit)) edited(simulator, of_record) else edit, error = function(e) {
     abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"),
-                call = call)
+                class = "amiss_error_edit", call = call)
   })
   if (!inherits(extended, class(simulator)[1])) {
     abort_input(c(paste("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not",
@@ -100,6 +100,20 @@ extend <- function(simulator, mechanism, adopted = character(), record = NULL, c
 # Given runs cannot be extended: those that lack what was adopted can no longer be tried.
 applies <- function(mechanism, adopted) {
   is.function(mechanism$edit) || all(adopted %in% names(free_parameters(mechanism$edit)))
+}
+
+# Whether an edit can be made on top of what has been adopted. One that could be made on the base model, as it was tried
+# there, may not be: then the loop goes on without it.
+can_extend <- function(mechanism, model, settings) {
+  if (!length(settings$adopted)) return(TRUE)
+  tryCatch({
+    extended_model(mechanism, model, settings)
+    TRUE
+  }, amiss_error_edit = function(e) {
+    warn_result(c("Mechanism {.val {mechanism$name}} is left out: it cannot be applied on top of what was adopted.",
+                  x = "{conditionMessage(e)}"), class = "amiss_warning_edit")
+    FALSE
+  })
 }
 
 # A mechanism whose driver is not analysed can be adopted, but no condition can speak for it.

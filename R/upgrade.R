@@ -151,6 +151,11 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
                          if (control$max_steps == 1) "" else "s")
       break
     }
+    left <- left[vapply(catalogue[left], can_extend, NA, model_of(current$fit), settings)]
+    if (!length(left)) {
+      stopped <- "no mechanism that is left can be applied on top of what has been adopted"
+      break
+    }
     ordered <- trial_order(catalogue[left], current$attribution)
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)

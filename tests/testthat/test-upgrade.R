@@ -341,3 +341,28 @@ test_that("runs that are too few to say how far the simulator can move are told"
   expect_warning(loop(12), "8 runs fill the space of 2 parameters", class = "amiss_warning_runs")
   expect_no_warning(loop(15), class = "amiss_warning_runs")
 })
+
+test_that("a mechanism that cannot be made on top of what was adopted is left out, and told", {
+  table <- linear_data(60)
+  table$Ti <- table$Ti + 0.01 * table$Gv
+  m <- linear_measurements(table, calibrate = table$hour <= 42, validate = table$hour > 42)
+  base <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+                             free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
+  sunny <- function(model) {
+    with_parameters(model, free("s", uniform(0, 0.02)), boundary = "Gv",
+                    f = function(values, drivers, base) base(values) + values[["s"]] * drivers[, "Gv"])
+  }
+  sun <- mechanism("sun", sunny, "Gv", "Sun enters.")
+  again <- mechanism("sun again", function(model) {
+    if ("s" %in% names(free_parameters(model))) stop("there is a sun")
+    with_parameters(model, free("r", uniform(0, 1e-6)), boundary = "Gv",
+                    f = function(values, drivers, base) base(values) + values[["r"]] * drivers[, "Gv"])
+  }, "Gv", "A little sun enters.")
+  expect_warning(upgrade <- upgrade_model(base, m, catalogue(sun, again), runs = 20, seed = 1, quiet = TRUE,
+                                          control = list(calibration = quick_ais,
+                                                         attribution = list(surrogates = 19))),
+                 "\"sun again\" is left out", class = "amiss_warning_edit")
+  expect_equal(upgrade$models[[2]]$mechanism, "sun")
+  expect_match(upgrade$stopped_because, "can be applied on top")
+  expect_setequal(upgrade$candidates$mechanism, c("sun", "sun again"))
+})
