@@ -2,7 +2,8 @@
 # interpolated in the caller's frame.
 
 abort_input <- function(message, class = character(), call = rlang::caller_env(), .envir = parent.frame()) {
-  cli::cli_abort(message, class = c(class, "amiss_error_input", "amiss_error"), call = short_call(call), .envir = .envir)
+  cli::cli_abort(message, class = c(class, "amiss_error_input", "amiss_error"), call = short_call(call),
+                 .envir = .envir)
 }
 
 abort_numerical <- function(message, call = rlang::caller_env(), .envir = parent.frame()) {

@@ -218,7 +218,8 @@ test_that("what is hidden in worlds of each family is found, and nothing else is
     fixed <- list(w$family, w$seed, kind = w$kind, strength = w$strength, days = w$days)
     if (!is.na(w$structure)) fixed$structure <- w$structure
     control <- list(max_steps = 1, calibration = list(ais = list(precision = 0.3)))
-    scope$score_world(do.call(scope$family_world, fixed), control, runs = 80, rivals = FALSE)
+    scope$score_world(do.call(scope$family_world, fixed), control, runs = 80, rivals = FALSE,
+                      least_squares = FALSE)
   }, mc.cores = 2, mc.preschedule = FALSE)
   failed <- vapply(rows, inherits, NA, "try-error")
   expect_false(any(failed), info = paste(unlist(rows[failed]), collapse = "; "))

@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kSmallestTail = 1e-15;  // of Phi; keeps logarithms finite
-constexpr Index kBlock = 96;             // columns of the covariance built at once
+constexpr Index kColumnsAtOnce = 96;     // columns of the covariance built at once
 
 double tail(double x) { return std::max(normal_cdf(x), kSmallestTail); }
 
@@ -212,8 +212,8 @@ bool KernelModel::factorise(const KernelParameters& p, Memory& work) const {
   right.col(c).setOnes();
   right.col(c + 1) = left.col(c).array() + std::log(ratio);
   work.b.resize(n, n);
-  for (Index j = 0; j < n; j += kBlock) {
-    const Index width = std::min(kBlock, n - j);
+  for (Index j = 0; j < n; j += kColumnsAtOnce) {
+    const Index width = std::min(kColumnsAtOnce, n - j);
     auto block = work.b.block(j, j, n - j, width);
     block.noalias() = left.bottomRows(n - j) * right.middleRows(j, width).transpose();
     block.array() = block.array().exp();
