@@ -1,7 +1,7 @@
 # Classed conditions. A message says what was wrong, where, the value seen and what to do; cli markup is
 # interpolated in the caller's frame.
 
-abort_input <- function(message, class = character(), call = rlang::caller_env(), .envir = parent.frame()) {
+abort_input <- function(message, call = rlang::caller_env(), class = character(), .envir = parent.frame()) {
   cli::cli_abort(message, class = c(class, "amiss_error_input", "amiss_error"), call = short_call(call),
                  .envir = .envir)
 }
