@@ -102,20 +102,6 @@ applies <- function(mechanism, adopted) {
   is.function(mechanism$edit) || all(adopted %in% names(free_parameters(mechanism$edit)))
 }
 
-# Whether an edit can be made on top of what has been adopted. One that could be made on the base model, as it was tried
-# there, may not be: then the loop goes on without it.
-can_extend <- function(mechanism, model, settings) {
-  if (!length(settings$adopted)) return(TRUE)
-  tryCatch({
-    extended_model(mechanism, model, settings)
-    TRUE
-  }, amiss_error_edit = function(e) {
-    warn_result(c("Mechanism {.val {mechanism$name}} is left out: it cannot be applied on top of what was adopted.",
-                  x = "{conditionMessage(e)}"), class = "amiss_warning_edit")
-    FALSE
-  })
-}
-
 # A mechanism whose driver is not analysed can be adopted, but no condition can speak for it.
 warn_absent_drivers <- function(catalogue, measurements) {
   for (entry in catalogue) {

@@ -31,6 +31,20 @@ extended_model <- function(mechanism, model, settings) {
   extended
 }
 
+# Whether an edit can be made on top of what has been adopted. One that could be made on the base model, as it was tried
+# there, may not be: then the loop goes on without it.
+can_extend <- function(mechanism, model, settings) {
+  if (!length(settings$adopted)) return(TRUE)
+  tryCatch({
+    extended_model(mechanism, model, settings)
+    TRUE
+  }, amiss_error_edit = function(e) {
+    warn_result(c("Mechanism {.val {mechanism$name}} is left out: it cannot be applied on top of what was adopted.",
+                  x = "{conditionMessage(e)}"), class = "amiss_warning_edit")
+    FALSE
+  })
+}
+
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
 
 # Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined
