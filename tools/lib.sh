@@ -14,7 +14,8 @@ fail() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
 # processor, or, where AMISS_NATIVE is set and empty, as R CMD INSTALL alone does; with "portable" into
 # build/portable/library as R CMD INSTALL alone does; with "blas" into build/blas/library, for this processor and with
 # R's BLAS. Does nothing where the same files are installed already. Objects are kept from one run to the next; make
-# does not follow headers, so they are dropped when a header, the build's own files or R have changed.
+# does not follow headers, so they are dropped when a header, the build's own files, which sources there are or R have
+# changed.
 install_package() {
   local copy="$root/build/package" library="$library" native="${AMISS_NATIVE-1}" blas= state whole
   if [[ $# -gt 0 ]]; then
@@ -30,7 +31,7 @@ install_package() {
     tar -C "$copy" -x
   [[ ! -d "$root/build/doc" ]] || cp -r "$root/build/doc" "$copy/inst/doc"  # see tools/vignettes
   state="$(cd "$copy" && { printf '%s\n' "$native" "$blas"; R --version; g++ --version; grep LinkingTo DESCRIPTION; cat src/Makevars "$root/tools/Makevars";
-    find src -name '*.hpp' | sort | xargs cat; } | sha256sum)"
+    find src -name '*.cpp' | sort; find src -name '*.hpp' | sort | xargs cat; } | sha256sum)"
   if [[ "$(cat "$copy/.state" 2>/dev/null)" != "$state" ]]; then
     find "$copy/src" -name '*.o' -delete
     printf '%s\n' "$state" > "$copy/.state"
