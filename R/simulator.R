@@ -293,9 +293,8 @@ check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()
 }
 
 check_simulator <- function(simulator, call = rlang::caller_env()) {
-  method <- function(class) utils::getS3method("simulate_runs", class, optional = TRUE)
-  known <- !all(vapply(lapply(class(simulator), method), is.null, NA))
-  if (!known) {
+  known <- function(class) !is.null(utils::getS3method("simulate_runs", class, optional = TRUE))
+  if (!any(vapply(class(simulator), known, NA))) {
     abort_input(c("{.arg simulator} is of class {.cls {class(simulator)}}, which is no simulator.",
                   i = "Make one with {.fun zone} or {.fun function_simulator}, or give runs with {.fun ensemble}."),
                   call = call)
