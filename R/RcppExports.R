@@ -17,8 +17,8 @@ make_basis_ <- function(outputs, control) {
     .Call(`_amiss_make_basis_`, outputs, control)
 }
 
-train_emulator_ <- function(inputs, basis_list, control, context) {
-    .Call(`_amiss_train_emulator_`, inputs, basis_list, control, context)
+train_emulator_ <- function(normal, region, basis_list, control, context) {
+    .Call(`_amiss_train_emulator_`, normal, region, basis_list, control, context)
 }
 
 predict_emulator_ <- function(emulator, normal) {

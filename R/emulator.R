@@ -87,7 +87,7 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   basis <- call_engine(make_basis_(ensemble$outputs, c(control, noise_sd = noise_sd)))
   basis$discarded_sd <- discarded_sd(basis, ensemble$outputs)
   trained <- staged(paste("training the emulator of", ncol(ensemble$outputs), "runs"), call_engine(train_emulator_(
-    region_inputs(ensemble$region, ensemble$unit), basis, control, engine_context(1, threads))))
+    to_normal(ensemble$unit), ensemble$region, basis, control, engine_context(1, threads))))
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   selection <- trained$selection
   selection$parameter <- names(ensemble$parameters)[selection$parameter]

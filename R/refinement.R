@@ -215,7 +215,7 @@ searched_ensembles <- function(ensembles, sets, centre, runs, threads) {
   modes <- Filter(Negate(is.null), lapply(Filter(Negate(is.null), starts), search))
   if (!length(modes)) return(list(ensembles = ensembles, runs = 0))
   regional <- Map(function(ensemble, set) {
-    region <- region_of_modes(modes, match(names(ensemble$parameters), all))
+    region <- region_of_modes(modes, ensemble$parameters, match(names(ensemble$parameters), all))
     regional_ensemble(ensemble, region, set$emulator, set$measurements, runs, threads)
   }, ensembles, sets)
   list(ensembles = regional, runs = runs * length(ensembles) + sum(vapply(modes, `[[`, 0, "runs")))

@@ -1,7 +1,13 @@
 # Regions of the parameters' space: where the posterior lies, in the coordinates in which the priors are N(0, I). An
 # emulator of runs in such a region, along its axes, needs few of them; NULL stands for everywhere.
 
-# The ellipsoid that holds a posterior: list(centre, root, radius). Tails that the draws do not show are allowed for by
+# `uniform`: which parameters have uniform priors, in whose probabilities and not in normal coordinates they are linear.
+new_region <- function(centre, root, radius, parameters) {
+  uniform <- vapply(parameters, function(p) p$prior$family == "uniform", NA, USE.NAMES = FALSE)
+  list(centre = centre, root = root, radius = radius, uniform = uniform)
+}
+
+# The ellipsoid that holds a posterior. Tails that the draws do not show are allowed for by
 # their number, by the radius, and by `growth` where the posterior reached the end of the region it was sought in.
 posterior_region <- function(fit, growth = 1) {
   z <- to_normal(posterior_unit(fit))
@@ -14,8 +20,8 @@ posterior_region <- function(fit, growth = 1) {
   covariance <- (1 - shrinkage) * covariance + shrinkage * diag(diag(covariance), ncol(z)) + diag(1e-10, ncol(z))
   root <- growth * t(chol(covariance))
   distance <- sqrt(colSums(forwardsolve(root, t(apart))^2))
-  list(centre = centre, root = root,
-       radius = 1.1 * max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999)))
+  new_region(centre, root, 1.1 * max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999)),
+             fit$emulator$parameters)
 }
 
 wider_region <- function(region) {
@@ -24,15 +30,15 @@ wider_region <- function(region) {
 }
 
 # The ellipsoid that holds what search_mode() found from several starts: modes as good as the best, or places along a
-# ridge. `own`: the coordinates that are asked for.
-region_of_modes <- function(modes, own) {
+# ridge. `parameters`: those that are asked for, at `own` among the coordinates.
+region_of_modes <- function(modes, parameters, own) {
   value <- vapply(modes, `[[`, 0, "value")
   modes <- modes[value > max(value) - 10]
   centres <- do.call(rbind, lapply(modes, function(mode) mode$centre[own]))
   centre <- colMeans(centres)
   covariance <- Reduce(`+`, lapply(modes, function(mode) mode$covariance[own, own, drop = FALSE])) / length(modes) +
     crossprod(sweep(centres, 2, centre)) / length(modes)
-  list(centre = centre, root = t(chol(covariance)), radius = 1.1 * sqrt(stats::qchisq(0.999, length(centre))))
+  new_region(centre, t(chol(covariance)), 1.1 * sqrt(stats::qchisq(0.999, length(centre))), parameters)
 }
 
 # Of points of the unit cube (one a row), how far out they lie: 1 is where the region ends.
@@ -42,12 +48,6 @@ region_distance <- function(region, unit) {
 }
 
 in_region <- function(region, unit) region_distance(region, unit) <= 1
-
-# Inputs of the emulator's processes, as the engine has them.
-region_inputs <- function(region, unit) {
-  if (is.null(region)) return(unit)
-  0.5 + t(forwardsolve(region$root, t(to_normal(unit)) - region$centre)) / (2 * region$radius)
-}
 
 # n points of the unit cube, spread evenly over the region: a Latin hypercube of directions and distances.
 region_design <- function(region, n, seed) {

@@ -59,16 +59,17 @@ BEGIN_RCPP
 END_RCPP
 }
 // train_emulator_
-Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basis_list, const Rcpp::List& control, const Rcpp::List& context);
-RcppExport SEXP _amiss_train_emulator_(SEXP inputsSEXP, SEXP basis_listSEXP, SEXP controlSEXP, SEXP contextSEXP) {
+Rcpp::List train_emulator_(const Eigen::MatrixXd& normal, const Rcpp::RObject& region, const Rcpp::List& basis_list, const Rcpp::List& control, const Rcpp::List& context);
+RcppExport SEXP _amiss_train_emulator_(SEXP normalSEXP, SEXP regionSEXP, SEXP basis_listSEXP, SEXP controlSEXP, SEXP contextSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
-    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type inputs(inputsSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type normal(normalSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::RObject& >::type region(regionSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type basis_list(basis_listSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
-    rcpp_result_gen = Rcpp::wrap(train_emulator_(inputs, basis_list, control, context));
+    rcpp_result_gen = Rcpp::wrap(train_emulator_(normal, region, basis_list, control, context));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -270,7 +271,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_ais_defaults_", (DL_FUNC) &_amiss_ais_defaults_, 0},
     {"_amiss_cpu_has_avx2_", (DL_FUNC) &_amiss_cpu_has_avx2_, 0},
     {"_amiss_make_basis_", (DL_FUNC) &_amiss_make_basis_, 2},
-    {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 4},
+    {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 5},
     {"_amiss_predict_emulator_", (DL_FUNC) &_amiss_predict_emulator_, 2},
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 3},

@@ -38,7 +38,7 @@ inline Region region(const Rcpp::RObject& given) {
   if (given.isNULL()) return Region();
   const Rcpp::List list(given);
   return Region(Rcpp::as<Eigen::VectorXd>(list["centre"]), Rcpp::as<Eigen::MatrixXd>(list["root"]),
-                Rcpp::as<double>(list["radius"]));
+                Rcpp::as<double>(list["radius"]), Rcpp::as<std::vector<bool>>(list["uniform"]));
 }
 
 inline EmulatorState emulator_state(const Rcpp::List& emulator) {

@@ -203,9 +203,12 @@ Rcpp::List make_basis_(const Eigen::MatrixXd& outputs, const Rcpp::List& control
                             _["discarded_rms"] = basis.discarded_rms, _["discarded_ss"] = basis.discarded_ss);
 }
 
+// Of runs at points (a row each) in the coordinates N(0, I), in their region.
 // [[Rcpp::export]]
-Rcpp::List train_emulator_(const Eigen::MatrixXd& inputs, const Rcpp::List& basis_list,
-                           const Rcpp::List& control, const Rcpp::List& context) {
+Rcpp::List train_emulator_(const Eigen::MatrixXd& normal, const Rcpp::RObject& region,
+                           const Rcpp::List& basis_list, const Rcpp::List& control,
+                           const Rcpp::List& context) {
+  const MatrixXd inputs = convert::region(region).inputs(normal.transpose());
   const Emulator emulator =
       Emulator::train(inputs, read_basis(basis_list), emulator_options(control), convert::context(context));
   MatrixXd mean, variance;

@@ -52,7 +52,7 @@ TEST(CalibrationTarget, AlongTheParametersItIsTheSameLikelihood) {
   EmulatorState state = make_emulator(2).state();
   const Joint everywhere;
   const CalibrationTarget whole = everywhere.target();
-  state.region = Region(VectorXd::Zero(2), MatrixXd::Identity(2, 2), 6.0);
+  state.region = Region(VectorXd::Zero(2), MatrixXd::Identity(2, 2), 6.0, {false, false});
   const Emulator regional(state);
   const CalibrationTarget within(everywhere.model, {0, 1}, regional);
   MatrixXd x = normal_matrix(7, 8, 88), elsewhere = normal_matrix(2, 8, 89);
@@ -112,7 +112,7 @@ TEST(CalibrationTarget, UnitsOfTheBasisDoNotMatter) {
 
 TEST(CalibrationTarget, OutsideTheRegionTheRecordIsImpossible) {
   EmulatorState state = make_emulator(2).state();
-  state.region = Region(Eigen::Vector2d(0.2, -0.3), 0.5 * MatrixXd::Identity(2, 2), 2.0);
+  state.region = Region(Eigen::Vector2d(0.2, -0.3), 0.5 * MatrixXd::Identity(2, 2), 2.0, {false, false});
   const Emulator emulator(state);
   const Joint joint;
   const CalibrationTarget target(joint.model, {0, 1}, emulator);

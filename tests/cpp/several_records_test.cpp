@@ -106,7 +106,7 @@ VectorXd over_noise(const CalibrationTarget& target, const VectorXd& grid) {
 
 TEST(SeveralRecords, EvidenceAndPosteriorAreThoseOfQuadrature) {
   const VectorXd grid = VectorXd::LinSpaced(401, -6.0, 6.0);
-  for (const Region& region : {Region(), Region(VectorXd::Zero(1), MatrixXd::Identity(1, 1), 5.0)}) {
+  for (const Region& region : {Region(), Region(VectorXd::Zero(1), MatrixXd::Identity(1, 1), 5.0, {false})}) {
     const Two two(1, region, {});
     const std::vector<Record> records = two.records({0}, {0}, {});
     const VectorXd value = over_noise(CalibrationTarget(two.quiet, {}, two.first), grid) +

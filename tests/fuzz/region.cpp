@@ -12,8 +12,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   double radius = 2.0;
   in.perhaps(radius);
   const Eigen::MatrixXd normal = in.matrix(d, in.integer(1, 3));
+  std::vector<bool> uniform(static_cast<std::size_t>(in.byte() == 255 ? d + 1 : d));
+  for (std::size_t i = 0; i < uniform.size(); ++i) uniform[i] = in.byte() % 2 == 1;
   fuzz::refusable([&] {
-    const Region region(centre, root, radius);
+    const Region region(centre, root, radius, uniform);
     fuzz::require(region.contains(centre), "the centre is inside");
     if (!fuzz::ordinary(centre) || !fuzz::ordinary(root) || radius > 1e100 || !fuzz::ordinary(normal)) return;
     const Eigen::MatrixXd placed = region.place(normal);
