@@ -3,10 +3,8 @@
 #' Trains the emulator, calibrates, and lets the simulator check the emulator where the posterior lies. Where the check
 #' fails, fewer than a third of its runs are effective, or more than a hundredth of the posterior lies in the outer
 #' tenth of the emulator's region, runs are made in the region of that posterior ([refine_ensemble()]; those of the
-#' check join them), an emulator is trained for this region, and all is done again, up to a number of rounds. Where the
-#' emulator was surer than it was right, the error that the check saw is added to the noise before the region is drawn,
-#' so that the region is as wide as the emulator deserves. Of rounds that all leave something to ask for, that with the
-#' best check stays.
+#' check join them), an emulator is trained for this region, and all is done again, up to a number of rounds. Of rounds
+#' that all leave something to ask for, that with the best check stays.
 #'
 #' @param ensemble An ensemble: [simulate_design()], [refine_ensemble()], [ensemble()] (which can be checked, but not
 #'   refined).
@@ -235,10 +233,11 @@ with_checked_runs <- function(ensemble, fit, made) {
 #'
 #' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an
 #' emulator of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior
-#' lies: the ellipsoid that holds it, in the coordinates in which the priors are standard normal. Its runs follow the
-#' axes of the ellipsoid and fill it evenly; runs of `ensemble` that lie inside join them, the last 40. An emulator of
-#' them holds in the region alone, and there a few dozen runs do what hundreds spread over the priors cannot. Parameters
-#' outside count as impossible; if the posterior comes near the end of the region, the check of [calibrate()] says so.
+#' lies: the ellipsoid that holds it, in the coordinates in which the priors are standard normal, half as wide again
+#' where the check by runs refutes the calibration. Its runs follow the axes of the ellipsoid and fill it evenly; runs of
+#' `ensemble` that lie inside join them, the last 40. An emulator of them holds in the region alone, and there a few
+#' dozen runs do what hundreds spread over the priors cannot. Parameters outside count as impossible; if the posterior
+#' comes near the end of the region, the check of [calibrate()] says so.
 #'
 #' @param ensemble An ensemble made by [simulate_design()], or by this.
 #' @param fit A calibration with the emulator trained on it ([calibrate()]).
@@ -280,8 +279,9 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
                   i = "Give the ensemble and the calibration of the same measurements."))
   }
   check_same_rows(ensemble$hours, fit$measurements)
-  regional_ensemble(ensemble, posterior_region(fit, if (isTRUE(fit$check$border > largest_border_share)) 1.5 else 1),
-                    fit$emulator, fit$measurements, runs, threads)
+  # What runs refute is not quite where the posterior lies.
+  region <- posterior_region(fit, growth = if (isFALSE(fit$check$passed)) 1.5 else 1)
+  regional_ensemble(ensemble, region, fit$emulator, fit$measurements, runs, threads)
 }
 
 # The ensemble of a region of the parameters' space; `emulator` knows that over the priors.

@@ -7,8 +7,8 @@ new_region <- function(centre, root, radius, parameters) {
   list(centre = centre, root = root, radius = radius, uniform = uniform)
 }
 
-# The ellipsoid that holds a posterior. Tails that the draws do not show are allowed for by
-# their number, by the radius, and by `growth` where the posterior reached the end of the region it was sought in.
+# The ellipsoid that holds a posterior. Tails that the draws do not show are allowed for by their number, by the radius,
+# and by `growth` where the posterior is not trusted.
 posterior_region <- function(fit, growth = 1) {
   z <- to_normal(posterior_unit(fit))
   w <- fit$weights / sum(fit$weights)

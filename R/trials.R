@@ -47,8 +47,8 @@ can_extend <- function(mechanism, model, settings) {
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
 
-# Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined
-# no further. A budget leaves out the last.
+# Coarse calibrations (screen_model()) of those whose responses promise something, the most promising first: what lies
+# far behind them is refined no further. A budget leaves out the last.
 screened_mechanisms <- function(current, trials, responses, settings, say) {
   coarse <- as_coarse(current$fit)
   screens <- list()
@@ -57,11 +57,32 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
   for (name in ordered) {
     fits <- lapply(screens, `[[`, "fit")
     if (length(fits) && settings$spent()) break
+    if (!promises(responses[name, "log10_bf"], lead_of(screens, responses, current$fit, settings$control))) next
     screens[[name]] <- staged(turn(name), naming_mechanism(name, screen_model(
       trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
     report_candidate(name, screens[[name]]$fit, coarse, say)
   }
   screens
+}
+
+far_behind <- 10  # decades of responses, which are off by decades where a simulator bends
+
+# Whether the log10 Bayes factor of responses, which come in amounts that are free, is worth a calibration: the record
+# is for them in some amount, and no more than `far_behind` the lead. Not known, it may be anything.
+promises <- function(by_response, lead) {
+  is.null(by_response) || is.na(by_response) || by_response > max(0, lead - far_behind)
+}
+
+# The highest log10 Bayes factor, by responses and by calibration, of a mechanism that was calibrated and may be
+# adopted.
+lead_of <- function(screens, responses, current, control) {
+  each <- vapply(names(screens), function(name) {
+    fit <- screens[[name]]$fit
+    bf <- bayes_factor(fit, as_coarse(current))$log10_bf
+    if (bf < control$decisive || error_ratio(fit, current) > risen_error) return(0)
+    min(bf, responses[name, "log10_bf"], na.rm = TRUE)
+  }, 0)
+  max(0, each)
 }
 
 # list(fits, table, current) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by

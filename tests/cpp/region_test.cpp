@@ -33,7 +33,8 @@ TEST(Region, InputsFillTheUnitCubeAlongItsAxes) {
   }
 }
 
-// What is linear in the probabilities of uniform priors is linear in the inputs, however far out the region lies.
+// What is linear in the probabilities of uniform priors is linear in the inputs, however far out the region
+// lies.
 TEST(Region, InputsAreLinearInWhatAUniformPriorIsLinearIn) {
   for (const double far : {0.0, -3.0, 3.0, -6.0, 6.0}) {
     const MatrixXd root = Eigen::Vector2d(0.6, 0.4).asDiagonal();
@@ -53,7 +54,7 @@ TEST(Region, StraightenedCoordinatesAgreeWithTheOthersOnTheWhole) {
   const double centre = -1.4, sd = 0.7;
   const Region region(VectorXd::Constant(1, centre), MatrixXd::Constant(1, 1, sd), 8.0, {true});
   double mean = 0.0, slope = 0.0;
-  constexpr int kSteps = 4000;  // of the trapezium rule, exact to rounding for a smooth integrand that vanishes
+  constexpr int kSteps = 4000;  // of the trapezium rule, exact to rounding where a smooth integrand vanishes
   for (int k = 0; k <= kSteps; ++k) {
     const double t = -8.0 + 16.0 * k / kSteps, weight = normal_density(t) * 16.0 / kSteps;
     const double s = (region.inputs(VectorXd::Constant(1, centre + sd * t))(0, 0) - 0.5) * 2.0 * 8.0;
