@@ -234,8 +234,8 @@ with_checked_runs <- function(ensemble, fit, made) {
 #' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an
 #' emulator of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior
 #' lies: the ellipsoid that holds it, in the coordinates in which the priors are standard normal, half as wide again
-#' where the check by runs refutes the calibration. Its runs follow the axes of the ellipsoid and fill it evenly; runs of
-#' `ensemble` that lie inside join them, the last 40. An emulator of them holds in the region alone, and there a few
+#' where the check by runs refutes the calibration. Its runs follow the axes of the ellipsoid and fill it evenly; runs
+#' of `ensemble` that lie inside join them, the last 40. An emulator of them holds in the region alone, and there a few
 #' dozen runs do what hundreds spread over the priors cannot. Parameters outside count as impossible; if the posterior
 #' comes near the end of the region, the check of [calibrate()] says so.
 #'
