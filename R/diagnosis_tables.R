@@ -43,7 +43,7 @@ candidates_words <- function(upgrade) {
              "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)), evidence = table$word,
              probability = percent(table$probability),
              "error in calibration" = error_words(table$error_ratio),
-             estimate = ifelse(table$trusted, "sound", "rough"),
+             estimate = ifelse(table$judged_by == "response", "by responses", ifelse(table$trusted, "sound", "rough")),
              decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
 }
 

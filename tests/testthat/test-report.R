@@ -211,8 +211,9 @@ test_that("a report says what result.json says", {
     row <- trials[trials[, 2] == trial$mechanism, ]
     expect_identical(row[c(4, 5, 7, 8, 9)],
                      c(signed(trial$log10_bf), paste(signed(unlist(trial$interval)), collapse = " to "),
-                       percent(trial$probability), paste(short(trial$error_ratio), "times"),
-                       if (trial$trusted) "sound" else "rough"))
+                       percent(trial$probability),
+                       if (is.null(trial$error_ratio)) "" else paste(short(trial$error_ratio), "times"),
+                       if (trial$judged_by == "response") "by responses" else if (trial$trusted) "sound" else "rough"))
     expect_identical(row[10] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
   }
 
