@@ -38,7 +38,7 @@ check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) 
 }
 
 # What the objects of the package are made of; another number, as an object read from a file may have, is refused.
-format_version <- 2L
+format_version <- 3L
 
 check_object <- function(x, classes, name, hint = NULL, call = rlang::caller_env()) {
   check_input(checkmate::check_multi_class(x, classes), name, hint, call)

@@ -210,7 +210,9 @@ test_that("a report says what result.json says", {
   for (trial in told$candidates) {
     row <- trials[trials[, 2] == trial$mechanism, ]
     expect_identical(row[c(4, 5, 7, 8, 9)],
-                     c(signed(trial$log10_bf), paste(signed(unlist(trial$interval)), collapse = " to "),
+                     c(signed(trial$log10_bf),
+                       if (trial$judged_by == "response") ""
+                       else paste(signed(unlist(trial$interval)), collapse = " to "),
                        percent(trial$probability),
                        if (is.null(trial$error_ratio)) "" else paste(short(trial$error_ratio), "times"),
                        if (trial$judged_by == "response") "by responses" else if (trial$trusted) "sound" else "rough"))
