@@ -1,6 +1,6 @@
 #!/usr/bin/env Rscript
-# What hangs on the seed: the base model of a Twin House, calibrated and refined as the loop does it, a row for each seed:
-# runs, whether the check by runs passed, its emulator's error over the noise, the effective share, the evidence.
+# What hangs on the seed: the base model of a Twin House, calibrated and refined as the loop does it. A row each: runs,
+# whether the check by runs passed, the emulator's error over the noise, the effective share, the evidence.
 # Usage: Rscript bench/seeds.R [--house O5] [--seeds 24] [--threads 2] [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

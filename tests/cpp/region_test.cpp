@@ -36,7 +36,7 @@ TEST(Region, InputsFillTheUnitCubeAlongItsAxes) {
 // What is linear in the probabilities of uniform priors is linear in the inputs, however far out the region
 // lies.
 TEST(Region, InputsAreLinearInWhatAUniformPriorIsLinearIn) {
-  for (const double far : {0.0, -3.0, 3.0, -6.0, 6.0}) {
+  for (const double far : {0.0, -3.0, 3.0, -7.5, 7.5}) {
     const MatrixXd root = Eigen::Vector2d(0.6, 0.4).asDiagonal();
     const Region region(Eigen::Vector2d(far, 0.3), root, 3.0, {true, false});
     const MatrixXd x = region.place(normal_matrix(2, 50, 412)), inputs = region.inputs(x);
