@@ -47,47 +47,26 @@ can_extend <- function(mechanism, model, settings) {
 
 trial_name <- function(current, mechanism) paste(current$name, "+", mechanism)
 
-# Coarse calibrations (screen_model()) of those whose responses promise something, the most promising first: what lies
-# far behind them is refined no further. A budget leaves out the last. `fits`, those of `full` in full: of mechanisms
-# that have been calibrated before.
-screened_mechanisms <- function(current, trials, responses, settings, say, fits = list(), full = character()) {
+# Coarse calibrations (screen_model()), those first whose responses promise most: what lies far behind them is refined
+# no further. A budget leaves out the last.
+screened_mechanisms <- function(current, trials, responses, settings, say) {
   coarse <- as_coarse(current$fit)
   screens <- list()
   ordered <- if (is.null(responses)) names(trials) else names(trials)[order(-responses$log10_bf, na.last = FALSE)]
-  ordered <- setdiff(ordered, names(fits))
   turn <- turns("mechanism", length(ordered))
   for (name in ordered) {
+    fits <- lapply(screens, `[[`, "fit")
     if (length(fits) && settings$spent()) break
-    if (!promises(responses[name, "log10_bf"], lead_of(fits, full, responses, current$fit, settings$control))) break
     screens[[name]] <- staged(turn(name), naming_mechanism(name, screen_model(
       trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
-    fits[[name]] <- screens[[name]]$fit
-    report_candidate(name, fits[[name]], coarse, say)
+    report_candidate(name, screens[[name]]$fit, coarse, say)
   }
   screens
 }
 
-far_behind <- 10  # decades of responses, which are off by decades where a simulator bends
-
-# Whether the log10 Bayes factor of responses, which come in amounts that are free, is worth a calibration: the record
-# is for them in some amount, and no more than `far_behind` the lead. Not known, it may be anything.
-promises <- function(by_response, lead) {
-  is.null(by_response) || is.na(by_response) || by_response > max(0, lead - far_behind)
-}
-
-# The log10 Bayes factor, the lesser of that by responses and that by calibration, of the mechanism furthest ahead among
-# those that were calibrated and may be adopted.
-lead_of <- function(fits, full, responses, current, control) {
-  if (!length(fits)) return(0)
-  bf <- standing(fits, current, full)
-  open <- bf$log10_bf >= control$decisive & bf$lower95 > 0 & vapply(fits, error_ratio, 0, current) <= risen_error
-  max(0, pmin(bf$log10_bf, responses[names(fits), "log10_bf"], na.rm = TRUE)[open])
-}
-
 # list(fits, table, current) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by
-# its full calibration, others may come near: they are calibrated too, until what leads is known in full, and if nothing
-# may be adopted then, those that only a leader kept from being screened. What is to be adopted, or the present model if
-# it stays, is settled, and must lead after that too.
+# its full calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be
+# adopted, or the present model if it stays, is settled, and must lead after that too.
 tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
   full <- list()
@@ -114,12 +93,6 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
                                                                       settings)))
       settled <- c(settled, name)
     } else {
-      more <- if (!is.null(responses)) {
-        screened_mechanisms(current, trials, responses, settings, say, fits, names(full))
-      }
-      screens <- c(screens, more)
-      fits[names(more)] <- lapply(more, `[[`, "fit")
-      if (length(more)) next
       if (is.null(current$full)) break
       current <- settled_model(current, settings)
     }

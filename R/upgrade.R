@@ -12,12 +12,10 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
 #' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
-#' these responses, in amounts that are free, says in which order mechanisms are calibrated, and which are not: those
-#' whose responses the record is for in no amount (Bayes factor below 1), and those ten decades behind a mechanism that
-#' has been calibrated and may be adopted. It is all that is known of these, and of those that a budget (`runs_total`)
-#' leaves no runs for: `candidates$judged_by` is `"response"` for them. Where a simulator is far from linear, a
-#' mechanism may do elsewhere in the parameters' space what it does not do there; how often that cost a cause is in
-#' `vignette("measured")`.
+#' these responses, in amounts that are free, says in which order mechanisms are calibrated, and is all that is known of
+#' those that a budget (`runs_total`) leaves no runs for: `candidates$judged_by` is `"response"` for them. It is no
+#' verdict: where a simulator is far from linear, a mechanism may do elsewhere in the parameters' space what it does not
+#' do there.
 #'
 #' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the
 #' parameters, two thirds of all, and compared with the present model calibrated in the same way; then in full, with the

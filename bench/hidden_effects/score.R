@@ -113,7 +113,7 @@ rival_conditions <- function(fit, world, most = 400) {
   strongest <- function(score) unname(names_of[which.max(score)])
   unit <- apply(x, 2, function(v) (v - min(v)) / diff(range(v)))
   thin <- seq(1, length(r), by = ceiling(length(r) / most))
-  ard <- amiss:::train_emulator_(unit[thin, , drop = FALSE], list(
+  ard <- amiss:::train_emulator_(amiss:::to_normal(unit[thin, , drop = FALSE]), NULL, list(
     vectors = matrix(1, 3, 1), coefficients = matrix(r[thin]), singular_values = 1, discarded_ss = 0),
                                  utils::modifyList(amiss:::emulator_control,
                                                    list(starts = 2, searches = 1, max_evaluations = 40)),

@@ -187,6 +187,21 @@ test_that("a report is one file that names the cause and needs nothing from outs
   expect_gte(sum(grepl("src=\"data:image/png", links)), length(figure_names))
 })
 
+test_that("an estimate by responses is shown without an interval or a word", {
+  upgrade <- small_upgrade()
+  last <- nrow(upgrade$candidates)
+  upgrade$candidates$judged_by[last] <- "response"
+  upgrade$candidates$error_ratio[last] <- NA
+  told <- amiss:::candidates_words(upgrade)
+  by_response <- told$estimate == "by responses"
+  expect_equal(told$mechanism[by_response], upgrade$candidates$mechanism[last])
+  expect_true(all(told[by_response, c("95 % interval", "evidence", "error in calibration")] == ""))
+  expect_true(all(nzchar(told[!by_response, "95 % interval"])))
+  shown <- plot(upgrade, "candidates")
+  expect_match(levels(shown$data$state)[as.integer(shown$data$state[last])], "by a few runs")
+  expect_equal(nrow(ggplot2::layer_data(shown, 3)), last - 1)  # lines of the others
+})
+
 test_that("a report says what result.json says", {
   skip_without_pandoc()
   skip_if_not_installed("xml2")

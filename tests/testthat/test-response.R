@@ -69,21 +69,11 @@ drift <- adding("drift", function(values, drivers) values[["d"]] * seq_len(nrow(
 sun <- adding("sun", function(values, drivers) values[["s"]] * lagged(drivers[, "Gv"], 3), free("s", uniform(0, 0.02)),
               boundary = "Gv")
 
-test_that("mechanisms are tried in the order of their responses, those that promise nothing by these alone", {
+test_that("mechanisms are tried in the order of their responses, all of them", {
   table <- tried(drift, sun)$table
   expect_equal(table$mechanism, c("sun", "drift"))
-  expect_equal(table$judged_by, c("calibration", "response"))
-  expect_equal(tried(drift)$table$judged_by, "response")
-})
-
-test_that("responses promise something if the record is for them, and no leader is far ahead", {
-  promises <- amiss:::promises
-  expect_true(promises(0.1, lead = 0))
-  expect_false(promises(-0.1, lead = 0))
-  expect_true(promises(21, lead = 30))
-  expect_false(promises(19, lead = 30))
-  expect_true(promises(NA_real_, lead = 30))  # its runs failed
-  expect_true(promises(NULL, lead = 30))      # runs were given, and none could be made
+  expect_equal(table$judged_by, c("calibration", "screening"))
+  expect_equal(tried(drift)$table$judged_by, "screening")
 })
 
 test_that("what a budget leaves no runs for is judged by its responses alone, and the table says so", {

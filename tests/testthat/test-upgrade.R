@@ -98,35 +98,6 @@ test_that("where the leader falls back in full, what now leads is calibrated in 
   expect_equal(tried$table$judged_by, c("calibration", "calibration", "screening"))
 })
 
-test_that("where the leader falls back, those that it kept from being screened are calibrated", {
-  base <- small_upgrade()$models[[1]]
-  at <- function(decades) {
-    own <- base$fit
-    own$log_evidence <- amiss:::as_coarse(base$fit)$log_evidence + decades * log(10)
-    own$standard_error <- 0.1
-    own
-  }
-  decades <- list(coarse = c(a = 30, b = 12, c = 0), full = c(a = 0, b = 12, c = 0))
-  made <- character()
-  keep <- function(key, code) {
-    made <<- c(made, paste(key[[1]], key[[2]]))
-    if (key[[1]] == "settled") return(at(12))
-    list(fit = at(decades[[key[[1]]]][[sub("base \\+ ", "", key[[2]])]]), made = list())
-  }
-  trials <- lapply(c(a = 1, b = 2, c = 3), function(k) linear_simulator())
-  responses <- data.frame(log10_bf = c(30, 12, -1), lower95 = c(29, 11, -2), upper95 = c(31, 13, 0),
-                          word = "decisive", runs = 4, row.names = names(trials))
-  settings <- list(control = amiss:::upgrade_control, keep = keep, spent = function() FALSE)
-  say <- function(...) NULL
-  screens <- amiss:::screened_mechanisms(base, trials, responses, settings, say)
-  expect_named(screens, "a")
-  tried <- amiss:::tried_in_full(base, trials, screens, settings, say, responses)
-  expect_equal(setdiff(made, grep("settled", made, value = TRUE)),
-               c("coarse base + a", "full base + a", "coarse base + b", "full base + b"))
-  expect_equal(tried$table$judged_by, c("calibration", "calibration", "response"))
-  expect_equal(amiss:::best_trial(tried$table)$mechanism, "b")
-})
-
 test_that("what is to be adopted is settled, and must lead after that too", {
   base <- small_upgrade()$models[[1]]
   above <- function(fit, decades, border) {
