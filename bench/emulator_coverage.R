@@ -84,7 +84,7 @@ one_design <- function(case, runs, noise, seed) {
     e <- amiss:::train_emulator_(amiss:::to_normal(x), NULL, basis, amiss:::emulator_control,
                                  list(seed = 1, threads = 1))
   })[["elapsed"]]
-  p <- amiss:::predict_emulator_(e, stats::qnorm(at))
+  p <- amiss:::predict_emulator_(c(e, list(region = NULL)), stats::qnorm(at))
   error <- truth - centre - spread * p$mean[, 1]
   # At the mode: variances without what they were widened by, leave-one-out errors from the covariance.
   mode <- e$hyperparameters[1, ] + log(e$widened) * c(-1, -1, 1, rep(0, case$inputs))

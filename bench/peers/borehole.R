@@ -26,7 +26,7 @@ amiss_fit <- function(x, y) {
                 discarded_ss = 0)
   e <- amiss:::train_emulator_(amiss:::to_normal(x), NULL, basis, amiss:::emulator_control, list(seed = 1, threads = 1))
   function(at) {
-    p <- amiss:::predict_emulator_(e, stats::qnorm(at))
+    p <- amiss:::predict_emulator_(c(e, list(region = NULL)), stats::qnorm(at))
     interval(mean(y) + stats::sd(y) * p$mean[, 1], stats::sd(y) * sqrt(p$variance[, 1]))
   }
 }
