@@ -105,6 +105,7 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
     calibrated(found$ensembles, coarsely(control$calibration))
   }
   coarse <- FALSE
+  from_posterior <- FALSE  # whether a search has begun there: another would end where it did
   result <- first
   if (is.null(result)) {
     emulators <- trained(ensembles)
@@ -125,7 +126,8 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
       # A coarse sampler is enough to see where the posterior lies, until the check passes.
       next_round()
       wider <- Map(with_checked_runs, result$ensembles, result$fits, result$made)
-      result <- if (any(vapply(result$fits, function(fit) fit$check$ratio > lost, NA))) {
+      result <- if (!from_posterior && any(vapply(result$fits, function(fit) fit$check$ratio > lost, NA))) {
+        from_posterior <- TRUE
         searched(wider, result$fits, joint_centre(result$fits))
       } else {
         runs_made <- runs_made + runs * length(wider)
@@ -234,10 +236,11 @@ with_checked_runs <- function(ensemble, fit, made) {
 #' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an
 #' emulator of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior
 #' lies: the ellipsoid that holds it, in the coordinates in which the priors are standard normal, half as wide again
-#' where the check by runs refutes the calibration. Its runs follow the axes of the ellipsoid and fill it evenly; runs
-#' of `ensemble` that lie inside join them, the last 40. An emulator of them holds in the region alone, and there a few
-#' dozen runs do what hundreds spread over the priors cannot. Parameters outside count as impossible; if the posterior
-#' comes near the end of the region, the check of [calibrate()] says so.
+#' where the posterior came near the end of the region before or the check by runs found the emulator surer than it was
+#' right. Its runs follow the axes of the ellipsoid, at all distances from its centre alike; runs of `ensemble` that lie
+#' inside join them, the last 40. An emulator of them holds in the region alone, and there a few dozen runs do what
+#' hundreds spread over the priors cannot. Parameters outside count as impossible; if the posterior comes near the end
+#' of the region, the check of [calibrate()] says so.
 #'
 #' @param ensemble An ensemble made by [simulate_design()], or by this.
 #' @param fit A calibration with the emulator trained on it ([calibrate()]).
@@ -279,8 +282,10 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
                   i = "Give the ensemble and the calibration of the same measurements."))
   }
   check_same_rows(ensemble$hours, fit$measurements)
-  # What runs refute is not quite where the posterior lies.
-  region <- posterior_region(fit, growth = if (isFALSE(fit$check$passed)) 1.5 else 1)
+  # Where the posterior reached the end of its region, or the emulator was surer than it was right, it lies elsewhere in
+  # part. An emulator that knows how far it is off has widened the posterior already.
+  astray <- isTRUE(fit$check$border > largest_border_share || fit$check$z2 > 1)
+  region <- posterior_region(fit, growth = if (astray) 1.5 else 1)
   regional_ensemble(ensemble, region, fit$emulator, fit$measurements, runs, threads)
 }
 

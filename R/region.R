@@ -49,11 +49,13 @@ region_distance <- function(region, unit) {
 
 in_region <- function(region, unit) region_distance(region, unit) <= 1
 
-# n points of the unit cube, spread evenly over the region: a Latin hypercube of directions and distances.
+# n points of the unit cube for the emulator of a region: a Latin hypercube of directions and distances from the centre.
+# Spread evenly over the volume they would nearly all lie at its end: of seven parameters one run in a hundred would lie
+# as near to the centre as the posterior does.
 region_design <- function(region, n, seed) {
   p <- length(region$centre)
   u <- with_seed(seed, lhs::randomLHS(n, p + 1))
   x <- stats::qnorm(u[, seq_len(p), drop = FALSE])
-  x <- x * (region$radius * u[, p + 1]^(1 / p) / sqrt(rowSums(x^2)))
+  x <- x * (region$radius * u[, p + 1] / sqrt(rowSums(x^2)))
   stats::pnorm(sweep(tcrossprod(x, region$root), 2, region$centre, "+"))
 }

@@ -196,11 +196,24 @@ test_that("runs are added where the posterior lies, and the emulator is better t
   beyond <- amiss:::region_design(within(region, radius <- 1.5 * radius), 50, 1)
   expect_identical(amiss:::in_region(region, beyond), amiss:::region_distance(region, beyond) <= 1)
   expect_true(any(!amiss:::in_region(region, beyond)))
+  # At all distances from the centre alike: spread over the volume, of two parameters a quarter would lie half as near.
+  expect_equal(mean(amiss:::region_distance(region, amiss:::region_design(region, 200, 1)) < 0.5), 0.5,
+               tolerance = 0.02)
   expect_error(stats::predict(train_emulator(more, m), cbind(a = 1.9, b = -0.9)), "outside the region",
                class = "amiss_error_input")
   truth <- bent$f(c(a = 0.12, b = 0.2), as.matrix(data["Te"]))
   off <- function(ensemble) max(abs(stats::predict(train_emulator(ensemble, m), cbind(a = 0.12, b = 0.2))$mean - truth))
   expect_lt(off(more), off(first))
+  # Wider where the posterior came to the end of its region, or the emulator was surer than right; not where it fails
+  # and knows.
+  drawn_with <- function(...) {
+    fit$check <- utils::modifyList(fit$check, list(...))
+    diag(refine_ensemble(first, fit, runs = 8)$region$root)
+  }
+  usual <- drawn_with(passed = TRUE, border = 0, z2 = 0.5)
+  expect_equal(drawn_with(passed = FALSE, border = 0, z2 = 0.5), usual)
+  expect_equal(drawn_with(border = 0.06, z2 = 0.5), 1.5 * usual)
+  expect_equal(drawn_with(border = 0, z2 = 1.5), 1.5 * usual)
   elsewhere <- suppressWarnings(ensemble(first$values, first$outputs))
   expect_error(refine_ensemble(elsewhere, fit), "elsewhere", class = "amiss_error_input")
   expect_error(refine_ensemble(first, "fit"), "fit", class = "amiss_error_input")
