@@ -170,5 +170,5 @@ settled_model <- function(model, settings) {
   full <- model$full
   model$full <- NULL
   if (identical(fit, full$fit)) return(model)
-  staged(model$name, measured_model(fit, model$name, model$parent, model$mechanism, settings, "settled"))
+  staged(model$name, measured_model(fit, model$name, model$parent, model$mechanism, settings, "settled, measured"))
 }

@@ -121,14 +121,15 @@ test_that("the evidence does not depend on the unit of a boundary condition", {
 
 test_that("the unit of the basis does not matter", {
   fit <- plain_fit()
-  # Powers of two round nothing; what other factors change in the last digit, chains amplify (test-paper.R), but to far
-  # less than the standard error, 0.05.
+  # Powers of two round nothing. Other factors change the last digit, by which a chain may take another way: what is found
+  # then differs as between two seeds, whose standard deviation is 0.07 (seeds 3 to 9), and the reach's 0.04.
   for (factor in c(2^10, 2^-10, 1000)) {
     other <- calibrate(rescaled(fit$emulator, factor), fit$measurements, quick_ais, seed = 3)
-    expect_lt(abs(other$log_evidence - fit$log_evidence), if (factor == 1000) 5e-3 else 1e-8)
-    expect_lt(abs(other$posterior$log_evidence - fit$posterior$log_evidence), if (factor == 1000) 5e-3 else 1e-8)
-    expect_equal(other$reach, fit$reach, tolerance = if (factor == 1000) 1e-2 else 1e-8)
-    expect_equal(coef(other), coef(fit), tolerance = if (factor == 1000) 1e-3 else 1e-8)
+    exact <- factor != 1000
+    expect_lt(abs(other$log_evidence - fit$log_evidence), if (exact) 1e-8 else 0.21)
+    expect_lt(abs(other$posterior$log_evidence - fit$posterior$log_evidence), if (exact) 1e-8 else 0.21)
+    expect_lt(max(abs(other$reach - fit$reach)), if (exact) 1e-8 else 0.12)
+    expect_equal(coef(other), coef(fit), tolerance = if (exact) 1e-8 else 1e-3)
   }
 })
 

@@ -130,3 +130,17 @@ test_that("an edited model does not go on with the old one's work", {
   expect_equal(kept(0.5), 0.5)
   expect_length(dir(folder), 2)
 })
+
+test_that("a model that is settled at the end is kept beside its fit, not in its place", {
+  stand_in(all_settled = function(...) FALSE, model_of = function(fit) fit$model,
+           fit_runs = function(...) list(fit = list(model = "as it was", tails = "reached")),
+           attribute_discrepancy = function(...) "answers to the sun",
+           predicted_record = function(...) list(scores = "close"))
+  settings <- list(keep = checkpoint_keeper(withr::local_tempdir(), list()))
+  started <- list(model = "as it was")
+  for (time in c("made", "read again")) {
+    model <- settled_model(list(name = "base", fit = started, full = list(fit = started)), settings)
+    expect_identical(model$fit$tails, "reached")
+    expect_identical(model$attribution, "answers to the sun")
+  }
+})

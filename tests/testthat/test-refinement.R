@@ -153,8 +153,7 @@ test_that("where the last round is worse, the one before it stays", {
     if (full) found$fits[[1]]$check$effective <- 0.3 / rounds
     found
   }
-  utils::assignInNamespace("calibrate_sets", worse, "amiss")
-  withr::defer(utils::assignInNamespace("calibrate_sets", sets, "amiss"))
+  stand_in(calibrate_sets = worse)
   fit <- calibrate_refined(runs, m, rounds = 2, control = list(calibration = quick_ais), seed = 1)
   expect_gt(rounds, 1)
   expect_equal(fit$check$effective, 0.3)
