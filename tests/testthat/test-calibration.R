@@ -121,8 +121,8 @@ test_that("the evidence does not depend on the unit of a boundary condition", {
 
 test_that("the unit of the basis does not matter", {
   fit <- plain_fit()
-  # Powers of two round nothing. Other factors change the last digit, by which a chain may take another way: what is found
-  # then differs as between two seeds, whose standard deviation is 0.07 (seeds 3 to 9), and the reach's 0.04.
+  # Powers of two round nothing. Other factors change the last digit, by which a chain may take another way: what is
+  # found then differs as between two seeds, whose standard deviation is 0.07 (seeds 3 to 9), and the reach's 0.04.
   for (factor in c(2^10, 2^-10, 1000)) {
     other <- calibrate(rescaled(fit$emulator, factor), fit$measurements, quick_ais, seed = 3)
     exact <- factor != 1000
