@@ -81,7 +81,9 @@ diagnosis_verdict <- function(upgrade) {
   likely <- of("likely")
   if (length(likely)) {
     tag <- if (describes(upgrade$catalogue[[likely[[1]]$mechanism]])) "Described, not explained"
-           else paste("Likely cause, but", paste(likely[[1]]$doubts, collapse = "; "))
+           else paste("Likely cause, but", paste(c(utils::head(likely[[1]]$doubts, 2),
+                                                   if (length(likely[[1]]$doubts) > 2) "more speaks against it"),
+                                                 collapse = "; "))
     return(list(verdict = "likely", tag = tag, headline = headline))
   }
   list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
@@ -107,7 +109,7 @@ open_verdict <- function(upgrade) {
   if (remainder$large) {
     return(unexplained(sprintf(paste("Something is missing from the model, and %s: its error is %s times the stated",
                                      "noise; %s."), explained, short(remainder$ratio),
-                               remainder$pattern$what %||% "it answers to no boundary condition that was measured")))
+                               remainder$pattern$what %||% "no response to a boundary condition was found in it")))
   }
   if (!base$fit$trust$trusted) {
     return(list(verdict = "nothing", tag = "Nothing decisive, but the numbers are not trusted",
@@ -123,11 +125,16 @@ open_verdict <- function(upgrade) {
 cause_headline <- function(upgrade) {
   adopted <- adopted_models(upgrade)
   sentence <- function(m) upgrade$catalogue[[m$mechanism]]$sentence
+  rivals <- function(m) {
+    told <- vapply(upgrade$catalogue[m$held_out_rivals], `[[`, "", "sentence")
+    if (length(told)) paste0(" But by the data held out: ", paste(told, collapse = " Or: "))
+  }
   adopted <- adopted[order(match(vapply(adopted, `[[`, "", "verdict"), c("named", "likely", "stand-in")))]
   told <- vapply(seq_along(adopted), function(k) {
     m <- adopted[[k]]
     switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
-           likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
+           likely = paste0(if (k > 1) "Likely as well: " else if (length(m$held_out_rivals)) "By the evidence: "
+                           else "Most likely: ", sentence(m), rivals(m)),
            paste0("\"", m$mechanism, "\" fits", if (k > 1) " too",
                   ", but data held out do not gain by it: take it as a stand-in for something else."))
   }, "")
@@ -141,7 +148,7 @@ improves_held_out <- function(upgrade) {
 }
 
 evidence_sentence <- function(row) {
-  sprintf("The evidence for %s is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf),
+  sprintf("The evidence for %s over no change is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf),
           odds_interval(c(row$lower95, row$upper95)))
 }
 
@@ -314,11 +321,29 @@ gain_sentences <- function(upgrade) {
   told <- function(v) if (length(v) < 2) paste("is", with_unit(short(v), unit)) else change_words(v[1], v[2], unit)
   c(paste0("The typical error (RMSE) ", told(seen), " in calibration",
            if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
+    nearest_run_sentence(upgrade),
     if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
     sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside,
             if (anyNA(held)) "calibration" else "held-out",
             if (inside < 88) paste0(": ",
                                     narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
+}
+
+# Where the base model's discrepancy, and not its parameters, follows the record, other values of them come nearer.
+nearest_run_sentence <- function(upgrade) {
+  base <- upgrade$models[[1]]
+  if (length(upgrade$models) < 2 || is_several(upgrade$measurements)) return(NULL)
+  nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)), nearest_run, 0, base$fit))
+  if (nearest > 0.9 * base$scores$calibrate[["rmse"]]) return(NULL)
+  sprintf(paste("A part of this fall is not due to the change: one of the base model's runs is wrong by only %s in",
+                "calibration, but its discrepancy did the work of its parameters."),
+          with_unit(short(nearest), upgrade$measurements$unit))
+}
+
+# The least RMSE in calibration among the runs that an emulator was trained on.
+nearest_run <- function(emulator, fit) {
+  runs <- tcrossprod(emulator$basis$vectors, emulator$processes$coefficients)
+  sqrt(min(colMeans((runs - fit$measurements$y[fit$rows])^2)))
 }
 
 # What each of several records gains, in its own unit.
@@ -350,7 +375,8 @@ remaining_sentences <- function(upgrade) {
                             if (is.null(last$pattern))
                               ": either the stated noise is too small, or something else is missing."
                             else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    reach_sentence(upgrade$models[[length(upgrade$models)]]$fit),
+    reach_sentence(upgrade$models[[length(upgrade$models)]]$fit) %||% if (last$large)
+      "The parameters may have taken the place of what is missing: do not read their values as physical.",
     vapply(group_words(upgrade$models[[length(upgrade$models)]]$attribution), paste0, "", "."),
     if (length(edge))
       sprintf(paste("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these",

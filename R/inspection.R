@@ -81,17 +81,18 @@ held_out_inspection <- function(model, measurements) {
                               "calibration (argument validate of measurements()), or measure some more.")))
   }
   if (held < 1.5 * max(seen, measurements$noise_sd)) return(NULL)
-  beyond <- uncovered_conditions(measurements)
+  beyond <- uncovered_conditions(measurements, model$fit)
   where <- if (!length(beyond)) "compare the two periods for what else differs: settings, use, sensors"
            else sprintf("there %s outside of what calibration saw; calibrate on data that cover it",
                         listed(sprintf("%s lies in %s of the steps", names(beyond), percent(beyond))))
   c(held_out = sprintf("On held-out data the error is %s times that in calibration: %s.", short(held / seen), where))
 }
 
-# Share of the held-out steps at which a condition lies outside of its range in calibration, if a tenth or more.
-uncovered_conditions <- function(measurements) {
+# Share of the held-out steps at which a condition that the model reads lies outside of its range in calibration, if a
+# tenth or more.
+uncovered_conditions <- function(measurements, fit) {
   if (is_several(measurements)) {
-    each <- lapply(measurements$records, uncovered_conditions)
+    each <- Map(uncovered_conditions, measurements$records, fit$records[names(measurements$records)])
     shares <- unlist(unname(each))
     names(shares) <- paste(names(shares), "of", rep(names(each), lengths(each)), recycle0 = TRUE)
     return(shares)
@@ -103,14 +104,17 @@ uncovered_conditions <- function(measurements) {
     mean(held < seen[1] | held > seen[2], na.rm = TRUE)
   }, 0)
   turning <- tabulate(measurements$condition, length(share)) == 2
-  share[share >= 0.1 & !turning]
+  simulator <- fit$emulator$simulator
+  read <- if (is.null(simulator)) names(share) else driver_names(simulator)
+  share[share >= 0.1 & !turning & names(share) %in% read]
 }
 
 # ---- one mechanism
 
 mechanism_inspections <- function(upgrade, model) {
   trials <- upgrade$candidates[upgrade$candidates$from == model$parent, ]
-  rivals <- trials[trials$mechanism != model$mechanism & trials$probability >= rival_probability, ]
+  adopted <- vapply(adopted_models(upgrade), `[[`, "", "mechanism")
+  rivals <- trials[!trials$mechanism %in% adopted & trials$probability >= rival_probability, ]
   told <- c(vapply(rivals$mechanism, function(rival) separating_words(upgrade, trials, model$mechanism, rival), ""),
             confounded_inspection(upgrade, model))
   c(stats::setNames(told, rep("rival", length(told))),
@@ -121,7 +125,25 @@ mechanism_inspections <- function(upgrade, model) {
       c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: a drift of it would",
                               "explain as much as %s."),
                         upgrade$measurements$target, model$mechanism))
-    })
+    },
+    if (any(grepl("changes slowly", model$doubts))) {
+      c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: it tells whether the",
+                              "sensor changes or what it measures."), upgrade$measurements$target))
+    },
+    step_inspection(upgrade, model))
+}
+
+# A time constant about as short as the record's step: the simulator's own steps may be what is seen.
+step_inspection <- function(upgrade, model) {
+  if (is_several(upgrade$measurements)) return(NULL)
+  brought <- upgrade$candidates[upgrade$candidates$from == model$parent &
+                                  upgrade$candidates$mechanism == model$mechanism, "parameters"][[1]]
+  hours <- c(s = 1 / 3600, min = 1 / 60, h = 1, d = 24)[brought$unit]
+  short <- !is.na(hours) & brought$median * hours <= 2 * upgrade$measurements$step_h
+  if (!any(short)) return(NULL)
+  c(step = sprintf(paste("The time that %s brings (%s) is about a step of the record: a simulator whose own steps are",
+                         "coarse errs alike. Run it with finer ones before you believe in %s."), model$mechanism,
+                   listed(brought$name[short]), model$mechanism))
 }
 
 # What would tell two mechanisms apart: conditions that only one answers to, or what each asks to be found on site.
@@ -130,9 +152,10 @@ separating_words <- function(upgrade, trials, a, b) {
   only <- list(setdiff(drivers[[1]], drivers[[2]]), setdiff(drivers[[2]], drivers[[1]]))
   if (!length(unlist(only))) {
     called <- vapply(c(a, b), function(name) called_for(trials$parameters[[match(name, trials$mechanism)]]), "")
-    return(sprintf(paste("Since %s and %s answer to the same conditions, only a look on site tells them apart: the",
-                         "one asks for %s, the other for %s."),
-                   a, b, called[1], called[2]))
+    same <- if (length(drivers[[1]])) "answer to the same conditions" else "answer to no condition that was measured"
+    return(sprintf(paste("Since %s and %s %s, only a look on site tells them apart: the one asks for %s, the other",
+                         "for %s."),
+                   a, b, same, called[1], called[2]))
   }
   together <- correlation_words(upgrade$measurements, drivers[[1]], drivers[[2]])
   either <- lapply(only, listed, "or")
@@ -227,9 +250,10 @@ answer_inspections <- function(upgrade, last) {
                     "look for another way in which %s acts."),
               name, listed(driven), if (length(driven) > 1) "were" else "was", name)
     } else {
-      sprintf(paste("The error still answers to %s, and no mechanism left in the catalogue is driven by it: think",
-                    "of what acts with %s, and add it."),
-              name, name)
+      ever <- any(vapply(upgrade$catalogue, function(entry) name %in% entry$boundary, NA))
+      sprintf(paste("The error still answers to %s, and no mechanism %s the catalogue is driven by it: think of what",
+                    "acts with %s, and add it."),
+              name, if (ever) "left in" else "of", name)
     }
   }, "")
   stats::setNames(told, rep("answer", length(told)))
@@ -296,7 +320,8 @@ remainder_inspection <- function(model, measurements) {
   if (left$large && is.null(left$pattern)) {
     return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: hold a second sensor",
                                    "beside the first; if that noise is right, something is still missing from the",
-                                   "model."),
+                                   "model, perhaps something that acts through two conditions at once or by",
+                                   "thresholds, which an attribution does not show."),
                              short(left$ratio), noise)))
   }
   if (left$large) {

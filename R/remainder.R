@@ -60,7 +60,8 @@ clock_hour <- function(time) {
 # Share of the sum of squares about the mean that a parabola in time explains.
 drift_share <- function(r, hours) {
   if (length(r) < 10) return(0)
-  summary(stats::lm(r ~ stats::poly(hours, 2)))$r.squared
+  left <- stats::residuals(stats::lm(r ~ stats::poly(hours, 2)))
+  1 - sum(left^2) / sum((r - mean(r))^2)
 }
 
 # Share of the variance that a profile over the day explains, adjusted for its number of values; three days at least.
@@ -79,6 +80,29 @@ drift_rivals <- function(models, control, threads) {
   if (!length(of_record)) return(FALSE)
   drift <- if (any(of_record > 0)) sum(of_record[of_record > 0]) else max(of_record)
   bayes_factor(models[[length(models)]]$fit, base)$log10_bf < drift + control$decisive
+}
+
+# What is told of a mechanism that a drift rivals: one that moves the simulation as a drift does is not contradicted by
+# it, but by all else that is slow.
+drift_doubt <- function(parent, model, threads) {
+  if (acts_as_drift(parent$fit, model$fit, threads)) "anything that changes slowly would explain the error as well"
+  else "a drifting sensor would explain the error as well"
+}
+
+# Whether a parabola in time holds nearly all that an extension of a model changes, at the centre of its posterior.
+acts_as_drift <- function(parent, fit, threads) {
+  slow <- mapply(function(before, after) {
+    if (is.null(after$emulator$simulator)) return(FALSE)
+    parameters <- after$emulator$parameters
+    values <- unit_to_values(stats::pnorm(matrix(posterior_centre(after), 1)), parameters)
+    run <- function(fit) {
+      own <- values[, names(fit$emulator$parameters), drop = FALSE]
+      suppress_run_warnings(simulate_measured(fit$emulator$simulator, own, fit$measurements, "calibrate", threads))[, 1]
+    }
+    change <- run(after) - run(before)
+    all(is.finite(change)) && any(change != 0) && drift_share(change, after$measurements$hours[after$rows]) > 0.99
+  }, record_fits(parent), record_fits(fit))
+  all(slow)
 }
 
 # Its log10 Bayes factor; NULL for a record too short to show one.

@@ -67,6 +67,11 @@ trial_table <- function(fits, current, from, full, responses = NULL) {
   table
 }
 
+# The Bayes factor of a coarse calibration.
+coarse_factor <- function(fit, current) {
+  as_far_as_emulated(bayes_factor(fit, as_coarse(current)), fit$check, stats::nobs(current))
+}
+
 # The interval of a candidate whose emulator runs refute holds the error e that they saw, in units of the noise: over N
 # rows it takes N e^2 / 2 nats from the log-likelihood of what the emulator says, and moves it by sqrt(N) e at random.
 as_far_as_emulated <- function(row, check, rows) {

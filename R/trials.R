@@ -59,7 +59,7 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
     if (length(fits) && settings$spent()) break
     screens[[name]] <- staged(turn(name), naming_mechanism(name, screen_model(
       trials[[name]], trial_name(current, name), settings, hopeless(fits, coarse, settings$control))))
-    report_candidate(name, screens[[name]]$fit, coarse, say)
+    report_candidate(name, coarse_factor(screens[[name]]$fit, current$fit), say)
   }
   screens
 }
@@ -80,7 +80,7 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
         full[[name]] <- staged(turn(name), naming_mechanism(name, fit_fully(
           trials[[name]], trial_name(current, name), settings, first = screens[[name]])))
         fits[[name]] <- full[[name]]$fit
-        report_candidate(paste(name, "in full"), fits[[name]], current$fit, say)
+        report_candidate(paste(name, "in full"), bayes_factor(fits[[name]], current$fit), say)
       }
       next
     }
@@ -127,8 +127,7 @@ hopeless <- function(fits, reference, control, far = 3) {
   }
 }
 
-report_candidate <- function(what, fit, reference, say) {
-  bf <- bayes_factor(fit, reference)
+report_candidate <- function(what, bf, say) {
   say(
     "  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")
 }

@@ -61,9 +61,11 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
 #'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
-#'   place of something else. `confounded_with` names parameters that are correlated beyond 0.4 with those that it
-#'   brought: other parts of the model that could do the same. Of several records `fit` is what [calibrate_jointly()]
-#'   gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its own unit.
+#'   place of something else. `held_out_rivals` names mechanisms that could have been adopted in its place and with
+#'   which data held out are met better. `confounded_with` names parameters that are correlated beyond 0.4 with those
+#'   that it brought: other parts of the model that could do the same. Of several records `fit` is what
+#'   [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its
+#'   own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
@@ -168,6 +170,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     chosen <- best$mechanism
     say("Adopted {.strong {chosen}}: log10 Bayes factor {round(best$log10_bf, 1)}")
     current <- measured_model(trials$fits[[chosen]], paste(current$name, "+", chosen), current$name, chosen, settings)
+    current$held_out_rivals <- held_out_rivals(current, trials, settings)
     report_model(current, say)
     models <- c(models, list(current))
   }
@@ -243,18 +246,21 @@ report_model <- function(model, say) {
     warn_coarse_basis(fits[[k]]$emulator, "control$emulator$max_vectors", paste(c(model$name, names(fits)[k]),
                                                                                  collapse = ", "))
   }
-  first <- model$attribution$table[1, ]
+  first <- utils::head(model$attribution$table[model$attribution$table$significant, ], 1)
   say(paste("{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
-            "{signif(model$scores$validate[['rmse']], 3)} held out; discrepancy answers most to",
-            "{.field {first$boundary}} (log10 Bayes factor {round(first$log10_bf_dropped, 1)})"))
+            "{signif(model$scores$validate[['rmse']], 3)} held out; discrepancy",
+            if (nrow(first)) paste("answers most to {.field {first$boundary}}",
+                                   "(log10 Bayes factor {round(first$log10_bf_dropped, 1)})")
+            else "shows no response to a boundary condition"))
 }
 
 stop_reason <- function(table, attribution, decisive) {
   significant <- significant_conditions(attribution$table)
   best <- best_trial(table)
   highest <- table[which.max(table$log10_bf), ]
-  if (!nrow(best)) best <- highest
-  found <- sprintf("best: %s, log10 Bayes factor %.1f", best$mechanism, best$log10_bf)
+  if (!nrow(best) || highest$log10_bf < decisive) best <- highest
+  found <- sprintf("best: %s, log10 Bayes factor %.1f%s", best$mechanism, best$log10_bf,
+                   if (raises_error(best)) ", though the error rises with it" else "")
   why <- if (raises_error(highest) && highest$log10_bf >= decisive) {
     sprintf("no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but raises it)",
             highest$mechanism, highest$log10_bf)

@@ -8,6 +8,7 @@ fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the e
 # otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
   remains <- much_remains(models, measurements)
+  inside <- models[[length(models)]]$scores$validate[["coverage95"]]
   for (k in seq_along(models)[-1]) {
     model <- models[[k]]
     parent <- models[[k - 1]]
@@ -16,9 +17,13 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
     gain <- held_out_gain(parent, model)
     no_gain <- isFALSE(gain$improves)
+    # What was adopted later is no other cause: with both, the evidence is decisively above that of either alone.
+    later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
+    others <- 1 - row$probability - sum(trials$probability[trials$mechanism %in% later])
     doubts <- c(
       if (describes(catalogue[[model$mechanism]])) "it describes what is missing and does not explain it",
-      if (row$probability < 0.95) "other causes are possible",
+      if (others > 0.05) "other causes are possible",
+      if (length(model$held_out_rivals)) paste("data held out speak for", listed(model$held_out_rivals)),
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (row$lower95 < control$decisive + few_runs_error && from_few_runs(model$fit))
         "the runs over the priors are too few for evidence of that size",
@@ -29,7 +34,8 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
         "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
       if (remains) "a good part of the error remains",
-      if (k == 2 && drift_rivals(models, control, threads)) "a drifting sensor would explain the error as well")
+      if (isTRUE(inside < least_inside)) sprintf("its 95 %% band holds only %s of the data held out", percent(inside)),
+      if (k == 2 && drift_rivals(models, control, threads)) drift_doubt(parent, model, threads))
     models[[k]]$held_out_gain <- gain
     for (name in names(model$records)) {
       models[[k]]$records[[name]]$held_out_gain <- held_out_gain(record_model(parent, name), record_model(model, name))
@@ -41,6 +47,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
   models
 }
 
+least_inside <- 0.8    # share of the data held out in the 95 % band of the last model, below which it is wrong there
 few_runs_error <- 3  # decades by which evidence was off with too few runs
 
 # Whether the runs that fill the space of a model's parameters are few_runs(), of one record at least.
@@ -75,6 +82,19 @@ held_out_gain <- function(parent, model) {
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
+}
+
+# Other mechanisms that could have been adopted in place of `model`, calibrated in full, with which the error on data
+# held out is smaller by more than its own error.
+held_out_rivals <- function(model, trials, settings) {
+  table <- trials$table
+  others <- table$mechanism[table$judged_by == "calibration" & table$mechanism != model$mechanism &
+                              table$probability >= rival_probability & !raises_error(table)]
+  Filter(function(name) {
+    fit <- trials$fits[[name]]
+    predicted <- settings$keep(list("rival", model$parent, name, plain(model_of(fit))), predicted_record(fit, settings))
+    isTRUE(held_out_gain(model, c(list(fit = fit), predicted))$improves)
+  }, others)
 }
 
 # The condition that drives a mechanism answered before and does so still, with more than half of its evidence.

@@ -61,7 +61,7 @@ change_words <- function(before, after, unit) {
 }
 
 # 10^x written out while it can be read.
-power_of_ten <- function(x) ifelse(x < 4.5, format_each_comma(signif(10^x, 2)), paste0("10^", round(x)))
+power_of_ten <- function(x) ifelse(x < 6, format_each_comma(signif(10^x, 2)), paste0("10^", round(x)))
 
 format_each_comma <- function(x) vapply(x, format, "", big.mark = ",", scientific = FALSE)
 

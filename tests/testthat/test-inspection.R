@@ -22,7 +22,9 @@ test_that("rivals are told apart by what only one of them answers to, or on site
   expect_match(told, sprintf(paste("tell sun from drift, measure while Gv changes while Te does not, .*correlation",
                                    "is %.2f"), r))
   expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
-  upgrade$catalogue$drift$boundary <- "Gv"
+  upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- character()
+  expect_match(about(inspected(upgrade), "rival"), "Since sun and drift answer to no condition that was measured")
+  upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- "Gv"
   expect_match(about(inspected(upgrade), "rival"), paste("only a look on site tells them apart: the one asks for a",
                                                          "sun_gain of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
@@ -35,8 +37,30 @@ test_that("a stand-in and a drifting sensor have tests of their own", {
   upgrade$models[[2]]$verdict <- "stand-in"
   expect_match(about(inspected(upgrade), "stand_in"), "Take sun as a sign")
   expect_length(about(inspected(upgrade), "site"), 0)
+  upgrade$models[[2]]$doubts <- "anything that changes slowly would explain the error as well"
+  expect_match(about(inspected(upgrade), "drift"), "whether the sensor changes or what it measures")
   upgrade$models[[2]]$doubts <- "a drifting sensor would explain the error as well"
   expect_match(about(inspected(upgrade), "drift"), "sensor of Ti beside a second one")
+})
+
+test_that("a time of about a step asks for finer steps of the simulator", {
+  upgrade <- small_upgrade()
+  brought <- function(median, unit) {
+    upgrade$candidates$parameters[[1]][c("name", "median", "unit")] <- list("lag", median, unit)
+    about(inspected(upgrade), "step")
+  }
+  expect_identical(upgrade$candidates$mechanism[1], "sun")
+  expect_match(brought(1.5, "h"), "The time that sun brings \\(lag\\) is about a step of the record")
+  expect_match(brought(80, "min"), "finer ones before you believe in sun")
+  expect_length(brought(3, "h"), 0)
+  expect_length(brought(1.5, "K"), 0)
+})
+
+test_that("conditions are told as not covered only where the model reads them", {
+  m <- small_upgrade()$measurements
+  m$boundary[m$use == "validate", ] <- m$boundary[m$use == "validate", ] + 1e3
+  expect_named(amiss:::uncovered_conditions(m, small_upgrade()$models[[1]]$fit), "Te")
+  expect_named(amiss:::uncovered_conditions(m, small_upgrade()$models[[2]]$fit), c("Te", "Gv"))
 })
 
 test_that("conditions that go together, answers without a mechanism and absent drivers are told", {

@@ -165,3 +165,13 @@ test_that("an interrupt leaves the session as it was and keeps what is finished"
   expect_length(suppressMessages(work()), 2)
   expect_equal(calls, 10)
 })
+
+test_that("a response of the error is told of only where one is significant", {
+  model <- small_upgrade()$models[[1]]
+  said <- function(model) {
+    amiss:::report_model(model, function(text, .envir = parent.frame()) cli::format_inline(text, .envir = .envir))
+  }
+  expect_match(said(model), "discrepancy answers most to .?Gv")
+  model$attribution$table$significant <- FALSE
+  expect_match(said(model), "discrepancy shows no response to a boundary condition")
+})

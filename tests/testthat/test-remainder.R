@@ -128,6 +128,16 @@ test_that("the evidence for a drift is that of a full calibration with such a dr
   expect_gt(full$log10_bf, 2)
 })
 
+test_that("of a mechanism that is a drift itself, what else is slow is told", {
+  world <- drift_world(by = 3, sun = 0.01)
+  drifting <- with_parameters(linear_simulator(), free("slope", normal(0, 0.1)), f = function(values, drivers, base) {
+    base(values) + values[["slope"]] * seq_len(nrow(drivers)) / 24
+  })
+  doubt <- function(model) amiss:::drift_doubt(world$base, model, threads = 1)
+  expect_match(doubt(world$fit(drifting)), "anything that changes slowly")
+  expect_match(doubt(world$sunny), "a drifting sensor")
+})
+
 test_that("a cause that a drift rivals is only likely", {
   upgrade <- small_upgrade()
   expect_false(amiss:::drift_rivals(upgrade$models, upgrade$control, threads = 1))

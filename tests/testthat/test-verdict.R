@@ -55,6 +55,14 @@ test_that("each doubt makes a mechanism likely", {
     u$candidates$lower95 <- -290
     u
   })
+  expect_doubt("data held out speak for drift", function(u) {
+    u$models[[2]]$held_out_rivals <- "drift"
+    u
+  })
+  expect_doubt("band holds only 70 % of the data held out", function(u) {
+    u$models[[2]]$scores$validate[["coverage95"]] <- 0.7
+    u
+  })
   expect_doubt("the error in calibration rose with it", function(u) {
     u$models[[2]]$scores$calibrate[["rmse"]] <- 1.03 * u$models[[1]]$scores$calibrate[["rmse"]]
     u
@@ -74,6 +82,57 @@ test_that("each doubt makes a mechanism likely", {
     for (k in 1:2) u$models[[k]]$prediction$observed <- p$observed + extra
     u
   })
+})
+
+test_that("what was adopted later is no other cause", {
+  upgrade <- small_upgrade()
+  upgrade$candidates$probability <- ifelse(upgrade$candidates$mechanism == "sun", 0.6, 0.4)
+  expect_match(rejudged(upgrade)$models[[2]]$doubts, "other causes are possible")
+  later <- upgrade$models[[2]]
+  later[c("name", "parent", "mechanism")] <- list("base + sun + drift", "base + sun", "drift")
+  upgrade$models[[3]] <- later
+  upgrade$candidates <- rbind(upgrade$candidates, transform(upgrade$candidates, from = "base + sun"))
+  upgrade <- rejudged(upgrade)
+  expect_no_match(c("", upgrade$models[[2]]$doubts), "other causes")
+  expect_false(any(grepl("tell sun from drift", upgrade_inspections(upgrade))))
+})
+
+test_that("a rival with which data held out are met better is found among those calibrated in full, and told", {
+  upgrade <- small_upgrade()
+  model <- upgrade$models[[2]]
+  worse <- model
+  held <- worse$prediction$use == "validate"
+  worse$prediction$mean[held] <- worse$prediction$mean[held] + 0.3
+  stand_in(predicted_record = function(fit, settings) model[c("prediction", "scores")])
+  trials <- function(judged_by = "calibration", probability = 0.1) {
+    list(fits = list(sun = worse$fit, drift = model$fit),
+         table = data.frame(mechanism = c("sun", "drift"), judged_by = c("calibration", judged_by),
+                            probability = c(0.8, probability), error_ratio = 0.5))
+  }
+  settings <- list(keep = function(name, value) value)
+  expect_identical(amiss:::held_out_rivals(worse, trials(), settings), "drift")
+  expect_length(amiss:::held_out_rivals(model, trials(), settings), 0)
+  expect_length(amiss:::held_out_rivals(worse, trials("screening"), settings), 0)
+  expect_length(amiss:::held_out_rivals(worse, trials(probability = 0.01), settings), 0)
+  upgrade$models[[2]]$held_out_rivals <- "drift"
+  expect_match(summary(rejudged(upgrade))$headline,
+               "^By the evidence: Sun .* But by the data held out: The target drifts")
+})
+
+test_that("where the base model's parameters could have come nearer by themselves, the gain says so", {
+  upgrade <- small_upgrade()
+  nearest <- amiss:::nearest_run(upgrade$models[[1]]$fit$emulator, upgrade$models[[1]]$fit)
+  runs <- simulate_design(model_of(upgrade$models[[1]]$fit), upgrade$measurements, runs = 20, seed = 1)
+  y <- upgrade$measurements$y[used_rows(upgrade$measurements, "calibrate")]
+  # The basis leaves out less than a hundredth of the noise.
+  expect_equal(amiss:::nearest_run(train_emulator(runs, upgrade$measurements), upgrade$models[[1]]$fit),
+               sqrt(min(colMeans((runs$outputs - y)^2))), tolerance = 1e-3)
+  gain <- function(rmse) {
+    upgrade$models[[1]]$scores$calibrate[["rmse"]] <- rmse
+    paste(summary(upgrade)$gain, collapse = " ")
+  }
+  expect_match(gain(1.2 * nearest), "base model's runs is wrong by only")
+  expect_no_match(gain(1.05 * nearest), "by only")
 })
 
 test_that("a parameter of the base model at the edge of its prior is no doubt about the mechanism", {
@@ -225,6 +284,16 @@ test_that("a mechanism with which the simulation's own error rises is not adopte
                "not adopted, because with sun the simulation's own error .* 1.9 times")
   expect_match(told$candidates[["error in calibration"]], "1.9 times", all = FALSE)
   expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title, "the best raises the error")
+})
+
+test_that("the best of what was not adopted is the one of highest evidence, also where the error rises with it", {
+  upgrade <- small_upgrade()
+  table <- data.frame(mechanism = c("sun", "lag"), log10_bf = c(1.2, 0.3), lower95 = 0, upper95 = 2,
+                      judged_by = "screening", error_ratio = c(1.4, 1))
+  reason <- amiss:::stop_reason(table, upgrade$models[[2]]$attribution, 2)
+  expect_match(reason, "best: sun, log10 Bayes factor 1.2, though the error rises with it;")
+  table$error_ratio <- 1
+  expect_match(amiss:::stop_reason(table, upgrade$models[[2]]$attribution, 2), "best: sun, log10 Bayes factor 1.2;")
 })
 
 test_that("where the base model's emulator is refuted, no mechanism is judged and no odds are given", {

@@ -17,3 +17,7 @@ test_that("what rounds to zero has no sign, and a clock no sixtieth minute", {
   expect_equal(amiss:::signed(c(-0.01, 0.04, -0.06, 12.3)), c("0.0", "0.0", "-0.1", "+12"))
   expect_equal(amiss:::clock_words(c(0, 7.5, 10.9999, 23.25)), c("00:00", "07:30", "11:00", "23:15"))
 })
+
+test_that("odds up to a million are told in figures", {
+  expect_equal(amiss:::power_of_ten(c(1, 4.6, 5.9, 6.2)), c("10", "40,000", "790,000", "10^6"))
+})
