@@ -1,12 +1,15 @@
 #!/usr/bin/env Rscript
 # The loop on records of other sciences (bench/sciences): a tank with a leak and a little rain, a battery cell with two
-# causes, a greenhouse whose cause the catalogue does not hold, a town where nothing is missing. What is named, what was
-# hidden, and how many of the true values lie in their 95 % intervals.
-# Usage: Rscript bench/sciences.R [--records reservoir,cell,greenhouse,town] [--seed 1] [--runs 120] [--out FILE]
+# causes, a greenhouse and a photovoltaic module whose causes the catalogues do not hold, a town where nothing is
+# missing, a river under wind, glucose with two causes, a reactor that fouls, a drug that tissue takes up. What is
+# named, what was hidden, and how many of the true values lie in their 95 % intervals.
+# Usage: Rscript bench/sciences.R
+#          [--records reservoir,cell,greenhouse,town,river,glucose,reactor,module,drug] [--seed 1] [--runs 120]
+#          [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
 suppressPackageStartupMessages(library(amiss))
-known <- c("reservoir", "cell", "greenhouse", "town")
+known <- c("reservoir", "cell", "greenhouse", "town", "river", "glucose", "reactor", "module", "drug")
 for (part in c("common", known)) source(file.path(here, "sciences", paste0(part, ".R")))
 chosen <- strsplit(option("records", paste(known, collapse = ","), "town"), ",")[[1]]
 if (!all(chosen %in% known)) stop("--records: choose from ", paste(known, collapse = ", "), call. = FALSE)
