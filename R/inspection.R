@@ -1,9 +1,6 @@
 # What to inspect next to settle what a result leaves open: sentences that say what to measure, look at or compute, each
 # from something that the result knows. Their names say what they are about.
 
-# Rivals below this probability are not worth a measurement.
-rival_probability <- 0.05
-
 upgrade_inspections <- function(upgrade) {
   last <- upgrade$models[[length(upgrade$models)]]
   adopted <- adopted_models(upgrade)

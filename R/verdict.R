@@ -47,6 +47,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
   models
 }
 
+rival_probability <- 0.05  # of a mechanism not adopted, below which it is no rival and not worth a measurement
 least_inside <- 0.8    # share of the data held out in the 95 % band of the last model, below which it is wrong there
 few_runs_error <- 3  # decades by which evidence was off with too few runs
 
