@@ -127,6 +127,19 @@ hopeless <- function(fits, reference, control, far = 3) {
   }
 }
 
+# Other mechanisms that could have been adopted in place of `model`, calibrated in full, with which the error on data
+# held out is smaller by more than its own error.
+held_out_rivals <- function(model, trials, settings) {
+  table <- trials$table
+  others <- table$mechanism[table$judged_by == "calibration" & table$mechanism != model$mechanism &
+                              table$probability >= rival_probability & !raises_error(table)]
+  Filter(function(name) {
+    fit <- trials$fits[[name]]
+    predicted <- settings$keep(list("rival", model$parent, name, plain(model_of(fit))), predicted_record(fit, settings))
+    isTRUE(held_out_gain(model, c(list(fit = fit), predicted))$improves)
+  }, others)
+}
+
 report_candidate <- function(what, bf, say) {
   say(
     "  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")

@@ -85,19 +85,6 @@ held_out_gain <- function(parent, model) {
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
 }
 
-# Other mechanisms that could have been adopted in place of `model`, calibrated in full, with which the error on data
-# held out is smaller by more than its own error.
-held_out_rivals <- function(model, trials, settings) {
-  table <- trials$table
-  others <- table$mechanism[table$judged_by == "calibration" & table$mechanism != model$mechanism &
-                              table$probability >= rival_probability & !raises_error(table)]
-  Filter(function(name) {
-    fit <- trials$fits[[name]]
-    predicted <- settings$keep(list("rival", model$parent, name, plain(model_of(fit))), predicted_record(fit, settings))
-    isTRUE(held_out_gain(model, c(list(fit = fit), predicted))$improves)
-  }, others)
-}
-
 # The condition that drives a mechanism answered before and does so still, with more than half of its evidence.
 still_answers <- function(parent, model, boundary) {
   strength <- function(m) {
