@@ -48,7 +48,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
 }
 
 rival_probability <- 0.05  # of a mechanism not adopted, below which it is no rival and not worth a measurement
-least_inside <- 0.8    # share of the data held out in the 95 % band of the last model, below which it is wrong there
+least_inside <- 0.8  # share of the data held out in the 95 % band of the last model, below which it is wrong there
 few_runs_error <- 3  # decades by which evidence was off with too few runs
 
 # Whether the runs that fill the space of a model's parameters are few_runs(), of one record at least.
