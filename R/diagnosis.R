@@ -169,7 +169,7 @@ sure_sentences <- function(upgrade) {
   best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
   needed <-
     sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that lies",
-                  "wholly in its favour."),
+                  "wholly in its favour, or an error that falls by a third, on held-out data too."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
@@ -177,11 +177,20 @@ sure_sentences <- function(upgrade) {
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
              trust_sentence(upgrade, best)))
   }
-  later <- vapply(adopted[-1], function(m) {
-    evidence_sentence(upgrade$candidates[upgrade$candidates$from == m$parent &
-                                         upgrade$candidates$mechanism == m$mechanism, ])
-  }, "")
-  c(evidence_sentence(best), later, probability_sentence(trials), trust_sentence(upgrade, best))
+  each <- unlist(lapply(adopted, function(m) {
+    row <- upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ]
+    c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive))
+  }))
+  c(each, probability_sentence(trials), trust_sentence(upgrade, best))
+}
+
+# Why a mechanism was adopted for which the evidence is not decisive.
+fallen_sentence <- function(row, decisive) {
+  if (row$log10_bf >= decisive) return(NULL)
+  sprintf(paste("That is not decisive: the discrepancy, which may be anything, does as well without %s. It was adopted",
+                "because the simulation itself gains: its own error falls to %s of what it was, and on held-out data",
+                "too."),
+          row$mechanism, percent(row$error_ratio))
 }
 
 raised_sentence <- function(row) {
@@ -270,7 +279,8 @@ mechanism_words <- function(model, upgrade) {
   changes <- changes_table(upgrade)
   list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
        sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))), collapse = " "),
-       evidence = evidence_sentence(row), brought = step_sentence(upgrade, model), against = doubt_sentence(model),
+       evidence = paste(c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive)), collapse = " "),
+       brought = step_sentence(upgrade, model), against = doubt_sentence(model),
        also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
        inspect = mechanism_inspections(upgrade, model),
        changes = changes[changes$mechanism == model$mechanism, ])
@@ -333,17 +343,11 @@ gain_sentences <- function(upgrade) {
 nearest_run_sentence <- function(upgrade) {
   base <- upgrade$models[[1]]
   if (length(upgrade$models) < 2 || is_several(upgrade$measurements)) return(NULL)
-  nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)), nearest_run, 0, base$fit))
+  nearest <- least_error(base$fit)
   if (nearest > 0.9 * base$scores$calibrate[["rmse"]]) return(NULL)
   sprintf(paste("A part of this fall is not due to the change: one of the base model's runs is wrong by only %s in",
                 "calibration, but its discrepancy did the work of its parameters."),
           with_unit(short(nearest), upgrade$measurements$unit))
-}
-
-# The least RMSE in calibration among the runs that an emulator was trained on.
-nearest_run <- function(emulator, fit) {
-  runs <- tcrossprod(emulator$basis$vectors, emulator$processes$coefficients)
-  sqrt(min(colMeans((runs - fit$measurements$y[fit$rows])^2)))
 }
 
 # What each of several records gains, in its own unit.

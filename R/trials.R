@@ -64,9 +64,9 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
   screens
 }
 
-# list(fits, table, current) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by
-# its full calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be
-# adopted, or the present model if it stays, is settled, and must lead after that too.
+# list(fits, table, current, adopted) of the mechanisms, those that could lead calibrated in full. Where the leader
+# falls back by its full calibration, others may come near: they are calibrated too, until what leads is known in full.
+# What is to be adopted, or the present model if it stays, is settled, and must lead after that too.
 tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
   full <- list()
@@ -85,9 +85,9 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
       next
     }
     table <- trial_table(fits, current$fit, current$name, names(full), responses)
-    best <- best_trial(table)
-    if (may_be_adopted(best, current$fit, settings$control)) {
-      name <- best$mechanism
+    adopted <- adopted_trial(table, fits, current, settings)
+    if (nrow(adopted)) {
+      name <- adopted$mechanism
       if (name %in% settled) break
       fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name),
                                                                       settings)))
@@ -97,7 +97,24 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
       current <- settled_model(current, settings)
     }
   }
-  list(fits = fits, table = table, current = current)
+  list(fits = fits, table = table, current = current, adopted = adopted)
+}
+
+# The row of the mechanism to adopt, none if there is none: the best by the evidence; where that is not decisive, the
+# first for which the fall of the simulation's own error speaks, on data held out too.
+adopted_trial <- function(table, fits, current, settings) {
+  best <- best_trial(table)
+  if (may_be_adopted(best, current$fit, settings$control)) return(best)
+  falling <- spoken_for_by_error(table, fits, current$fit, settings$control)
+  gains <- function(name) isTRUE(trial_gain(name, fits, current, current$name, settings)$improves)
+  table[table$mechanism %in% Find(gains, falling), ]
+}
+
+# held_out_gain() over a model of a mechanism tried as an extension of the model `from`.
+trial_gain <- function(name, fits, model, from, settings) {
+  fit <- fits[[name]]
+  predicted <- settings$keep(list("rival", from, name, plain(model_of(fit))), predicted_record(fit, settings))
+  held_out_gain(model, c(list(fit = fit), predicted))
 }
 
 naming_mechanism <- function(name, code) {
@@ -133,11 +150,7 @@ held_out_rivals <- function(model, trials, settings) {
   table <- trials$table
   others <- table$mechanism[table$judged_by == "calibration" & table$mechanism != model$mechanism &
                               table$probability >= rival_probability & !raises_error(table)]
-  Filter(function(name) {
-    fit <- trials$fits[[name]]
-    predicted <- settings$keep(list("rival", model$parent, name, plain(model_of(fit))), predicted_record(fit, settings))
-    isTRUE(held_out_gain(model, c(list(fit = fit), predicted))$improves)
-  }, others)
+  Filter(function(name) isTRUE(trial_gain(name, trials$fits, model, model$parent, settings)$improves), others)
 }
 
 report_candidate <- function(what, bf, say) {

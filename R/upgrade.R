@@ -162,13 +162,13 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
     current <- models[[length(models)]] <- trials$current
-    best <- best_trial(trials$table)
-    if (!may_be_adopted(best, current$fit, control)) {
-      stopped <- stop_reason(trials$table, current$attribution, control$decisive)
+    if (!nrow(trials$adopted)) {
+      falling <- spoken_for_by_error(trials$table, trials$fits, current$fit, control)
+      stopped <- stop_reason(trials$table, current$attribution, control$decisive, falling)
       break
     }
-    chosen <- best$mechanism
-    say("Adopted {.strong {chosen}}: log10 Bayes factor {round(best$log10_bf, 1)}")
+    chosen <- trials$adopted$mechanism
+    say("Adopted {.strong {chosen}}: {adoption_words(trials$adopted, control)}")
     current <- measured_model(trials$fits[[chosen]], paste(current$name, "+", chosen), current$name, chosen, settings)
     current$held_out_rivals <- held_out_rivals(current, trials, settings)
     report_model(current, say)
@@ -254,7 +254,14 @@ report_model <- function(model, say) {
             else "shows no response to a boundary condition"))
 }
 
-stop_reason <- function(table, attribution, decisive) {
+adoption_words <- function(row, control) {
+  found <- sprintf("log10 Bayes factor %.1f", row$log10_bf)
+  if (row$log10_bf >= control$decisive) return(found)
+  sprintf("%s is not decisive, but the error falls to %s of what it was", found, percent(row$error_ratio))
+}
+
+# `falling`: mechanisms with which the error falls, but not on data held out, or none are.
+stop_reason <- function(table, attribution, decisive, falling = character()) {
   significant <- significant_conditions(attribution$table)
   best <- best_trial(table)
   highest <- table[which.max(table$log10_bf), ]
@@ -269,6 +276,10 @@ stop_reason <- function(table, attribution, decisive) {
   } else {
     sprintf("the evidence for the best mechanism is too uncertain (%s, interval from %.1f to %.1f)", found,
             best$lower95, best$upper95)
+  }
+  if (length(falling)) {
+    why <- sprintf("%s; with %s the error falls by a third or more, but no data held out confirm it", why,
+                   listed(falling))
   }
   if (length(significant)) paste0(why, "; what answers to ", paste(significant, collapse = ", "),
                                   " remains unexplained") else paste0(why, " and no boundary condition is significant")

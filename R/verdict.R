@@ -27,7 +27,8 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (row$lower95 < control$decisive + few_runs_error && from_few_runs(model$fit))
         "the runs over the priors are too few for evidence of that size",
-      if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
+      if (row$log10_bf < control$decisive) "the fall of the error speaks for it, the evidence is not decisive"
+      else if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))

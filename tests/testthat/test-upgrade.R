@@ -43,7 +43,8 @@ test_that("the coarse calibration follows screening, whatever is asked of the fu
 # Calibrations by hand that share a record: `coarse` is the evidence that screening found, `error` the simulation's.
 fit_by_hand <- function(log10_evidence, se = 0.05, lag = 0, coarse = log10_evidence, error = 1) {
   posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
-  structure(list(measurements = list(y = 1:3), rows = 1:3, check = list(mean = 1:3 - error),
+  emulator <- list(basis = list(vectors = diag(3)), processes = list(coefficients = t(1:3 - error)))
+  structure(list(emulator = emulator, measurements = list(y = 1:3), rows = 1:3, check = list(mean = 1:3 - error),
                  log_evidence = log10_evidence * log(10),
                  standard_error = se * log(10), posterior = posterior,
                  coarse = list(log_evidence = coarse * log(10), standard_error = 0)),
