@@ -179,7 +179,7 @@ sure_sentences <- function(upgrade) {
   }
   each <- unlist(lapply(adopted, function(m) {
     row <- upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ]
-    c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive))
+    c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive), least_squares_sentence(m, upgrade))
   }))
   c(each, probability_sentence(trials), trust_sentence(upgrade, best))
 }
@@ -191,6 +191,15 @@ fallen_sentence <- function(row, decisive) {
                 "because the simulation itself gains: its own error falls to %s of what it was, and on held-out data",
                 "too."),
           row$mechanism, percent(row$error_ratio))
+}
+
+# Why a mechanism was adopted with which the calibrated simulation's own error rises.
+least_squares_sentence <- function(model, upgrade) {
+  if (is.null(model$least_squares)) return(NULL)
+  sprintf(paste("With the calibrated values the simulation's own error rises, as the discrepancy does a part of the",
+                "parameters' work. By least squares %s brings a gain: the error %s, and it falls on held-out data too."),
+          model$mechanism,
+          change_words(model$least_squares$rmse[1], model$least_squares$rmse[2], upgrade$measurements$unit))
 }
 
 raised_sentence <- function(row) {
@@ -279,7 +288,8 @@ mechanism_words <- function(model, upgrade) {
   changes <- changes_table(upgrade)
   list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
        sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))), collapse = " "),
-       evidence = paste(c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive)), collapse = " "),
+       evidence = paste(c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive),
+                          least_squares_sentence(model, upgrade)), collapse = " "),
        brought = step_sentence(upgrade, model), against = doubt_sentence(model),
        also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
        inspect = mechanism_inspections(upgrade, model),

@@ -86,8 +86,8 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
     }
     table <- trial_table(fits, current$fit, current$name, names(full), responses)
     adopted <- adopted_trial(table, fits, current, settings)
-    if (nrow(adopted)) {
-      name <- adopted$mechanism
+    if (nrow(adopted$row)) {
+      name <- adopted$row$mechanism
       if (name %in% settled) break
       fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name),
                                                                       settings)))
@@ -100,14 +100,45 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
   list(fits = fits, table = table, current = current, adopted = adopted)
 }
 
-# The row of the mechanism to adopt, none if there is none: the best by the evidence; where that is not decisive, the
-# first for which the fall of the simulation's own error speaks, on data held out too.
+# list(row, least_squares) of the mechanism to adopt, no row if there is none: the best by the evidence; where that is not
+# decisive, the first for which the fall of the simulation's own error speaks, on data held out too. One of higher
+# evidence with which the error of the calibrated simulation rises is adopted before it if that of least squares falls.
 adopted_trial <- function(table, fits, current, settings) {
+  control <- settings$control
   best <- best_trial(table)
-  if (may_be_adopted(best, current$fit, settings$control)) return(best)
-  falling <- spoken_for_by_error(table, fits, current$fit, settings$control)
+  decided <- may_be_adopted(best, current$fit, control)
+  above <- max(if (decided) best$log10_bf, control$decisive)
+  for (k in order(-table$log10_bf)) {
+    row <- table[k, ]
+    if (row$judged_by != "calibration" || !raises_error(row) || row$log10_bf < above || row$lower95 <= 0) next
+    gain <- least_squares_gain(fits[[row$mechanism]], current, settings)
+    if (isTRUE(gain$held_out$improves)) return(list(row = row, least_squares = gain))
+  }
+  if (decided) return(list(row = best))
   gains <- function(name) isTRUE(trial_gain(name, fits, current, current$name, settings)$improves)
-  table[table$mechanism %in% Find(gains, falling), ]
+  list(row = table[table$mechanism %in% Find(gains, spoken_for_by_error(table, fits, current$fit, control)), ])
+}
+
+# Where a discrepancy does a part of the parameters' work, the calibrated values are not those with which the simulation
+# is best. list(rmse, held_out): the errors in calibration that the simulations of `current` and of a trial reach by
+# least squares, and held_out_gain() of the second over the first. NULL where there is no simulator to be run, or one
+# that is not of one record.
+least_squares_gain <- function(fit, current, settings) {
+  if (is_several(settings$measurements) || is_given(model_of(fit))) return(NULL)
+  reached <- lapply(list(current$fit, fit), function(f) {
+    settings$keep(list("least squares", plain(model_of(f))), best_simulation(f, settings$threads))
+  })
+  list(rmse = vapply(reached, `[[`, 0, "rmse"), held_out = held_out_gain(reached[[1]], reached[[2]]))
+}
+
+# least_squares() as a model: list(fit, rmse, prediction), that of data held out.
+best_simulation <- function(fit, threads) {
+  m <- fit$measurements
+  best <- least_squares(fit, threads)
+  rows <- used_rows(m, "validate")
+  held_out <- if (length(rows)) simulate_measured(fit$emulator$simulator, t(best$values), m, "validate", threads)[, 1]
+  list(fit = fit, rmse = sqrt(mean(best$error^2)),
+       prediction = data.frame(use = rep("validate", length(rows)), observed = m$y[rows], mean = as.numeric(held_out)))
 }
 
 # held_out_gain() over a model of a mechanism tried as an extension of the model `from`.

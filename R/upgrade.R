@@ -162,14 +162,16 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
     current <- models[[length(models)]] <- trials$current
-    if (!nrow(trials$adopted)) {
+    adopted <- trials$adopted
+    if (!nrow(adopted$row)) {
       falling <- spoken_for_by_error(trials$table, trials$fits, current$fit, control)
       stopped <- stop_reason(trials$table, current$attribution, control$decisive, falling)
       break
     }
-    chosen <- trials$adopted$mechanism
-    say("Adopted {.strong {chosen}}: {adoption_words(trials$adopted, control)}")
+    chosen <- adopted$row$mechanism
+    say("Adopted {.strong {chosen}}: {adoption_words(adopted, control)}")
     current <- measured_model(trials$fits[[chosen]], paste(current$name, "+", chosen), current$name, chosen, settings)
+    current$least_squares <- adopted$least_squares
     current$held_out_rivals <- held_out_rivals(current, trials, settings)
     report_model(current, say)
     models <- c(models, list(current))
@@ -254,8 +256,13 @@ report_model <- function(model, say) {
             else "shows no response to a boundary condition"))
 }
 
-adoption_words <- function(row, control) {
+adoption_words <- function(adopted, control) {
+  row <- adopted$row
   found <- sprintf("log10 Bayes factor %.1f", row$log10_bf)
+  if (!is.null(adopted$least_squares)) {
+    return(sprintf("%s; the error of least squares falls from %s to %s", found,
+                   short(adopted$least_squares$rmse[1]), short(adopted$least_squares$rmse[2])))
+  }
   if (row$log10_bf >= control$decisive) return(found)
   sprintf("%s is not decisive, but the error falls to %s of what it was", found, percent(row$error_ratio))
 }

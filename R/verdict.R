@@ -16,7 +16,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     row <- trials[trials$mechanism == model$mechanism, ]
     new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
     gain <- held_out_gain(parent, model)
-    no_gain <- isFALSE(gain$improves)
+    no_gain <- isFALSE(gain$improves) && !isTRUE(model$least_squares$held_out$improves)
     # What was adopted later is no other cause: with both, the evidence is decisively above that of either alone.
     later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
     others <- 1 - row$probability - sum(trials$probability[trials$mechanism %in% later])
@@ -31,6 +31,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       else if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),
+      if (!is.null(model$least_squares)) "only by least squares does the simulation gain by it",
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
         "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
