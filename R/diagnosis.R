@@ -169,7 +169,7 @@ sure_sentences <- function(upgrade) {
   best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
   needed <-
     sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that lies",
-                  "wholly in its favour, or an error that falls by a third, on held-out data too."),
+                  "wholly in its favour, or an error that falls by a third."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
@@ -188,8 +188,7 @@ sure_sentences <- function(upgrade) {
 fallen_sentence <- function(row, decisive) {
   if (row$log10_bf >= decisive) return(NULL)
   sprintf(paste("That is not decisive: the discrepancy, which may be anything, does as well without %s. It was adopted",
-                "because the simulation itself gains: its own error falls to %s of what it was, and on held-out data",
-                "too."),
+                "because the simulation itself gains: its own error in calibration falls to %s of what it was."),
           row$mechanism, percent(row$error_ratio))
 }
 
@@ -197,7 +196,7 @@ fallen_sentence <- function(row, decisive) {
 least_squares_sentence <- function(model, upgrade) {
   if (is.null(model$least_squares)) return(NULL)
   sprintf(paste("With the calibrated values the simulation's own error rises, as the discrepancy does a part of the",
-                "parameters' work. By least squares %s brings a gain: the error %s, and it falls on held-out data too."),
+                "parameters' work. By least squares %s brings a gain: the error %s."),
           model$mechanism,
           change_words(model$least_squares$rmse[1], model$least_squares$rmse[2], upgrade$measurements$unit))
 }

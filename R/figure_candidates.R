@@ -46,7 +46,7 @@ figure_candidates <- function(upgrade) {
                                  "estimates%s."),
                           format(10^decisive, big.mark = ","),
                           if (any(table$adopted & table$log10_bf < decisive))
-                            "; left of it where the error falls by a third, on held-out data too" else "",
+                            "; left of it where the error falls by a third" else "",
                           if (any(by_response)) ", those of crosses off by some powers of ten" else ""),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()

@@ -45,7 +45,7 @@ nearest_run <- function(emulator, fit) {
 raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > risen_error
 
 # Candidates not calibrated in full whose evidence could come near the best that may be adopted, if any could come near
-# adoption; where none is decisive, those with which the error has fallen as well (speaks_by_error()).
+# adoption; where none is decisive, those with which the error has fallen as well (spoken_for_by_error()).
 contenders <- function(fits, current, full, control) {
   if (!length(fits)) return(character())
   bf <- standing(fits, current, full)
@@ -130,11 +130,12 @@ may_be_adopted <- function(best, current, control) {
   best$lower95 > 0 || (isFALSE(current$check$passed) && best$trusted && isTRUE(best$error_ratio < fallen_error))
 }
 
-# Names of the mechanisms, calibrated in full, of which the evidence is decisive neither for nor against, and with which
-# the simulation's own error falls by a third; best first. A discrepancy may be anything, at little cost however large
-# it is: for the evidence it can do what a mechanism does, but it does not mend the simulation.
+# The mechanisms, calibrated in full, of which the evidence is decisive neither for nor against, and with which the
+# simulation's own error falls by a third; best first. A discrepancy may be anything, at little cost however large it is:
+# for the evidence it can do what a mechanism does, but it does not mend the simulation.
 spoken_for_by_error <- function(table, fits, current, control) {
   open <- table[table$judged_by == "calibration" & table$trusted & table$log10_bf > -control$decisive, ]
   falls <- vapply(fits[open$mechanism], function(fit) error_fall(fit, current) < fallen_error, NA)
-  open$mechanism[falls][order(-open$log10_bf[falls])]
+  open <- open[falls, ]
+  open[order(-open$log10_bf), ]
 }

@@ -101,22 +101,20 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
 }
 
 # list(row, least_squares) of the mechanism to adopt, no row if there is none: the best by the evidence; where that is not
-# decisive, the first for which the fall of the simulation's own error speaks, on data held out too. One of higher
-# evidence with which the error of the calibrated simulation rises is adopted before it if that of least squares falls.
+# decisive, the first for which the fall of the simulation's own error speaks. One of higher evidence with which the
+# error of the calibrated simulation rises is adopted before it if that of least squares falls.
 adopted_trial <- function(table, fits, current, settings) {
-  control <- settings$control
   best <- best_trial(table)
-  decided <- may_be_adopted(best, current$fit, control)
-  above <- max(if (decided) best$log10_bf, control$decisive)
+  decided <- may_be_adopted(best, current$fit, settings$control)
+  above <- max(if (decided) best$log10_bf, settings$control$decisive)
   for (k in order(-table$log10_bf)) {
     row <- table[k, ]
     if (row$judged_by != "calibration" || !raises_error(row) || row$log10_bf < above || row$lower95 <= 0) next
     gain <- least_squares_gain(fits[[row$mechanism]], current, settings)
-    if (isTRUE(gain$held_out$improves)) return(list(row = row, least_squares = gain))
+    if (isTRUE(gain$rmse[2] < fallen_error * gain$rmse[1])) return(list(row = row, least_squares = gain))
   }
   if (decided) return(list(row = best))
-  gains <- function(name) isTRUE(trial_gain(name, fits, current, current$name, settings)$improves)
-  list(row = table[table$mechanism %in% Find(gains, spoken_for_by_error(table, fits, current$fit, control)), ])
+  list(row = utils::head(spoken_for_by_error(table, fits, current$fit, settings$control), 1))
 }
 
 # Where a discrepancy does a part of the parameters' work, the calibrated values are not those with which the simulation
@@ -139,13 +137,6 @@ best_simulation <- function(fit, threads) {
   held_out <- if (length(rows)) simulate_measured(fit$emulator$simulator, t(best$values), m, "validate", threads)[, 1]
   list(fit = fit, rmse = sqrt(mean(best$error^2)),
        prediction = data.frame(use = rep("validate", length(rows)), observed = m$y[rows], mean = as.numeric(held_out)))
-}
-
-# held_out_gain() over a model of a mechanism tried as an extension of the model `from`.
-trial_gain <- function(name, fits, model, from, settings) {
-  fit <- fits[[name]]
-  predicted <- settings$keep(list("rival", from, name, plain(model_of(fit))), predicted_record(fit, settings))
-  held_out_gain(model, c(list(fit = fit), predicted))
 }
 
 naming_mechanism <- function(name, code) {
@@ -181,7 +172,11 @@ held_out_rivals <- function(model, trials, settings) {
   table <- trials$table
   others <- table$mechanism[table$judged_by == "calibration" & table$mechanism != model$mechanism &
                               table$probability >= rival_probability & !raises_error(table)]
-  Filter(function(name) isTRUE(trial_gain(name, trials$fits, model, model$parent, settings)$improves), others)
+  Filter(function(name) {
+    fit <- trials$fits[[name]]
+    predicted <- settings$keep(list("rival", model$parent, name, plain(model_of(fit))), predicted_record(fit, settings))
+    isTRUE(held_out_gain(model, c(list(fit = fit), predicted))$improves)
+  }, others)
 }
 
 report_candidate <- function(what, bf, say) {

@@ -164,8 +164,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     current <- models[[length(models)]] <- trials$current
     adopted <- trials$adopted
     if (!nrow(adopted$row)) {
-      falling <- spoken_for_by_error(trials$table, trials$fits, current$fit, control)
-      stopped <- stop_reason(trials$table, current$attribution, control$decisive, falling)
+      stopped <- stop_reason(trials$table, current$attribution, control$decisive)
       break
     }
     chosen <- adopted$row$mechanism
@@ -267,8 +266,7 @@ adoption_words <- function(adopted, control) {
   sprintf("%s is not decisive, but the error falls to %s of what it was", found, percent(row$error_ratio))
 }
 
-# `falling`: mechanisms with which the error falls, but not on data held out, or none are.
-stop_reason <- function(table, attribution, decisive, falling = character()) {
+stop_reason <- function(table, attribution, decisive) {
   significant <- significant_conditions(attribution$table)
   best <- best_trial(table)
   highest <- table[which.max(table$log10_bf), ]
@@ -283,10 +281,6 @@ stop_reason <- function(table, attribution, decisive, falling = character()) {
   } else {
     sprintf("the evidence for the best mechanism is too uncertain (%s, interval from %.1f to %.1f)", found,
             best$lower95, best$upper95)
-  }
-  if (length(falling)) {
-    why <- sprintf("%s; with %s the error falls by a third or more, but no data held out confirm it", why,
-                   listed(falling))
   }
   if (length(significant)) paste0(why, "; what answers to ", paste(significant, collapse = ", "),
                                   " remains unexplained") else paste0(why, " and no boundary condition is significant")

@@ -139,36 +139,25 @@ test_that("where the present model's evidence is not known, runs of the simulato
   expect_false(adopted(row()[0, ]))
 })
 
-# Whether a trial is adopted beside a base model with an error of 1, if data held out gain by it; and what was asked.
-adopted_by_hand <- function(fit, trusted = TRUE, full = "a", held_out = TRUE, by_least_squares = held_out) {
-  current <- list(name = "base", fit = fit_by_hand(0, 0))
-  calls <- character()
-  stand_in(trial_gain = function(...) {
-             calls <<- c(calls, "held out")
-             list(improves = held_out)
-           },
-           least_squares_gain = function(...) {
-             calls <<- c(calls, "least squares")
-             list(rmse = c(1, 0.5), held_out = list(improves = by_least_squares))
-           }, frame = parent.frame())
+# What is adopted of one trial beside a base model with an error of 1, if least squares takes it to `least_squares`.
+adopted_by_hand <- function(fit, trusted = TRUE, full = TRUE, least_squares = 0.5) {
+  current <- fit_by_hand(0, 0)
+  stand_in(least_squares_gain = function(...) list(rmse = c(1, least_squares)), frame = parent.frame())
   fit$trust <- list(trusted = trusted)
-  table <- data.frame(mechanism = "a", amiss:::standing(list(a = fit), current$fit, "a"), trusted = trusted,
-                      error_ratio = amiss:::error_ratio(fit, current$fit),
-                      judged_by = if (length(full)) "calibration" else "screening")
-  adopted <- amiss:::adopted_trial(table, list(a = fit), current, list(control = list(margin = 3, decisive = 2)))
-  list(adopted = nrow(adopted$row) > 0, least_squares = adopted$least_squares, calls = calls)
+  table <- data.frame(mechanism = "a", amiss:::standing(list(a = fit), current, "a"), trusted = trusted,
+                      error_ratio = amiss:::error_ratio(fit, current),
+                      judged_by = if (full) "calibration" else "screening")
+  amiss:::adopted_trial(table, list(a = fit), list(fit = current), list(control = list(decisive = 2)))
 }
 
-test_that("where the evidence is not decisive, a fall of the simulation's own error on data held out decides", {
-  expect_true(adopted_by_hand(fit_by_hand(1, error = 0.5))$adopted)
-  expect_true(adopted_by_hand(fit_by_hand(-1, error = 0.5))$adopted)
-  expect_equal(adopted_by_hand(fit_by_hand(3, error = 0.5))$calls, character())  # the evidence decides
-  expect_false(adopted_by_hand(fit_by_hand(-3, error = 0.5))$adopted)  # against it
-  expect_false(adopted_by_hand(fit_by_hand(1, error = 0.8))$adopted)
-  expect_false(adopted_by_hand(fit_by_hand(1, error = 0.5), held_out = FALSE)$adopted)
-  expect_false(adopted_by_hand(fit_by_hand(1, error = 0.5), held_out = NA)$adopted)
-  expect_false(adopted_by_hand(fit_by_hand(1, error = 0.5), trusted = FALSE)$adopted)
-  expect_false(adopted_by_hand(fit_by_hand(1, error = 0.5), full = NULL)$adopted)
+test_that("where the evidence is not decisive, a fall of the simulation's own error decides", {
+  adopted <- function(...) nrow(adopted_by_hand(...)$row) == 1
+  expect_true(adopted(fit_by_hand(1, error = 0.5)))
+  expect_true(adopted(fit_by_hand(-1, error = 0.5)))
+  expect_false(adopted(fit_by_hand(-3, error = 0.5)))  # decisive against it
+  expect_false(adopted(fit_by_hand(1, error = 0.8)))
+  expect_false(adopted(fit_by_hand(1, error = 0.5), trusted = FALSE))
+  expect_false(adopted(fit_by_hand(1, error = 0.5), full = FALSE))
 })
 
 test_that("the fall counts from the least error that the model before is known to reach", {
@@ -185,9 +174,11 @@ test_that("the fall counts from the least error that the model before is known t
 test_that("decisive evidence with which the calibrated simulation's error rises is believed if least squares gains", {
   risen <- fit_by_hand(10, error = 1.3)
   expect_equal(adopted_by_hand(risen)$least_squares$rmse, c(1, 0.5))
-  expect_false(adopted_by_hand(risen, by_least_squares = FALSE)$adopted)
-  expect_false(adopted_by_hand(risen, by_least_squares = NA)$adopted)
-  expect_equal(adopted_by_hand(fit_by_hand(1, error = 1.3))$calls, character())
+  expect_equal(adopted_by_hand(risen)$row$mechanism, "a")
+  expect_equal(nrow(adopted_by_hand(risen, least_squares = 0.8)$row), 0)
+  expect_equal(nrow(adopted_by_hand(risen, full = FALSE)$row), 0)
+  expect_equal(nrow(adopted_by_hand(fit_by_hand(1, error = 1.3))$row), 0)
+  expect_null(adopted_by_hand(fit_by_hand(10, error = 0.9))$least_squares)
 })
 
 test_that("the evidence of a fit that runs confirmed needs a smaller margin, and nothing below it is refined", {

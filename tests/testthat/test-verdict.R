@@ -275,6 +275,40 @@ test_that("a stand-in is no named cause, and what is named goes before what is l
   expect_null(amiss:::named_cause(list(list(name = "base")), candidates, entries))
 })
 
+test_that("a gain that only least squares shows is no stand-in's, is a doubt, and is told", {
+  upgrade <- small_upgrade()
+  models <- upgrade$models
+  settings <- list(measurements = upgrade$measurements, threads = 1, keep = function(key, value) value)
+  gain <- amiss:::least_squares_gain(models[[2]]$fit, models[[1]], settings)
+  m <- upgrade$measurements
+  rows <- used_rows(m, "calibrate")
+  linear <- stats::lm(m$y[rows] ~ lagged(small_record()$Te, 6)[rows])  # the base model is linear in its parameters
+  expect_equal(gain$rmse[1], sqrt(mean(residuals(linear)^2)), tolerance = 1e-4)
+  expect_lt(gain$rmse[2], 0.06)  # the noise is 0.05
+  expect_true(gain$held_out$improves)
+  # As if the calibrated values showed none of it.
+  held <- models[[2]]$prediction$use == "validate"
+  upgrade$models[[2]]$prediction$mean[held] <- upgrade$models[[2]]$prediction$mean[held] + 5
+  expect_equal(rejudged(upgrade)$models[[2]]$verdict, "stand-in")
+  upgrade$models[[2]]$least_squares <- gain
+  judged <- rejudged(upgrade)
+  expect_equal(judged$models[[2]]$verdict, "likely")
+  expect_true("only by least squares does the simulation gain by it" %in% judged$models[[2]]$doubts)
+  expect_match(paste(summary(judged)$sure, collapse = " "), "By least squares sun brings a gain: the error falls from")
+})
+
+test_that("of what the fall of the error alone speaks for, diagnosis, log and figure say so, and it is likely at best", {
+  upgrade <- small_upgrade()
+  sun <- upgrade$candidates$mechanism == "sun" & upgrade$candidates$from == "base"
+  upgrade$candidates[sun, c("log10_bf", "lower95", "upper95")] <- list(1, 0.5, 1.5)
+  judged <- rejudged(upgrade)
+  expect_equal(judged$models[[2]]$verdict, "likely")
+  expect_true("the fall of the error speaks for it, the evidence is not decisive" %in% judged$models[[2]]$doubts)
+  expect_match(paste(summary(judged)$sure, collapse = " "), "not decisive: the discrepancy.*own error in calibration falls")
+  expect_match(ggplot2::autoplot(judged, "candidates")$labels$subtitle, "left of it where the error falls by a third")
+  expect_match(amiss:::adoption_words(list(row = judged$candidates[sun, ]), judged$control), "is not decisive, but the error")
+})
+
 test_that("a mechanism with which the simulation's own error rises is not adopted, and why is told", {
   upgrade <- base_only(small_upgrade())
   expect_lt(upgrade$candidates$error_ratio[upgrade$candidates$mechanism == "sun"], 0.5)
