@@ -7,7 +7,12 @@ candidates_title <- function(table, decisive) {
            else if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero"
            else "No mechanism explains the measurements decisively better than no change")
   }
-  paste0("The measurements call for ", listed(table$mechanism[table$adopted]))
+  adopted <- table[table$adopted, ]
+  by_error <- adopted$mechanism[adopted$log10_bf < decisive]
+  by_evidence <- setdiff(adopted$mechanism, by_error)
+  paste(c(if (length(by_evidence)) paste("The measurements call for", listed(by_evidence)),
+          if (length(by_error)) sprintf("%she fall of the error calls for %s, the evidence does not decide",
+                                        if (length(by_evidence)) "t" else "T", listed(by_error))), collapse = "; ")
 }
 
 figure_candidates <- function(upgrade) {

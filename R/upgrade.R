@@ -7,7 +7,12 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' The model is calibrated and its discrepancy attributed; every mechanism of the catalogue is tried as a real
 #' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
 #' and the loop begins again with the extended model. A mechanism with which the simulation's own error in calibration
-#' rises (by more than 2 %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. Held-out rows
+#' rises (by more than 2 %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. But where the
+#' model is wrong in other ways as well, its discrepancy can do for the evidence what a mechanism does, and it can do a
+#' part of the parameters' work. So two more are adopted, and told as likely at most: a mechanism of which the evidence
+#' is decisive neither for nor against and with which the error falls by a third (below what any run of the present
+#' model reaches, too); and one of decisive evidence with which the error rises at the calibrated values, but falls by a
+#' third where both models are fitted by least squares (`least_squares` of the model has both errors). Held-out rows
 #' only measure; they decide nothing.
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present

@@ -305,7 +305,9 @@ test_that("of what the fall of the error alone speaks for, diagnosis, log and fi
   expect_equal(judged$models[[2]]$verdict, "likely")
   expect_true("the fall of the error speaks for it, the evidence is not decisive" %in% judged$models[[2]]$doubts)
   expect_match(paste(summary(judged)$sure, collapse = " "), "not decisive: the discrepancy.*own error in calibration falls")
-  expect_match(ggplot2::autoplot(judged, "candidates")$labels$subtitle, "left of it where the error falls by a third")
+  told <- ggplot2::autoplot(judged, "candidates")$labels
+  expect_match(told$subtitle, "left of it where the error falls by a third")
+  expect_match(told$title, "^The fall of the error calls for sun, the evidence does not decide")
   expect_match(amiss:::adoption_words(list(row = judged$candidates[sun, ]), judged$control), "is not decisive, but the error")
 })
 
