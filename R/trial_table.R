@@ -131,8 +131,8 @@ may_be_adopted <- function(best, current, control) {
 }
 
 # The mechanisms, calibrated in full, of which the evidence is decisive neither for nor against, and with which the
-# simulation's own error falls by a third; best first. A discrepancy may be anything, at little cost however large it is:
-# for the evidence it can do what a mechanism does, but it does not mend the simulation.
+# simulation's own error falls by a third; best first. A discrepancy may be anything, at little cost however large it
+# is: for the evidence it can do what a mechanism does, but it does not mend the simulation.
 spoken_for_by_error <- function(table, fits, current, control) {
   open <- table[table$judged_by == "calibration" & table$trusted & table$log10_bf > -control$decisive, ]
   falls <- vapply(fits[open$mechanism], function(fit) error_fall(fit, current) < fallen_error, NA)

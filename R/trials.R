@@ -100,8 +100,8 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
   list(fits = fits, table = table, current = current, adopted = adopted)
 }
 
-# list(row, least_squares) of the mechanism to adopt, no row if there is none: the best by the evidence; where that is not
-# decisive, the first for which the fall of the simulation's own error speaks. One of higher evidence with which the
+# list(row, least_squares) of the mechanism to adopt, no row if there is none: the best by the evidence; where that is
+# not decisive, the first for which the fall of the simulation's own error speaks. One of higher evidence with which the
 # error of the calibrated simulation rises is adopted before it if that of least squares falls.
 adopted_trial <- function(table, fits, current, settings) {
   best <- best_trial(table)

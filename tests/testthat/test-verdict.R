@@ -297,18 +297,20 @@ test_that("a gain that only least squares shows is no stand-in's, is a doubt, an
   expect_match(paste(summary(judged)$sure, collapse = " "), "By least squares sun brings a gain: the error falls from")
 })
 
-test_that("of what the fall of the error alone speaks for, diagnosis, log and figure say so, and it is likely at best", {
+test_that("of what the fall of the error alone speaks for, diagnosis, log and figure say so; it is likely at best", {
   upgrade <- small_upgrade()
   sun <- upgrade$candidates$mechanism == "sun" & upgrade$candidates$from == "base"
   upgrade$candidates[sun, c("log10_bf", "lower95", "upper95")] <- list(1, 0.5, 1.5)
   judged <- rejudged(upgrade)
   expect_equal(judged$models[[2]]$verdict, "likely")
   expect_true("the fall of the error speaks for it, the evidence is not decisive" %in% judged$models[[2]]$doubts)
-  expect_match(paste(summary(judged)$sure, collapse = " "), "not decisive: the discrepancy.*own error in calibration falls")
+  expect_match(paste(summary(judged)$sure, collapse = " "),
+               "not decisive: the discrepancy.*own error in calibration falls")
   told <- ggplot2::autoplot(judged, "candidates")$labels
   expect_match(told$subtitle, "left of it where the error falls by a third")
   expect_match(told$title, "^The fall of the error calls for sun, the evidence does not decide")
-  expect_match(amiss:::adoption_words(list(row = judged$candidates[sun, ]), judged$control), "is not decisive, but the error")
+  expect_match(amiss:::adoption_words(list(row = judged$candidates[sun, ]), judged$control),
+               "is not decisive, but the error")
 })
 
 test_that("a mechanism with which the simulation's own error rises is not adopted, and why is told", {
