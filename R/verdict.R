@@ -9,6 +9,7 @@ fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the e
 judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
   remains <- much_remains(models, measurements)
   inside <- models[[length(models)]]$scores$validate[["coverage95"]]
+  open <- character()
   for (k in seq_along(models)[-1]) {
     model <- models[[k]]
     parent <- models[[k - 1]]
@@ -32,6 +33,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),
       if (!is.null(model$least_squares)) "only by least squares does the simulation gain by it",
+      if (length(open)) paste("it was found beside", listed(open), "only, which the evidence does not decide"),
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
         "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
@@ -45,6 +47,9 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     models[[k]]$confounded_with <- confounded_parameters(model$fit, new)
     models[[k]]$doubts <- doubts
     models[[k]]$verdict <- if (no_gain) "stand-in" else if (length(doubts)) "likely" else "named"
+    # What follows may mend what this one broke.
+    decided <- row$log10_bf >= control$decisive && row$lower95 > 0 && is.null(model$least_squares)
+    if (!decided) open <- c(open, model$mechanism)
   }
   models
 }

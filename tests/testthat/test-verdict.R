@@ -313,6 +313,25 @@ test_that("of what the fall of the error alone speaks for, diagnosis, log and fi
                "is not decisive, but the error")
 })
 
+test_that("what was found beside a mechanism that the evidence does not decide is not named", {
+  upgrade <- small_upgrade()
+  first <- second <- upgrade$models[[2]]
+  first[c("name", "mechanism", "prediction")] <- list("base + drift", "drift", upgrade$models[[1]]$prediction)
+  second$parent <- first$name
+  upgrade$models <- list(upgrade$models[[1]], first, second)
+  row <- upgrade$candidates[upgrade$candidates$mechanism == "sun", ][1, ]
+  verdict_after <- function(log10_bf) {
+    earlier <- later <- row
+    earlier[c("mechanism", "log10_bf")] <- list("drift", log10_bf)
+    later$from <- first$name
+    upgrade$candidates <- rbind(earlier, later)
+    rejudged(upgrade)$models[[3]][c("verdict", "doubts")]
+  }
+  expect_equal(verdict_after(9)$verdict, "named")
+  expect_equal(verdict_after(1)$verdict, "likely")
+  expect_equal(verdict_after(1)$doubts, "it was found beside drift only, which the evidence does not decide")
+})
+
 test_that("a mechanism with which the simulation's own error rises is not adopted, and why is told", {
   upgrade <- base_only(small_upgrade())
   expect_lt(upgrade$candidates$error_ratio[upgrade$candidates$mechanism == "sun"], 0.5)
