@@ -169,7 +169,8 @@ sure_sentences <- function(upgrade) {
   best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
   needed <-
     sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that lies",
-                  "wholly in its favour, or an error that falls by a third."),
+                  "wholly in its favour or, where the odds are open and can be trusted, an error that falls by a",
+                  "third."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
@@ -184,12 +185,13 @@ sure_sentences <- function(upgrade) {
   c(each, probability_sentence(trials), trust_sentence(upgrade, best))
 }
 
-# Why a mechanism was adopted for which the evidence is not decisive.
+# Why a mechanism was adopted for which the evidence does not speak by itself.
 fallen_sentence <- function(row, decisive) {
-  if (row$log10_bf >= decisive) return(NULL)
-  sprintf(paste("That is not decisive: the discrepancy, which may be anything, does as well without %s. It was adopted",
-                "because the simulation itself gains: its own error in calibration falls to %s of what it was."),
-          row$mechanism, percent(row$error_ratio))
+  if (speaks_for_itself(row, decisive)) return(NULL)
+  why <- if (row$log10_bf >= decisive) "too uncertain to decide"
+         else "not decisive: the discrepancy, which may be anything, does as well or better without it"
+  sprintf(paste("That is %s. It was adopted because the simulation itself gains: its own error in calibration falls to",
+                "%s of what it was."), why, percent(row$error_ratio))
 }
 
 # Why a mechanism was adopted with which the calibrated simulation's own error rises.

@@ -8,7 +8,7 @@ candidates_title <- function(table, decisive) {
            else "No mechanism explains the measurements decisively better than no change")
   }
   adopted <- table[table$adopted, ]
-  by_error <- adopted$mechanism[adopted$log10_bf < decisive]
+  by_error <- adopted$mechanism[!speaks_for_itself(adopted, decisive)]
   by_evidence <- setdiff(adopted$mechanism, by_error)
   paste(c(if (length(by_evidence)) paste("The measurements call for", listed(by_evidence)),
           if (length(by_error)) sprintf("%she fall of the error calls for %s, the evidence does not decide",
@@ -50,8 +50,8 @@ figure_candidates <- function(upgrade) {
                                  "first%s. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals; numbers: ",
                                  "estimates%s."),
                           format(10^decisive, big.mark = ","),
-                          if (any(table$adopted & table$log10_bf < decisive))
-                            "; left of it where the error falls by a third" else "",
+                          if (any(table$adopted & !speaks_for_itself(table, decisive)))
+                            ", or where the error falls by a third" else "",
                           if (any(by_response)) ", those of crosses off by some powers of ten" else ""),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()

@@ -50,10 +50,10 @@ contenders <- function(fits, current, full, control) {
   if (!length(fits)) return(character())
   bf <- standing(fits, current, full)
   reach <- bf$log10_bf + vapply(fits, uncertainty, 0, as_coarse(current), control)
-  risen <- vapply(fits, error_ratio, 0, current) > risen_error
-  best <- max(-Inf, bf$log10_bf[!(names(fits) %in% full & risen)])
-  leading <- reach >= max(best, control$decisive)
-  falling <- best < control$decisive & reach > -control$decisive & vapply(fits, error_fall, 0, current) < fallen_error
+  free <- !(names(fits) %in% full & vapply(fits, error_ratio, 0, current) > risen_error)
+  leading <- reach >= max(bf$log10_bf[free], control$decisive)
+  falling <- !any(free & speaks_for_itself(bf, control$decisive)) & reach > -control$decisive &
+    vapply(fits, error_fall, 0, current) < fallen_error
   setdiff(names(fits)[leading | falling], full)
 }
 

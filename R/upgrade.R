@@ -12,8 +12,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' part of the parameters' work. So two more are adopted, and told as likely at most: a mechanism of which the evidence
 #' is decisive neither for nor against and with which the error falls by a third (below what any run of the present
 #' model reaches, too); and one of decisive evidence with which the error rises at the calibrated values, but falls by a
-#' third where both models are fitted by least squares (`least_squares` of the model has both errors). Held-out rows
-#' only measure; they decide nothing.
+#' third where both models are fitted by least squares (`least_squares` of the model has both errors, and the gain held
+#' out with these values; not for given runs or several records). Held-out rows only measure; they decide nothing.
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
 #' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
@@ -65,12 +65,12 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   the simulation's error in calibration with each over that before, `error_ratio`), the named cause, the gain, why
 #'   the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
-#'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
-#'   place of something else. `held_out_rivals` names mechanisms that could have been adopted in its place and with
-#'   which data held out are met better. `confounded_with` names parameters that are correlated beyond 0.4 with those
-#'   that it brought: other parts of the model that could do the same. Of several records `fit` is what
-#'   [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its
-#'   own unit.
+#'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error; by least squares if
+#'   it was adopted by them): then it takes the place of something else. `held_out_rivals` names mechanisms that could
+#'   have been adopted in its place and with which data held out are met better. `confounded_with` names parameters that
+#'   are correlated beyond 0.4 with those that it brought: other parts of the model that could do the same. Of several
+#'   records `fit` is what [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and
+#'   `held_out_gain` of each in its own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
@@ -267,8 +267,9 @@ adoption_words <- function(adopted, control) {
     return(sprintf("%s; the error of least squares falls from %s to %s", found,
                    short(adopted$least_squares$rmse[1]), short(adopted$least_squares$rmse[2])))
   }
-  if (row$log10_bf >= control$decisive) return(found)
-  sprintf("%s is not decisive, but the error falls to %s of what it was", found, percent(row$error_ratio))
+  if (speaks_for_itself(row, control$decisive)) return(found)
+  sprintf("%s [%.1f, %.1f] is not decisive, but the error falls to %s of what it was", found, row$lower95, row$upper95,
+          percent(row$error_ratio))
 }
 
 stop_reason <- function(table, attribution, decisive) {

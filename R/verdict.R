@@ -3,6 +3,9 @@
 risen_error <- 1.02   # times the simulation's error in calibration before: from there it counts as risen
 fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the evidence
 
+# Whether a Bayes factor is enough by itself.
+speaks_for_itself <- function(bf, decisive) bf$log10_bf >= decisive & bf$lower95 > 0
+
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
 # is a stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely
 # otherwise.
@@ -17,7 +20,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     row <- trials[trials$mechanism == model$mechanism, ]
     new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
     gain <- held_out_gain(parent, model)
-    no_gain <- isFALSE(gain$improves) && !isTRUE(model$least_squares$held_out$improves)
+    no_gain <- isFALSE((model$least_squares$held_out %||% gain)$improves)
     # What was adopted later is no other cause: with both, the evidence is decisively above that of either alone.
     later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
     others <- 1 - row$probability - sum(trials$probability[trials$mechanism %in% later])
@@ -32,8 +35,8 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       else if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),
-      if (!is.null(model$least_squares)) "only by least squares does the simulation gain by it",
-      if (length(open)) paste("it was found beside", listed(open), "only, which the evidence does not decide"),
+      if (!is.null(model$least_squares)) "in calibration the simulation gains by it only with least squares",
+      if (length(open)) paste("it was found beside", listed(open), "only, which is not decided"),
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
         "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
@@ -48,8 +51,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     models[[k]]$doubts <- doubts
     models[[k]]$verdict <- if (no_gain) "stand-in" else if (length(doubts)) "likely" else "named"
     # What follows may mend what this one broke.
-    decided <- row$log10_bf >= control$decisive && row$lower95 > 0 && is.null(model$least_squares)
-    if (!decided) open <- c(open, model$mechanism)
+    if (!speaks_for_itself(row, control$decisive) || !is.null(model$least_squares)) open <- c(open, model$mechanism)
   }
   models
 }

@@ -139,15 +139,19 @@ test_that("where the present model's evidence is not known, runs of the simulato
   expect_false(adopted(row()[0, ]))
 })
 
-# What is adopted of one trial beside a base model with an error of 1, if least squares takes it to `least_squares`.
-adopted_by_hand <- function(fit, trusted = TRUE, full = TRUE, least_squares = 0.5) {
+# What is adopted of trials beside a base model with an error of 1, if least squares takes it to `least_squares`.
+adopted_by_hand <- function(..., trusted = TRUE, full = TRUE, least_squares = 0.5) {
+  fits <- list(...)
+  names(fits) <- letters[seq_along(fits)]
   current <- fit_by_hand(0, 0)
-  stand_in(least_squares_gain = function(...) list(rmse = c(1, least_squares)), frame = parent.frame())
-  fit$trust <- list(trusted = trusted)
-  table <- data.frame(mechanism = "a", amiss:::standing(list(a = fit), current, "a"), trusted = trusted,
-                      error_ratio = amiss:::error_ratio(fit, current),
+  table <- data.frame(mechanism = names(fits), amiss:::standing(fits, current, names(fits)), trusted = trusted,
+                      error_ratio = vapply(fits, amiss:::error_ratio, 0, current),
                       judged_by = if (full) "calibration" else "screening")
-  amiss:::adopted_trial(table, list(a = fit), list(fit = current), list(control = list(decisive = 2)))
+  reached <- function(name, fit) {
+    list(fit = fit, rmse = if (name %in% names(fits)) least_squares else 1,
+         prediction = data.frame(use = character(), observed = numeric(), mean = numeric()))
+  }
+  amiss:::adopted_trial(table, fits, list(fit = current), list(decisive = 2), reached)
 }
 
 test_that("where the evidence is not decisive, a fall of the simulation's own error decides", {
@@ -158,6 +162,10 @@ test_that("where the evidence is not decisive, a fall of the simulation's own er
   expect_false(adopted(fit_by_hand(1, error = 0.8)))
   expect_false(adopted(fit_by_hand(1, error = 0.5), trusted = FALSE))
   expect_false(adopted(fit_by_hand(1, error = 0.5), full = FALSE))
+  # An interval that holds zero decides nothing either.
+  expect_equal(adopted_by_hand(fit_by_hand(3, se = 2, error = 1), fit_by_hand(0.5, error = 0.5))$row$mechanism, "b")
+  expect_true("b" %in% amiss:::contenders(list(a = fit_by_hand(3, se = 2), b = fit_by_hand(0, error = 0.5)),
+                                          fit_by_hand(0, 0), "a", list(margin = 0, decisive = 2)))
 })
 
 test_that("the fall counts from the least error that the model before is known to reach", {
@@ -179,6 +187,11 @@ test_that("decisive evidence with which the calibrated simulation's error rises 
   expect_equal(nrow(adopted_by_hand(risen, full = FALSE)$row), 0)
   expect_equal(nrow(adopted_by_hand(fit_by_hand(1, error = 1.3))$row), 0)
   expect_null(adopted_by_hand(fit_by_hand(10, error = 0.9))$least_squares)
+  # One below the best whose error does not rise is not asked for.
+  expect_null(adopted_by_hand(fit_by_hand(10, error = 0.9), fit_by_hand(8, error = 1.3))$least_squares)
+  expect_equal(adopted_by_hand(fit_by_hand(8, error = 0.9), risen)$row$mechanism, "b")
+  expect_match(amiss:::adoption_words(adopted_by_hand(risen), list(decisive = 2)),
+               "10.0; the error of least squares falls from 1.0 to 0.50")
 })
 
 test_that("the evidence of a fit that runs confirmed needs a smaller margin, and nothing below it is refined", {
