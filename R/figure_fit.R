@@ -50,22 +50,25 @@ gain_title <- function(upgrade) {
   inside <- score_of(upgrade, use, "coverage95")
   band <- paste(round(100 * inside[length(inside)]), "% of the measurements lie in the 95 % band")
   if (length(rmse) < 2) return(paste0(where, ", ", band))
-  change <- 1 - rmse[2] / rmse[1]
-  sprintf("%s the error %s by %s %%; %s", where, if (change >= 0) "falls" else "rises", round(100 * abs(change)), band)
+  told <- short(rmse)
+  change <- if (told[1] == told[2]) paste("stays at", with_unit(told[1], upgrade$measurements$unit))
+            else sprintf("%s by %s", if (rmse[2] < rmse[1]) "falls" else "rises", percent(abs(1 - rmse[2] / rmse[1])))
+  sprintf("%s the error %s; %s", where, change, band)
 }
 
 figure_gain <- function(upgrade) {
   table <- gain_table(upgrade)
   target <- data.frame(panel = factor(levels(table$panel)[3], levels(table$panel)), value = 95)
-  dodge <- ggplot2::position_dodge(width = 0.8)
+  dodge <- ggplot2::position_dodge(width = 0.9)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$use, .data$value, fill = .data$stage)) +
-    ggplot2::geom_col(position = dodge, width = 0.74) +
+    ggplot2::geom_col(position = dodge, width = 0.84) +
     ggplot2::geom_text(ggplot2::aes(label = .data$label, vjust = ifelse(.data$score == "coverage95", 3, -0.35),
                                     colour = ifelse(.data$score == "coverage95" & .data$stage != "before", "white",
-                                                    "black")), position = dodge, size = 4.3) +
+                                                    "black")), position = dodge, size = 3.9) +
     ggplot2::scale_colour_identity() +
     ggplot2::geom_hline(ggplot2::aes(yintercept = .data$value), target, linetype = "dashed", colour = "grey20") +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 3, labeller = wrap_strips(3)) +
+    ggplot2::scale_x_discrete(expand = ggplot2::expansion(add = 0.5)) +
     ggplot2::scale_y_continuous(expand = ggplot2::expansion(mult = c(0, 0.14))) +
     ggplot2::scale_fill_manual(values = stage_colours) +
     figure_titles(gain_title(upgrade), "Lower is better for the two errors; the third should come near 95.") +

@@ -43,7 +43,7 @@ figure_priors <- function(fits) {
     figure_theme() +
     ggplot2::theme(axis.text.y = ggplot2::element_blank(), panel.grid.major.y = ggplot2::element_blank(),
                    strip.text = ggplot2::element_text(size = ggplot2::rel(0.83)))
-  with_height(figure, 1.9 + 1.5 * ceiling(nlevels(table$panel) / 3))
+  with_height(figure, 1.9 + 1.8 * ceiling(nlevels(table$panel) / 3))
 }
 
 # Shift of the medians as a share of the prior's range, and the strongest correlation with a parameter that is new.

@@ -30,5 +30,5 @@ figure_parameters <- function(fits) {
     figure_theme() +
     ggplot2::theme(panel.grid.major.y = ggplot2::element_blank(), axis.text.y = ggplot2::element_blank(),
                    strip.text = ggplot2::element_text(size = ggplot2::rel(0.87)))
-  with_height(figure, 1.9 + 1.02 * ceiling(nlevels(table$panel) / 2))
+  with_height(figure, 1.9 + 1.2 * ceiling(nlevels(table$panel) / 2))
 }

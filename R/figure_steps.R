@@ -21,7 +21,7 @@ figure_steps <- function(upgrade) {
   shown <- table[table$use == use[length(use)], ]
   drop <- -diff(shown$rmse)
   best <- which.max(drop)
-  title <- if (drop[best] <= 0) "No step lowers the error"
+  title <- if (drop[best] <= 0) sprintf("No step lowers the typical error (%s)", use[length(use)])
            else sprintf("%s brings most: the typical error (%s) %s",
                         sub("^\\+ ", "", as.character(shown$step[best + 1])), use[length(use)],
                         change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))

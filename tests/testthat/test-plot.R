@@ -33,6 +33,24 @@ test_that("figures show what they are for", {
   expect_lte(max(ggplot2::autoplot(upgrade, "mean_day")$data$hour), 24)
 })
 
+test_that("titles tell of a change what the numbers beside them say", {
+  upgrade <- small_upgrade()
+  with_errors <- function(before, after) {
+    upgrade$models[[1]]$scores$validate[["rmse"]] <- before
+    upgrade$models[[2]]$scores$validate[["rmse"]] <- after
+    upgrade$models <- upgrade$models[1:2]
+    vapply(c("gain", "steps", "fit"), function(which) ggplot2::autoplot(upgrade, which)$labels$title, "")
+  }
+  same <- with_errors(0.0838, 0.0842)
+  expect_match(same[["gain"]], "the error stays at 0.084 K;", fixed = TRUE)
+  expect_identical(same[["steps"]], "No step lowers the typical error (held out)")  # though it falls in calibration
+  expect_match(same[["fit"]], "it stays at 0.084 K", fixed = TRUE)
+  less <- with_errors(0.4, 0.1)
+  expect_match(less[["gain"]], "the error falls by 75 %;", fixed = TRUE)
+  expect_match(less[["steps"]], "falls from 0.40 to 0.10 K", fixed = TRUE)
+  expect_match(with_errors(0.1, 0.12)[["gain"]], "the error rises by 20 %;", fixed = TRUE)
+})
+
 test_that("stages have figures of their own", {
   grDevices::pdf(NULL)
   withr::defer(grDevices::dev.off())
