@@ -3,12 +3,13 @@
 # Usage: Rscript bench/hidden_effects.R [--family F,F] --worlds N --seed S --out FILE [--workers N]
 #
 # Worlds S, S+1, ... of each family named are drawn, scored and written as JSON: a row a world, with its family, and
-# rates and means for each family. Figures lie beside it: FILE-detection.png for all, FILE-confusion-FAMILY.png for
-# each. Families (hidden_effects/families.R): box, the test box with eight mechanisms and effects outside the
-# catalogue, which is the default; network, grey-box networks of a house; runoff, a catchment with thresholds; wrong,
-# base models that are wrong in structure besides. Each finished world is kept in FILE.worlds/, so that a stopped run
-# goes on where it was; worlds that failed are tried again. Work goes through the user's future plan if --workers is
-# not given.
+# for each family rates, means and what the attribution by itself said of each mechanism. Figures lie beside it:
+# FILE-detection.png for all, FILE-confusion-FAMILY.png for each. Families (hidden_effects/families.R): box, the test
+# box with eight mechanisms and effects outside the catalogue, which is the default; network, grey-box networks of a
+# house; runoff, a catchment with thresholds; wrong, base models that are wrong in structure besides. Each finished
+# world is kept in FILE.worlds/, so that a stopped run goes on where it was; worlds that failed are tried again. Work
+# goes through the user's future plan if --workers is not given. The random forest is asked where the package ranger is
+# installed.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -48,6 +49,9 @@ one_world <- function(seed, family, file, parts, total) {
 
 if (!is.null(workers)) future::plan(future::multisession, workers = as.integer(workers))
 missing <- tasks[!vapply(tasks$file, finished, NA), ]
+if (!requireNamespace("ranger", quietly = TRUE)) {
+  message("ranger is not installed: no random forest among the rivals (tools/install-dependencies --bench installs it)")
+}
 invisible(future.apply::future_mapply(one_world, missing$seed, missing$family, missing$file,
                                       MoreArgs = list(parts = parts, total = nrow(tasks)), future.seed = NULL,
                                       future.scheduling = Inf))
@@ -55,13 +59,14 @@ rows <- lapply(tasks$file, readRDS)
 failed <- Filter(function(r) !is.null(r$error), rows)
 scored <- Filter(function(r) is.null(r$error), rows)
 rates <- scope$by_family(scored, scope$score_rates)
+attributed <- scope$by_family(scored, scope$attributed_kinds)
 as_arrays <- function(row) {  # also where there is one value, or none
   arrays <- c("true_boundary", "true_mechanism", "adopted", "verdicts", "rmse")
   for (name in intersect(names(row), arrays)) row[[name]] <- as.list(row[[name]])
   row
 }
 write_rows(list(worlds = lapply(rows, as_arrays), failed = length(failed), rates = rates,
-                means = scope$by_family(scored, scope$score_means)), out)
+                means = scope$by_family(scored, scope$score_means), attributed = attributed), out)
 if (length(scored)) scope$write_figures(scored, out)
 for (family in names(rates)) {
   cat(family, "\n", sep = "")
@@ -70,5 +75,6 @@ for (family in names(rates)) {
     shares <- 100 * c(r$rate, r$lower95, r$upper95)
     if (r$n > 0) cat(sprintf("  %-28s %5.1f %% of %d [%.0f, %.0f]\n", name, shares[1], r$n, shares[2], shares[3]))
   }
+  if (length(attributed[[family]])) print(attributed[[family]], row.names = FALSE)
 }
 if (length(failed)) cat(length(failed), "worlds failed:", failed[[1]]$error, "\n")

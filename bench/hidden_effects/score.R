@@ -140,11 +140,14 @@ rate <- function(flags) {
   list(rate = mean(flags), n = length(flags), lower95 = interval[1], upper95 = interval[2])
 }
 
+# Worlds whose effect is about twice the noise and more, and a mechanism of the catalogue.
+strong_effects <- function(rows) Filter(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95, rows)
+
 # Rates of the worlds of one family; by_family() has those of each.
 score_rates <- function(rows) {
   pick <- function(f) Filter(f, rows)
   flags <- function(rows, f) vapply(rows, function(r) c(as.logical(f(r)), NA)[1], NA)  # NA where it was not scored
-  strong <- pick(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95)
+  strong <- strong_effects(rows)
   one <- pick(function(r) length(r$true_mechanism) > 0 && abs(r$achieved - 1) <= 0.2)
   none <- pick(function(r) r$kind == "none")
   outside <- pick(function(r) r$hidden && !length(r$true_mechanism))
@@ -182,11 +185,23 @@ by_family <- function(rows, of) {
 # Means, with their standard errors: held-out error removed, as a share of what knowing the truth would remove, and
 # time.
 score_means <- function(rows) {
-  strong <- Filter(function(r) length(r$true_mechanism) > 0 && r$achieved >= 1.95, rows)
+  strong <- strong_effects(rows)
   of <- function(rows, field) {
     v <- vapply(rows, function(r) as.numeric(r[[field]]), 0)
     v <- v[is.finite(v)]
     list(mean = mean(v), standard_error = stats::sd(v) / sqrt(length(v)), median = stats::median(v), n = length(v))
   }
   list(gain_share = of(strong, "gain_share"), rmse_ratio = of(strong, "rmse_ratio"), wall_s = of(rows, "wall_s"))
+}
+
+# What the attribution by itself said in the worlds of each mechanism: how often a right condition, a wrong one, none.
+attributed_kinds <- function(rows) {
+  strong <- strong_effects(rows)
+  kinds <- vapply(strong, `[[`, "", "kind")
+  do.call(rbind, lapply(unique(kinds), function(kind) {
+    own <- strong[kinds == kind]
+    none <- sum(vapply(own, function(r) is.na(r$attributed_condition), NA))
+    right <- sum(vapply(own, condition_right, NA, "attributed_condition"))
+    data.frame(kind = kind, right = right, wrong = length(own) - right - none, none = none)
+  }))
 }

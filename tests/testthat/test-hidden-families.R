@@ -182,6 +182,8 @@ test_that("rates tell families, verdicts and checks apart, and do without what t
   expect_equal(network$named_unchecked, 1)
   expect_equal(network$false_mechanism, 1)
   expect_equal(rates$network$right_paper_condition$n, 0)
+  told <- scope$attributed_kinds(c(rows, list(row(attributed_condition = "Te"), row(attributed_condition = NA))))
+  expect_equal(told, data.frame(kind = "heater state", right = 5L, wrong = 1L, none = 1L))
   model <- function(...) list(...)
   upgrade <- list(models = list(model(), model(verdict = "stand-in", fit = list(check = list(passed = FALSE)))))
   expect_equal(scope$mechanism_verdicts(upgrade, "named"), "stand-in")
