@@ -15,7 +15,8 @@
 #' directory, which is kept, and the last lines of its stderr; it is tried again at the next call. Runs are made in
 #' parallel as [future::plan()] says.
 #'
-#' @param command The program and its arguments, as a character vector. Words that name a file become absolute paths.
+#' @param command The program and its arguments, as a character vector. Words that name an existing file become absolute
+#'   paths, but for the names of `templates`, `drivers` and the file of `output`: those are in the run's directory.
 #' @param ... The parameters, each made by [free()].
 #' @param output Where the output is: `c(file = "out.csv", column = "Ti")` of a CSV in the run's directory (`stdout.txt`
 #'   for what the program prints), or a function of that directory that returns one number per row of the drivers.
@@ -54,7 +55,8 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
   check_input(checkmate::check_string(cache, min.chars = 1), "cache")
   check_input(checkmate::check_string(name), "name")
   templates <- read_templates(templates)
-  files <- file.exists(command) & !dir.exists(command) & !command %in% names(templates)
+  made <- c(names(templates), drivers, if (!is.function(output)) output[["file"]])  # in the run's directory
+  files <- file.exists(command) & !dir.exists(command) & !command %in% made
   command[files] <- normalizePath(command[files])
   simulator <- structure(list(
     format_version = format_version, name = name, command = command, output = output, templates = templates,

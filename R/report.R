@@ -32,7 +32,7 @@
 #' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' \donttest{
-#' if (rmarkdown::pandoc_available("1.12.3")) report(fit, file.path(tempdir(), "room.html"))
+#' if (rmarkdown::pandoc_available("2.0")) report(fit, file.path(tempdir(), "room.html"))
 #' }
 #' \dontrun{
 #' report_fragment(fit, parts = "summary", level = 3)  # in a chunk of a document

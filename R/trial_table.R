@@ -87,8 +87,9 @@ trial_table <- function(fits, current, from, full, responses = NULL) {
   }
   table <- do.call(rbind, rows)
   table$screened <- table$judged_by != "calibration"
-  # Equal prior probability for no change and for each mechanism.
+  # Equal prior probability for no change and for each mechanism; one whose runs all failed was not tried.
   log_odds <- c(0, table$log10_bf) * log(10)
+  log_odds[is.na(log_odds)] <- -Inf
   probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))
   table$probability <- probability[-1]
   table

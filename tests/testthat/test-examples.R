@@ -24,7 +24,7 @@ test_that("the R session finds the sun", {
 
 test_that("the R Markdown report names the window", {
   skip_on_cran()
-  skip_if_not(rmarkdown::pandoc_available("1.12.3"))
+  skip_if_not(rmarkdown::pandoc_available("2.0"))
   folder <- withr::local_tempdir()
   made <- new.env()
   file <- rmarkdown::render(example_file("report.Rmd"), "html_document", output_dir = folder,

@@ -35,6 +35,18 @@ test_that("a program gives what the same function gives, and no run is made twic
   expect_match(printed(program), "the program .*awk.* with 2 free parameters")
 })
 
+test_that("files of the working directory do not take the place of those that a run makes", {
+  withr::local_dir(withr::local_tempdir())
+  expected <- simulate_runs(rc_program(), rc_values, rc_drivers, 1)
+  writeLines(c("time,hours,Te", "1,1,100"), "drivers.csv")
+  writeLines("Ti", "stdout.txt")
+  writeLines("BEGIN { exit 1 }", "model.awk")
+  expect_identical(simulate_runs(rc_program(), rc_values, rc_drivers, 1), expected)
+  named <- program_simulator(c("cat", "stdout.txt", "other.txt"), free("a", uniform(0, 1)),
+                             output = c(file = "stdout.txt", column = "Ti"), templates = list(a.txt = I("{{a}}")))
+  expect_identical(named$command, c("cat", "stdout.txt", "other.txt"))
+})
+
 test_that("runs in parallel are the same", {
   skip_on_cran()  # second tier: tools/test --quick
   skip_if_not_installed("future")

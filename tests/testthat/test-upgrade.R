@@ -29,6 +29,17 @@ test_that("a coarse candidate is compared with the coarse calibration of the cur
   expect_equal(diff(table$log10_bf), (base$log_evidence - coarse$log_evidence) / log(10), tolerance = 1e-10)
 })
 
+test_that("a mechanism whose runs all failed takes no probability from the others", {
+  models <- small_upgrade()$models
+  seen <- data.frame(log10_bf = c(NA, -1), lower95 = c(NA, -2), upper95 = c(NA, 0), word = c(NA, "undecided"),
+                     runs = 4, row.names = c("broken", "drift"))
+  table <- amiss:::trial_table(list(sun = models[[2]]$fit), models[[1]]$fit, from = "base", full = "sun", seen)
+  expect_equal(table$mechanism, c("sun", "broken", "drift"))
+  odds <- 10^table$log10_bf[c(1, 3)]
+  expect_equal(table$probability[c(1, 3)], odds / (1 + sum(odds)), tolerance = 1e-12)
+  expect_equal(table$probability[2], 0)
+})
+
 test_that("the coarse calibration follows screening, whatever is asked of the full one", {
   upgrade <- small_upgrade()
   settings <- list(calibrate = calibrate, measurements = upgrade$measurements, runs = 30, seed = 1, threads = 1,
