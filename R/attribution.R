@@ -32,15 +32,19 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' together, also where conditions are correlated; two conditions that say the same share evenly. Beyond 10 conditions
 #' that act, 400 random orders stand for all.
 #'
-#' @param fit A calibration ([calibrate()]).
+#' @param fit A calibration ([calibrate()], [calibrate_refined()]), or that of several records ([calibrate_jointly()]).
 #' @param control List of options: `surrogates` (99; 39 where no condition earns enough evidence to matter),
 #'   `smallest_shift` (0.05 of the record), `level` (0.05), `least_log10_bf` (0.5: what a condition must earn besides
 #'   its p-value), and `ais` for the sampler.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition; `group` names the
-#'   conditions that it cannot be told apart from (`NA` for none), and `significant` of a member is that of the group.
+#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition (`boundary`): the
+#'   evidence lost without it (`log10_bf_dropped`, with its `standard_error`), its `share`, its p-value among all
+#'   conditions and by itself (`p_value`, `p_value_single`), whether it is `significant` (a p-value of at most `level`
+#'   and a loss of at least `least_log10_bf`) and whether the sampler is `trusted`; `group` names the conditions that it
+#'   cannot be told apart from (`NA` for none), and `significant` of a member is that of the group.
 #'   `groups` is a list, one element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and
-#'   `correlation`, the largest between two members.
+#'   `correlation`, the largest between two members. Of several records: an object of class `amiss_joint_attribution`
+#'   with `records`, one such object each, and `table` and `groups` of all together.
 #' @source Westfall and Young (1993), Resampling-based multiple testing, Wiley.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))

@@ -34,17 +34,19 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   `reach` (see *Model*), `time_constants` (hours) of the filter bank, `error_times` (hours) and `error_ratios`
 #'   (variance beside the white noise) of the autocorrelated error, `error_draws` (posterior draws kept for the
 #'   discrepancy over time), `check` (runs of the simulator at posterior draws, 40; 0 for none), `exact` (runs that
-#'   correct the evidence; default those of the check; 0 for none), and `ais`, a list for the
-#'   sampler (`pilot_chains`, `groups`, `chains`, `sweeps`, `ess_drop`, `resample`, `importance_draws`,
-#'   `max_components`).
+#'   correct the evidence; default those of the check; 0 for none), and `ais`, options of [ais()] (here `pilot_chains`
+#'   400, `groups` 8, `max_groups` 16, `max_sweeps` 12, `precision` 0.2, with gradients). Defaults of the times:
+#'   `time_constants` of 0, 2, 4, 8, ... 64 steps of the record, up to a sixth of the calibration rows: give longer ones
+#'   where the system is slower; `error_times` of 2 and 8 steps.
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
 #' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the parameters;
-#'   `log_evidence`, `standard_error` and `interval` its evidence; `reach` the posterior probability of each reach;
-#'   `check` what the runs said of the emulator: `error` (RMS at the record's rows), `ratio` (over the noise), `border`
-#'   (share of the posterior in the outer tenth of the emulator's region), `z2` (mean square in units of the emulator's
-#'   own standard deviations), `effective` (effective share of the draws under the exact weights), `passed` and
-#'   `verdict`.
+#'   `log_evidence`, `standard_error` and `interval` its evidence (natural logarithms; what is printed has those to the
+#'   base of 10); `trust`, whether the numbers can be believed (`trusted`) and why not (`verdict`); `reach` the
+#'   posterior probability of each reach; `check` what the runs said of the emulator: `error` (RMS at the record's
+#'   rows), `ratio` (over the noise), `border` (share of the posterior in the outer tenth of the emulator's region),
+#'   `z2` (mean square in units of the emulator's own standard deviations), `effective` (effective share of the draws
+#'   under the exact weights), `passed` and `verdict`.
 #' @source Kennedy and O'Hagan (2001), Bayesian calibration of computer models, Journal of the Royal Statistical Society
 #'   B 63, 425-464, for simulation plus discrepancy plus error. The covariance, its priors and the check are in
 #'   `vignette("algorithm", "amiss")`, *One covariance*, *The simulator has the last word* and *History of the boundary

@@ -49,7 +49,8 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' keeps the times of its rows, and is refused for measurements of others.
 #'
 #' @param design Matrix of parameter values, one run a row, named columns.
-#' @param outputs Matrix of outputs, one run a column: at the calibration rows of the measurements, or as said below.
+#' @param outputs Matrix of outputs, one run a column: at the calibration rows of the measurements (those that calibrate
+#'   and have a target), or as said below.
 #' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not given, each gets a
 #'   uniform prior over the range of its column.
 #' @param measurements The [measurements()] that the runs are compared with. Without them `outputs` are taken to be at

@@ -2,15 +2,17 @@
 #'
 #' Checks a table of measurements and prepares it for all later stages: the record is cut into segments wherever time is
 #' broken, averaged to a coarser step if asked (blocks follow the UTC clock), and each row is given its use:
-#' calibration, validation or warm-up. Time stamps mark the end of each interval.
+#' calibration, validation or warm-up. Time stamps mark the end of each interval: where yours mark the beginning, add a
+#' step first.
 #'
 #' # Time
 #'
-#' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text that is the same in all
-#' rows: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without), `30.08.2013 00:10`,
+#' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text in one
+#' format: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without), `30.08.2013 00:10`,
 #' `30/08/2013 00:10` or `08/30/2013 12:10 AM` (where the whole column tells day from month), the stamps of EnergyPlus
 #' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. Numbers of 1e8 and more
-#' are Unix time in seconds or milliseconds, which is told. What stays open is an error, and `time_format` settles it.
+#' are Unix time in seconds or milliseconds, which is told. A `Date` is its beginning, 00:00 UTC: for daily values that
+#' are dated by their day give `date + 1`. What stays open is an error, and `time_format` settles it.
 #'
 #' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when daylight saving ends,
 #' the column's order tells the first from the second; a time that its beginning leaves out is an error. Text that steps
@@ -38,7 +40,8 @@
 #'   standard error of the averages is taken. Both need `average`.
 #' @param average Width of the averages in hours; `NULL` keeps the step of the data.
 #' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that say which rows
-#'   calibrate and which validate. Rows of neither use still drive the simulator.
+#'   calibrate and which validate. Without both all rows calibrate; without `calibrate`, all but those that validate;
+#'   without `validate`, none validate. At least 20 rows must calibrate. Rows of neither use still drive the simulator.
 #' @param warmup Hours at the start of each segment that are left out, so that the simulator's unknown initial
 #'   state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
@@ -48,7 +51,9 @@
 #'   such as `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular
 #'   boundary conditions by way of sine and cosine.
-#' @return An object of class `amiss_measurements`; `noise` says how `noise_sd` came about (`method`, and
+#' @return An object of class `amiss_measurements`. Of each row, after averaging, `time`, `hours`, the target `y` and
+#'   `use` (`"calibrate"`, `"validate"`, `"warmup"` or `"none"`); the calibration rows are those of the first use
+#'   whose `y` is not `NA`. `noise` says how `noise_sd` came about (`method`, and
 #'   `per_step`, the value of each average, where it was estimated).
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))

@@ -7,13 +7,13 @@
 #' edit as `base`, so that edits stack in any order. Make every [mechanism()] of a function in this way: an edit that
 #' writes the model anew would lose what was adopted before it.
 #'
-#' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with named columns, one row per
-#'   interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is given a list
-#'   of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment` (its number) and
-#'   `hold` (the target as measured in the rows that warm up, `NA` in the others). `with_parameters()`: if it has an
-#'   argument `base`, it is given the simulator before the edit, as a function of `values` and, if they are to differ,
-#'   `drivers` and `info`; to change what the simulator does not read is an error. `NULL` leaves the function as it is:
-#'   the parameters are for the one that was there first, which uses them where it is given them.
+#' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with the columns of `boundary`,
+#'   one row per interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is
+#'   given a list of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment`
+#'   (its number) and `hold` (the target as measured in the rows that warm up, `NA` in the others). `with_parameters()`:
+#'   if it has an argument `base`, it is given the simulator before the edit, as a function of `values` and, if they are
+#'   to differ, `drivers` and `info`; to change what the simulator does not read is an error. `NULL` leaves the function
+#'   as it is: the parameters are for the one that was there first, which uses them where it is given them.
 #' @param ... The parameters, each made by [free()]. Those of `model` stay.
 #' @param boundary Names of the driver columns that the function needs; `with_parameters()`: beside those of `model`.
 #' @param name A name for people.

@@ -4,16 +4,17 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 
 #' The loop: show, name the cause, extend, measure
 #'
-#' The model is calibrated and its discrepancy attributed; every mechanism of the catalogue is tried as a real
-#' extension (simulated, trained, calibrated); the one of highest evidence is adopted if its Bayes factor is decisive;
-#' and the loop begins again with the extended model. A mechanism with which the simulation's own error in calibration
-#' rises (by more than 2 %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. But where the
-#' model is wrong in other ways as well, its discrepancy can do for the evidence what a mechanism does, and it can do a
-#' part of the parameters' work. So two more are adopted, and told as likely at most: a mechanism of which the evidence
-#' is decisive neither for nor against and with which the error falls by a third (below what any run of the present
-#' model reaches, too); and one of decisive evidence with which the error rises at the calibrated values, but falls by a
-#' third where both models are fitted by least squares (`least_squares` of the model has both errors, and the gain held
-#' out with these values; not for given runs or several records). Held-out rows only measure; they decide nothing.
+#' The model is calibrated and its discrepancy attributed; every mechanism of the catalogue is tried as a real extension
+#' (simulated, trained, calibrated); the one of highest evidence is adopted if its log10 Bayes factor is at least
+#' `decisive` (2) with its interval above zero (the word *decisive* asks for an interval above 2); and the loop begins
+#' again with the extended model. A mechanism with which the simulation's own error in calibration rises (by more than 2
+#' %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. But where the model is wrong in other
+#' ways as well, its discrepancy can do for the evidence what a mechanism does, and it can do a part of the parameters'
+#' work. So two more are adopted, and told as likely at most: a mechanism of which the evidence is decisive neither for
+#' nor against and with which the error falls by a third (below what any run of the present model reaches, too); and one
+#' of decisive evidence with which the error rises at the calibrated values, but falls by a third where both models are
+#' fitted by least squares (`least_squares` of the model has both errors, and the gain held out with these values; not
+#' for given runs or several records). Held-out rows only measure; they decide nothing.
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
 #' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
@@ -22,18 +23,16 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' verdict: where a simulator is far from linear, a mechanism may do elsewhere in the parameters' space what it does not
 #' do there.
 #'
-#' Mechanisms are calibrated twice: first with a coarse sampler (`screening`) on runs that fill the space of the
-#' parameters, two thirds of all, and compared with the present model calibrated in the same way; then in full, with the
-#' other runs made where the coarse posterior lies ([refine_ensemble()]; none where the coarse calibration was refined
-#' there already) and the emulator checked by runs of the simulator and refined ([calibrate_refined()]), those that
-#' could come within `margin` both of the best and of being decisive (a third of it where runs of the simulator have
-#' confirmed the coarse calibration): the coarse evidence is taken as uncertain by three standard errors and, if
-#' `screening` asks for a second estimator, by what annealing lags behind it. Candidates that stay behind keep their
-#' coarse Bayes factor; `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those calibrated in
-#' full. What is to be adopted, or the present model if it stays, is refined further, until the intervals of its
-#' parameters hold, and must lead after that too. Where the present model's evidence is not known, as runs refute its
-#' emulator to the end, a mechanism with trusted numbers is adopted (and told as likely) if the simulation's error falls
-#' by a third.
+#' Each mechanism is first calibrated coarsely (`screening`), on two thirds of the runs, and compared with the present
+#' model calibrated in the same way. Those that could still win are then calibrated in full, with the other runs made
+#' where the coarse posterior lies ([refine_ensemble()]), checked by runs of the simulator and refined
+#' ([calibrate_refined()]): those within `margin` (a third of it where runs have confirmed the coarse calibration),
+#' three standard errors and what annealing lags behind its second estimator, both of the best and of `decisive`. The
+#' others keep their coarse number: `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those
+#' calibrated in full. What is to be adopted, or the present model if it stays, is refined further, until the intervals
+#' of its parameters hold, and must lead after that too. Where the present model's evidence is not known, as runs refute
+#' its emulator to the end, a mechanism with trusted numbers is adopted (and told as likely) if the simulation's error
+#' falls by a third.
 #'
 #' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,
@@ -49,8 +48,10 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' @param simulator The base model: a simulator, or an [ensemble()] of given runs; of several records a named list.
 #' @param measurements The [measurements()]; of several records a list with the same names.
 #' @param catalogue A [catalogue()] of mechanisms.
-#' @param runs Runs of the simulator for each model that is calibrated in full; two thirds of them fill the space of its
-#'   parameters (`refine`), ten or more for each.
+#' @param runs Runs with which each model begins: two thirds of them fill the space of its parameters (`refine`; give
+#'   ten for each, below five a warning says so), the others lie where the posterior does. Searches, rounds of
+#'   refinement and checks come on top: with eight mechanisms two to ten thousand runs in all are usual, and fewer first
+#'   runs cost more in the end. The budget is `control$runs_total`.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies;
 #'   1/3, 0 for none), `rounds` (of refinement of a model where the check by runs asks for it; 8), `decisive` (log10
 #'   Bayes factor that a mechanism must earn, with its interval above zero; 2), `runs_total` (budget: once so many runs
@@ -61,9 +62,11 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_upgrade`: the models adopted (first the base model), all candidates tried (with
-#'   the simulation's error in calibration with each over that before, `error_ratio`), the named cause, the gain, why
-#'   the loop stopped, and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
+#' @return An object of class `amiss_upgrade`: the `models` adopted (first the base model), all `candidates` tried (a
+#'   row each: the model that it extends, `from`, the `mechanism`, `log10_bf` with `lower95` and `upper95` and its
+#'   `word`, its `probability`, the simulation's error in calibration over that before, `error_ratio`, `trusted`,
+#'   `judged_by`, and the estimates of its `parameters`), the `named_cause`, the `gain`, why the loop stopped
+#'   (`stopped_because`) and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
 #'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error; by least squares if
 #'   it was adopted by them): then it takes the place of something else. `held_out_rivals` names mechanisms that could

@@ -44,4 +44,5 @@ quick <- list(max_steps = 1, rounds = 3, attribution = list(surrogates = 19),
               calibration = list(check = 15, ais = list(pilot_chains = 48, groups = 4)))
 upgrade <- upgrade_model(network, room, ideas, runs = 60, control = quick, seed = 1, quiet = TRUE)
 print(upgrade)
-print(tail(tidy(upgrade), 1))
+estimates <- tidy(upgrade)
+print(estimates[estimates$term %in% c("south", "wind"), ])
