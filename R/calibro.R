@@ -9,13 +9,14 @@
 #' others, as it does where values are relative to their ranges; otherwise it is no run of the design and is left out.
 #'
 #' @section The command: `exec/calibrino -c NAME -b bc.csv -i inputs.csv -o obs.csv -s sims.csv --fmt json,html` reads
-#' such tables, calls [amiss()] and writes `calibro_report.json` and, by [report()], the other formats into the working
-#' directory; `--help` lists the options. What ESP-r reads there: of each parameter the median and 95 % limits, in the
-#' values of `inputs.csv` (`CALIBRATION_RESULTS`, `theta.stats`), and the RMSE of the simulation before the calibration,
-#' which is that of the base case, and after it (`CALIBRATED_MODEL_GOF`). ESP-r's names `what:where` become
-#' `what.where`. Besides: [Sobol indices][sobol_indices()], the training of the emulator, the data set. One record is
-#' calibrated at a time. Where nothing can be calibrated the file holds the `error` alone, and the exit status is 1 (2
-#' where the usage is bad).
+#'   such tables, calls [amiss()] and writes `calibro_report.json` and, by [report()], the other formats into the
+#'   working directory; `--help` lists the options. What ESP-r reads there: of each parameter the median and 95 %
+#'   limits, in the values of `inputs.csv` (`CALIBRATION_RESULTS`, `theta.stats`), and the RMSE of the simulation before
+#'   the calibration (of the base case if it is among the runs kept, else of the emulator at the middle of each prior)
+#'   and after it (`CALIBRATED_MODEL_GOF`). Priors are uniform over the range of each column of `inputs.csv`. ESP-r's
+#'   names `what:where` become `what.where`. Besides: [Sobol indices][sobol_indices()], the training of the emulator,
+#'   the data set. One record is calibrated at a time. Where nothing can be calibrated the file holds the `error` alone,
+#'   and the exit status is 1 (2 where the usage is bad).
 #'
 #' @param folder The folder.
 #' @param parameters The [free()] parameters that the columns of `inputs.csv` are, in their order, in a list; if not

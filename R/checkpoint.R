@@ -24,6 +24,20 @@ checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
   }
 }
 
+# The seed of work that is kept in a folder. One that was drawn is kept as well: with another, nothing would be found.
+kept_seed <- function(seed, folder, call = rlang::caller_env()) {
+  if (!is.null(seed) || is.null(folder)) return(pick_seed(seed, call))
+  check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
+  check_folder_possible(folder, "checkpoint", call)
+  file <- file.path(folder, "amiss-seed.rds")
+  kept <- read_kept(file, "seed")$value
+  if (is.null(kept)) {
+    kept <- pick_seed(NULL)
+    keep_value(kept, file, "seed")
+  }
+  kept
+}
+
 # Whether a folder is there, or can be made, and written.
 check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
   there <- folder
@@ -75,7 +89,7 @@ keep_value <- function(value, file, id, write = saveRDS) {
 
 # Removes what a keeper made in a folder, and the folder if nothing else is in it.
 remove_kept <- function(folder) {
-  unlink(dir(folder, "^amiss-([0-9a-f]{32}[.]rds|part-[0-9a-f]+)$", full.names = TRUE))
+  unlink(dir(folder, "^amiss-(([0-9a-f]{32}|seed)[.]rds|part-[0-9a-f]+)$", full.names = TRUE))
   remove_empty(folder)
 }
 

@@ -19,11 +19,14 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' these criteria knows that a simulation has a discrepancy; `autocorrelation` (of the least-squares errors at one step)
 #' shows how far they are from the independence that they take for granted.
 #'
-#' @param models A named list of simulators.
+#' @param models A named list of simulators. Runs made elsewhere ([ensemble()]) are not compared here: calibrate each
+#'   and use [bayes_factor()].
 #' @param measurements The [measurements()].
 #' @param method `"paper"`: [calibrate_paper()] with its variance index; `"history"`: [calibrate()] and
 #'   [attribute_discrepancy()].
-#' @param runs Runs of the simulator for each model.
+#' @param runs Runs of the first design of each model. On top come those for predictions and the least-squares search
+#'   and, of `"history"`, of the check and of up to eight rounds of refinement where it fails ([calibrate_refined()]).
+#'   `"paper"` is neither checked by runs nor refined.
 #' @param control List of lists: `emulator`, `calibration` and `attribution` (of `"history"` only), as the stages take
 #'   them.
 #' @param truth Of a synthetic record: a list of the `simulator` and the named `values` that made it, to be marked in
@@ -32,13 +35,17 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`, `attribution`, `prediction`,
 #'   `scores`, `best` (the least-squares parameters) and, of a [zone()], draws of its `heat_loss` coefficient), and the
 #'   tables that `tidy()` gives:
-#'   * `"evidence"`: `log10_evidence` with its interval, `trusted`, `log10_bf` of the best model against the second, of
-#'     every other against the one ranked above it, with its interval and `word`, `log10_bf_first` against the first
-#'     model of the list, posterior `probability`, and `rank`;
+#'   * `"evidence"`: `log10_evidence` with `lower95` and `upper95`, `trusted`, `log10_bf` of the best model against the
+#'     second, of every other against the one ranked above it (that is `against`), with `bf_lower95`, `bf_upper95` and
+#'     `word`, `log10_bf_first` against the first model of the list, posterior `probability`, and `rank`;
 #'   * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`, `aic`, `bic`, `nested`,
-#'     `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`;
+#'     `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`, `converged` (the least-squares search);
 #'   * `"ranking"`: the rank of each model by each criterion;
-#'   * `"attribution"` and `"parameters"`, with the column `model`.
+#'   * `"attribution"` (columns as in [calibrate_paper()], `index`, or in [attribute_discrepancy()]) and `"parameters"`,
+#'     with the column `model`.
+#'
+#'   `heat_loss` holds 200 draws in W/K at the mean of each driver over the calibration rows. Name the wind's direction
+#'   as `circular(Wd)` in [measurements()]: otherwise degrees are averaged, and 350 and 10 give 180.
 #' @source Monari (2022), table 1 for the words. The likelihood criteria are those of [logLik()], [AIC()] and [BIC()].
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
@@ -65,7 +72,7 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   control <- fill_comparison_control(control, measurements, method)
   check_runs_asked(runs, measurements)
   for (model in models) check_enough_runs(runs, length(free_parameters(model)))
-  seed <- pick_seed(seed)
+  seed <- kept_seed(seed, checkpoint)
   threads <- check_threads(threads)
   settings <- list(calibrate = switch(method, paper = calibrate_paper, history = calibrate),
                    measurements = measurements, runs = runs,

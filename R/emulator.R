@@ -32,15 +32,15 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 #' of Gilmour, Thompson and Cullis 1995). At the mode itself they would be too small (`bench/emulator_coverage.R`).
 #'
 #' @param ensemble An ensemble: [simulate_design()] or [ensemble()].
-#' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know it: the basis
-#'   is kept fine enough that what it discards lies below it.
+#' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know it. Vectors are kept
+#'   until `explained` is reached and what is left out (RMS) is below `noise_fraction` of it, `max_vectors` at most.
 #' @param control List of options: `explained` (share of variance kept, 0.99), `noise_fraction` (discarded RMS as a
 #'   share of the noise, 0.05), `max_vectors` (30); `selection` (`"ard"` or `"forward"`) and its `significance` (0.05);
 #'   `s2`, `eta2` and `beta`, the two shapes of their beta priors (each at least 1; `c(1, 1)`, uniform), and `lambda`,
 #'   shape a and rate b (squared unit of the outputs) of the gamma prior of the noise precision (`c(2, NA)`; `NA` is the
 #'   square root of the machine epsilon times the square of the largest singular value: where the basis leaves nothing
-#'   out, noise at each step of 1.7e-4 of the runs' RMS); `starts`, `searches` and `max_evaluations` of the gradient
-#'   search.
+#'   out, noise at each step of 1.7e-4 of the runs' RMS); `starts` (points looked at), `searches` (from the best so
+#'   many) and `max_evaluations` (for each) of the gradient search.
 #' @param threads Number of threads; results do not depend on it.
 #' @return An object of class `amiss_emulator`: `basis`, `processes`, `selection` (data frame of the steps of the
 #'   forward selection: `vector`, `step`, `parameter`, `gain` of the log density), `diagnostics`, all leave-one-out, of

@@ -48,8 +48,10 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' `time` rows may stand in any order, and what the measurements do not use may be there too. Either way the ensemble
 #' keeps the times of its rows, and is refused for measurements of others.
 #'
-#' @param design Matrix of parameter values, one run a row, named columns.
-#' @param outputs Matrix of outputs, one run a column: at the calibration rows of the measurements (those that calibrate
+#' @param design Matrix or data frame of parameter values, one run a row, named columns; at least five runs, and two
+#'   more than there are parameters.
+#' @param outputs Matrix or data frame of outputs, one run a column (one that is not finite is left out, with a
+#'   warning): at the calibration rows of the measurements (those that calibrate
 #'   and have a target), or as said below.
 #' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not given, each gets a
 #'   uniform prior over the range of its column.

@@ -19,7 +19,9 @@
 #'   not known is an error.
 #' @inheritParams calibrate
 #' @return `fitted()`, `residuals()`: the posterior mean of the simulation at the calibration rows, without the
-#'   discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a data frame of one row.
+#'   discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a data frame of one row with
+#'   `log10_evidence` and its interval, `trusted`, `emulator_error` (of the check by runs, in units of the noise),
+#'   `sigma` (of what the simulation leaves), `nobs`, `vectors` and `runs`.
 #'   `augment()`: the record with `.fitted` and `.resid`; with `newdata` its prediction, with `.lower` and `.upper` too.
 #'   `update()`: a new calibration by the same emulator (one that was refined for its region is not refined again).
 #' @examples
@@ -163,7 +165,7 @@ print.summary.amiss_fit <- function(x, ...) {
     say_table(shown)
     more <- nrow(x$parameters) - nrow(shown)
     if (more) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
-    cli::cli_bullets(c("*" = x$reach, "*" = x$check,
-                       ">" = "next: {.fun predict}, {.fun confint} or {.fun attribute_discrepancy}"))
+    then <- if (is.null(x$reach)) "its {.code index} of the boundary conditions" else "{.fun attribute_discrepancy}"
+    cli::cli_bullets(c("*" = x$reach, "*" = x$check, ">" = paste("next: {.fun predict}, {.fun confint} or", then)))
   })
 }

@@ -35,11 +35,13 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `unit` (of the target, in whose square `(1 - t2) / t2` is the
 #'   discrepancy's variance; 1), `fictitious_seed` (of the white noise, which is part of the data; 1),
 #'   `probability` of the highest-density intervals (0.95), `tolerance` (0.01, in nats; 0 for dense values), and `ais`,
-#'   a list for the sampler as in [calibrate()].
+#'   options of [ais()], with its defaults (not those of [calibrate()]).
 #' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of the parameters),
 #'   `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of equations 5 and 6 and the total),
 #'   `hyperparameters` (draws of `alpha`, the fictitious condition last, `t2`, `lambda` and their weights), `lambda`
-#'   (draws of the precisions of equation 5), `index` (ranked table), `share` (draws of `R2`), `trust`, and `posterior`
+#'   (draws of the precisions of equation 5), `index` (ranked: `boundary`, `difference` (posterior median of its `R2`
+#'   less that of the fictitious condition), `mean`, `lower95` and `upper95` (the highest-density interval, so called
+#'   whatever `probability` is), `significant`, `rank`), `share` (draws of `R2`), `trust`, and `posterior`
 #'   and `outside`, all that the sampler said of (5) and (6); `outside$approximation` tells the largest error among the
 #'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the
 #'   last, and in the last by skeletons and directly. [tidy()][posterior] gives the table of the parameters.

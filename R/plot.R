@@ -9,7 +9,9 @@ record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_
 #'
 #' `plot()` draws a figure and returns it invisibly; `autoplot()` of ggplot2 returns it undrawn, to be changed or saved.
 #'
-#' @param x,object An object of this package.
+#' @param x,object [measurements()]; a calibration ([calibrate()], not [calibrate_paper()]); what
+#'   [attribute_discrepancy()], [discrepancy()], [sobol_indices()], [ais()], [compare_models()] or [upgrade_model()]
+#'   return. Of several records plot one of `records`.
 #' @param which Which figure of an upgrade: `"fit"` (measured and simulated), `"attribution"` (what the error answers
 #'   to), `"candidates"` (mechanisms tried), `"parameters"`, `"discrepancy"` (over time), `"response"` (error against
 #'   the leading boundary condition), `"gain"` (scores before and after), `"mean_day"`, `"priors"` (against posteriors),

@@ -7,8 +7,9 @@
 #' @param object A calibration ([calibrate()], [calibrate_paper()]), or an upgrade ([upgrade_model()]), of
 #'   which it is the last model.
 #' @param newdata A record of its own: [measurements()] with the same time step and boundary conditions; or a data frame
-#'   of equal steps, as long as those of the data that were given to [measurements()], with a column `time` and the
-#'   columns that drive the simulator, one row for each interval. Its target, if it has that column, is compared with
+#'   of equal steps, as long as those of the data that were given to [measurements()], with a column `time` (whatever it
+#'   was called there), all boundary conditions of the record and what else drives the simulator, one row for each
+#'   interval. Its target, if it has that column, is compared with
 #'   the prediction, and nothing is learned from it. A data frame has no warm-up: begin it before the rows that count.
 #'   By default the record that was calibrated on.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both; every row of a data frame.
@@ -22,7 +23,8 @@
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the number is `level`),
-#'   and `crps`, the continuous ranked probability score of each row.
+#'   and `crps`, the continuous ranked probability score of each row; of a data frame also `segment`, the number of the
+#'   unbroken part. Of several records `newdata` and what is returned are lists by record.
 #' @source Gneiting and Raftery (2007), Strictly proper scoring rules, prediction, and estimation, Journal of the
 #'   American Statistical Association 102, 359-378, for the CRPS.
 #' @examples
@@ -37,7 +39,7 @@
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' head(predict(fit, use = "validate"))
 #'
-#' # Other weather: a table with the columns that drive the simulator.
+#' # Other weather: a table with the record's boundary conditions.
 #' warmer <- data.frame(time = 97:120, Te = 15 + 5 * sin(97:120 / 4), Gv = 0)
 #' head(predict(fit, warmer, interval = "confidence"))
 #' @export

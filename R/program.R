@@ -8,6 +8,10 @@
 #' The drivers' file has the columns `time` (the record's: ISO 8601 in UTC, or its hours), `hours` since the start of
 #' the segment, both at the end of each interval, and the columns named in `boundary`.
 #'
+#' Of a record with gaps the program is started once for each unbroken segment, from its first row, warm-up included, to
+#' the last that is used, at the step of the data (before averages): let it take its period and step from the drivers'
+#' file, and write one row for each of its rows.
+#'
 #' A run that succeeds is kept in `cache` at once and never made twice: its key is what it reads (templates, command,
 #' drivers, contents of the files that the command names, `version`) and how its output is read. What else the program
 #' reads, such as a library of its own, does not count: give another `version` when it changes. A run that fails (exit

@@ -47,7 +47,12 @@ free_parameters.amiss_renamed <- function(simulator) {
   parameters <- free_parameters(simulator$simulator)
   at <- match(names(simulator$to), names(parameters))
   names(parameters)[at] <- simulator$to
-  for (name in simulator$to) parameters[[name]]$name <- name
+  for (name in simulator$to) {
+    parameter <- parameters[[name]]
+    if (identical(parameter$label, parameter$name)) parameter$label <- name  # it had none of its own
+    parameter$name <- name
+    parameters[[name]] <- parameter
+  }
   parameters
 }
 

@@ -39,7 +39,21 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'
 #' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical.
 #' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets,
-#' the four operations of arithmetic and `%in% c(...)`.
+#' the four operations of arithmetic and `%in% c(...)`. One that begins with `!` needs quotes around it:
+#' `validate: '!(hour > 72)'`.
+#'
+#' `study`, `data`, `time`, `target` and `boundary` are needed, and `model` with `catalogue`, or `models`. Without the
+#' others `title` is that of `study`, `runs` 150, `method` `paper`, `average_h` the step of the data, `warmup_h` and
+#' `fill_gaps_h` 0.
+#'
+#' *result.json* of a loop holds `schema`, `study`, `seed`, `wall_s` (seconds), `runs_total`, `diagnosis` (`verdict`:
+#' `"named"`, `"likely"`, `"unexplained"` or `"nothing"`; `tag`, `headline`), `named_cause` (`null` if there is none; a
+#' likely cause stands here too), `gain` (`log10_bf`, `interval` and the scores of the first and the last model),
+#' `stopped_because`, `candidates` (as in [upgrade_model()]) and `models`: of each `name`, `parent`, `mechanism`, `N`
+#' rows, `M` runs, `Q` basis vectors, its evidence, `trusted` and why (`trust`), `verdict`, `doubts`, `confounded_with`,
+#' `held_out_gain`, what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`), `refinements`,
+#' `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of the command
+#' `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It
@@ -47,14 +61,16 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   goes on from there if it was interrupted, as long as the code of the study's R files is the same. What has these
 #'   names before, such as earlier results, is moved into a folder `earlier-` with the time. One run at a time can use
 #'   the folder.
-#' @param seed Overrides the seed of the file.
+#' @param seed Overrides the seed of the file; with neither R's generator draws one, which is kept with the stages.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
 #' @param trust Whether the R files that the study names may run, and files outside its folder be read: both can do
 #'   whatever you can. If not, such a study is refused, or you are asked at a terminal. Studies that ship with the
 #'   package need no trust.
-#' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], invisibly; `read_study()`: a list of
-#'   the study's pieces.
+#' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], with `study`, `title` and `wall_s`,
+#'   invisibly. `read_study()`: a list of `study`, `title`, `seed`, `runs`, `control`, `measurements` (of several
+#'   records a named list), `model` and `catalogue`, or `models`, `method` and `truth`.
+#' @seealso `help("amiss-package")` for options that a batch job may set, and for the classes of conditions.
 #' @examples
 #' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
 #' @export
@@ -65,7 +81,6 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
   if (!is.null(seed)) pick_seed(seed)
   check_threads(threads)
   study <- read_study(path, quiet, trust)
-  seed <- pick_seed(seed %||% study$seed)
   check_study_control(study)
   stages <- NULL
   if (!is.null(out)) {
@@ -74,6 +89,7 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
     on.exit(release_folder(held), add = TRUE)  # after what hush() undoes
     stages <- file.path(out, "stages", study$code)
   }
+  seed <- kept_seed(seed %||% study$seed, stages)
   result <- staged(paste("study", study$study), if (is.null(study$models)) {
     upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
                   seed = seed, threads = threads, quiet = quiet, checkpoint = stages)

@@ -21,7 +21,14 @@ read_study_file <- function(path, call = rlang::caller_env()) {
                     error = function(e) refuse(conditionMessage(e)), warning = function(w) refuse(conditionMessage(w)))
   if (length(tags)) refuse(paste("It has the tag", ls(tags)[1], "which is not known."))
   check_study_size(study, refuse)
-  study
+  joined_numbers(study)
+}
+
+# Numbers of one sequence, which the parser leaves in a list where some have a point and others have none.
+joined_numbers <- function(x) {
+  if (!is.list(x)) return(x)
+  number <- vapply(x, function(value) is.numeric(value) && length(value) == 1, NA)
+  if (length(x) && is.null(names(x)) && all(number)) as.numeric(unlist(x)) else lapply(x, joined_numbers)
 }
 
 # The parser takes minutes for what is nested very deep. Brackets in texts count too: a hundred are in no study.

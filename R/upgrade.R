@@ -26,13 +26,13 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' Each mechanism is first calibrated coarsely (`screening`), on two thirds of the runs, and compared with the present
 #' model calibrated in the same way. Those that could still win are then calibrated in full, with the other runs made
 #' where the coarse posterior lies ([refine_ensemble()]), checked by runs of the simulator and refined
-#' ([calibrate_refined()]): those within `margin` (a third of it where runs have confirmed the coarse calibration),
-#' three standard errors and what annealing lags behind its second estimator, both of the best and of `decisive`. The
-#' others keep their coarse number: `candidates$judged_by` is `"screening"` for them, and `"calibration"` for those
-#' calibrated in full. What is to be adopted, or the present model if it stays, is refined further, until the intervals
-#' of its parameters hold, and must lead after that too. Where the present model's evidence is not known, as runs refute
-#' its emulator to the end, a mechanism with trusted numbers is adopted (and told as likely) if the simulation's error
-#' falls by a third.
+#' ([calibrate_refined()]): those whose coarse number lies below the best, and below `decisive`, by no more than
+#' `margin` (a third of it where runs have confirmed it), three standard errors and what annealing lags behind its
+#' second estimator. The others keep their coarse number: `candidates$judged_by` is `"screening"` for them, and
+#' `"calibration"` for those calibrated in full. What is to be adopted, or the present model if it stays, is refined
+#' further, until the intervals of its parameters hold, and must lead after that too. Where the present model's evidence
+#' is not known, as runs refute its emulator to the end, a mechanism with trusted numbers is adopted (and told as
+#' likely) if the simulation's error falls by a third.
 #'
 #' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,
@@ -59,7 +59,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   `emulator`, `calibration` and `attribution` for the stages, `screening` (sampler of the first calibration of a
 #'   mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
-#' @param checkpoint A folder in which every finished model is kept, so that an interrupted loop, called again with the
+#' @param checkpoint A folder in which every finished model is kept (and the seed, if none is given), so that an
+#'   interrupted loop, called again with the
 #'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
 #' @return An object of class `amiss_upgrade`: the `models` adopted (first the base model), all `candidates` tried (a
@@ -121,7 +122,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     check_enough_runs(first, length(parameters), of = runs)
     warn_few_runs(first, length(parameters))
   }
-  seed <- pick_seed(seed)
+  seed <- kept_seed(seed, checkpoint)
   threads <- check_threads(threads)
   say <- progress(quiet)
   settings <- list(calibrate = calibrate, measurements = measurements, runs = runs, control = control, seed = seed,

@@ -28,7 +28,7 @@
 #' @param width,length Width and length of a crack, m.
 #' @param height Height above the zone's datum, m.
 #' @param exposure How open the ground is: `"exposed"`, `"semi-exposed"` or `"sheltered"`.
-#' @param shelter Reduction of the wind speed at the opening.
+#' @param shelter Factor on the wind speed at the opening: 1 for the column as it is, 0 for no wind.
 #' @param ach Air changes per hour.
 #' @param power Column of the power, W.
 #' @param radiant_fraction Share of the power that goes to the inner surfaces by area x emissivity.
@@ -44,6 +44,20 @@
 #'   before the record is unknown: a heavy building remembers it for days, so that it may be a [free()] parameter.
 #' @return `zone()`: an object of class `amiss_zone`; the others: a component (`amiss_component`) or `amiss_layer`.
 #' @details One opening alone exchanges nothing: use two at different heights or facades.
+#'
+#' *Walls.* The inner surface exchanges heat with the air by `inside_convection` and with the other surfaces by `4 sigma
+#' (293.15 K)^3 inside_emissivity` (5.1 W/m2K at 0.9). The outer surface gains, in W/m2, `film (Te - T) + absorptance
+#' sun - outside_emissivity sky_view (sigma Te^4 - sky)`, Te in kelvin in the last term, with `film = (1 - wind_film)
+#' outside_film + wind_film (7.3 + 3 V)`, V the wind along the facade (of a horizontal wall the wind speed). Without
+#' `outside`, `sun` and `sky` count for nothing; without `sky`, `outside_emissivity` does; with `wind_film = 0`, wind
+#' and azimuth do.
+#'
+#' *Windows* lose `u_value area (Ta - Te)` from the air, and gain `solar_factor area sun`, of which the share `1 -
+#' to_air` goes to the walls.
+#'
+#' *Openings.* Mass flow of an orifice is `0.65 area sqrt(2 rho |dp|)`, so that `area` is geometric; of a crack `rho k
+#' |dp|^x` with `x = 0.5 + 0.5 exp(-500 width)` and `k = 0.0097 length 0.0092^x`: a crack is absent at `length = 0`, not
+#' at `width = 0`. dp is wind pressure and buoyancy over `height`. A negative `flow` of a supply counts as 0.
 #' @section Limits of the fields:
 #' `r zone_limits()`
 #' @source Wind pressure coefficients: Liddament (1986), Air infiltration calculation techniques, Air Infiltration and

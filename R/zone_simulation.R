@@ -12,8 +12,10 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' @param hold Air temperature (degC) to be prescribed in each interval, `NA` where it is free; `NULL` for none.
 #'   Holding the first intervals at the measurement lets the walls forget their unknown past.
 #' @param threads Number of threads; the result does not depend on it.
-#' @param control List of `max_substep_s` (s), `cells` (refinement of the walls), `spinup` (times that the leading
-#'   held rows are repeated first), `initial_hours` (of data that give the walls their first outside temperature).
+#' @param control List of `max_substep_s` (300 s), `cells` (refinement of the walls; 1), `spinup` (times that the
+#'   leading held rows are repeated first; 0), `initial_hours` (of data that give the walls their first outside
+#'   temperature; 24). Calibrations take these defaults: a [function_simulator()] may call `simulate_zone()` with
+#'   others.
 #' @param flux Name of a wall whose heat flux is wanted instead of the air temperature.
 #' @return Matrix of mean air temperatures, degC, or of mean heat fluxes at the inner surface of the wall, W/m2,
 #'   positive into the room: one row per interval, one column per run; `NaN` in a run that fails.

@@ -1,6 +1,6 @@
 # A batch job: the studies of both Twin Houses side by side, each in a session of its own, by the package future.
 # Usage: Rscript batch.R OUT [--quick]
-#   OUT: folder for the results (OUT/N2, OUT/O5: report.html, figures, result.json)
+#   OUT: folder for the results: found.csv and, without --quick, OUT/N2 and OUT/O5 (report.html, figures, result.json)
 #   --quick: a coarse sampler, few runs and one mechanism, to try the job; its numbers are worth nothing
 library(amiss)
 

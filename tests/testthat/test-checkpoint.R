@@ -118,6 +118,23 @@ test_that("the key knows the globals that a function names", {
   expect_false(made(1) == made(2))
 })
 
+test_that("a seed that was drawn is kept with the work, one that was given is not", {
+  folder <- file.path(withr::local_tempdir(), "kept")
+  expect_identical(kept_seed(7, folder), 7)
+  expect_false(dir.exists(folder))
+  set.seed(1)
+  drawn <- kept_seed(NULL, folder)
+  set.seed(1)
+  expect_identical(drawn, pick_seed(NULL))
+  expect_identical(kept_seed(NULL, folder), drawn)
+  expect_identical(kept_seed(8, folder), 8)
+  expect_false(kept_seed(NULL, NULL) == drawn)
+  remove_kept(folder)
+  expect_false(dir.exists(folder))
+  expect_error(kept_seed(NULL, file.path(system.file("DESCRIPTION", package = "amiss"), "in")), "checkpoint",
+               class = "amiss_error_input")
+})
+
 test_that("an edited model does not go on with the old one's work", {
   folder <- withr::local_tempdir()
   m <- linear_measurements(linear_data(60))

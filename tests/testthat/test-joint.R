@@ -185,6 +185,10 @@ test_that("a run is made once for all outputs", {
 test_that("parameters under another name are not shared", {
   apart <- rename_parameters(flux_only, gain = "gain of the flux")
   expect_named(amiss:::free_parameters(apart), "gain of the flux")
+  expect_identical(amiss:::free_parameters(apart)[[1]]$label, "gain of the flux")
+  labelled <- function_simulator(function(values, drivers) values[["g"]] * drivers[, "Te"],
+                                 free("g", uniform(0, 1), label = "gain"), boundary = "Te")
+  expect_identical(amiss:::free_parameters(rename_parameters(labelled, g = "h"))$h$label, "gain")
   drivers <- cbind(Te = 1:4)
   expect_equal(simulate_runs(apart, cbind(`gain of the flux` = 0.3), drivers, 1),
                simulate_runs(flux_only, cbind(gain = 0.3), drivers, 1))

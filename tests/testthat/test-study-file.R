@@ -29,6 +29,14 @@ test_that("what looks like a tag in a comment or a text is none", {
                list(a = "no !expr here", b = "wait !important"))
 })
 
+test_that("numbers with a point and without make one sequence", {
+  read <- read_lines("a: [13, 300, .inf]", "b: {c: [2.5, 24]}", "d: [1, x]", "e: [[1, 2], [3, 4.5]]", "f: 5")
+  expect_identical(read[c("a", "b")], list(a = c(13, 300, Inf), b = list(c = c(2.5, 24))))
+  expect_identical(read$d, list(1L, "x"))
+  expect_equal(read$e, list(c(1, 2), c(3, 4.5)))
+  expect_identical(read$f, 5L)
+})
+
 test_that("a study file is one document", {
   refuse_lines("several documents", "a: 1", "---", "b: 2")
   refuse_lines("several documents", "---", "a: 1", "...", "b: 2")

@@ -1,7 +1,7 @@
 # A pipeline of the package targets: each stage is kept, and made again only when something that it hangs on changed.
 # Usage: copy this folder, then targets::tar_make() in it; library(amiss); targets::tar_read(cause)
 # shows a result.
-# `runs` and `quick` are small, for speed: for real work leave both out.
+# `runs`, `quick` and `surrogates` are small, for speed: for real work leave all three out.
 library(targets)
 tar_option_set(packages = "amiss")
 
