@@ -5,8 +5,7 @@
 # the run.
 checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
   if (is.null(folder)) return(function(name, value) value)
-  check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
-  check_folder_possible(folder, "checkpoint", call)
+  check_checkpoint(folder, call)
   key <- list(plain(arguments), as.character(utils::packageVersion("amiss")))
   function(name, value) {
     id <- content_hash(list(key, name))
@@ -27,8 +26,7 @@ checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
 # The seed of work that is kept in a folder. One that was drawn is kept as well: with another, nothing would be found.
 kept_seed <- function(seed, folder, call = rlang::caller_env()) {
   if (!is.null(seed) || is.null(folder)) return(pick_seed(seed, call))
-  check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
-  check_folder_possible(folder, "checkpoint", call)
+  check_checkpoint(folder, call)
   file <- file.path(folder, "amiss-seed.rds")
   kept <- read_kept(file, "seed")$value
   if (is.null(kept)) {
@@ -36,6 +34,11 @@ kept_seed <- function(seed, folder, call = rlang::caller_env()) {
     keep_value(kept, file, "seed")
   }
   kept
+}
+
+check_checkpoint <- function(folder, call) {
+  check_input(checkmate::check_string(folder, min.chars = 1), "checkpoint", call = call)
+  check_folder_possible(folder, "checkpoint", call)
 }
 
 # Whether a folder is there, or can be made, and written.

@@ -106,6 +106,12 @@ test_that("everything prints on standard output, in fifteen lines, and names the
   }
 })
 
+test_that("a summary of the paper's calibration leads to its index, not to an attribution that it does not have", {
+  told <- paste(capture.output(print(summary(paper))), collapse = " ")
+  expect_match(told, "index")
+  expect_no_match(told, "attribute_discrepancy")
+})
+
 test_that("the print of an upgrade names every mechanism, however many", {
   many <- upgrade
   step <- upgrade$models[[2]]
