@@ -18,8 +18,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' runs ([upgrade_model()]), and can be found where no condition is significant.
 #'
 #' *A condition is not yet a cause.* What changes how much a system loses or stores changes its answer to everything.
-#' The error may then be a response to what moves the output most (in a heated room the heating), not to the condition that
-#' the mechanism is called after. Conditions say where to look; trials of mechanisms say what it is.
+#' The error may then be a response to what moves the output most (in a heated room the heating), not to the condition
+#' that the mechanism is called after. Conditions say where to look; trials of mechanisms say what it is.
 #'
 #' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those
 #' that can be dropped alone a set is sought that cannot be dropped together, nor be made smaller. Such a group is
