@@ -169,8 +169,7 @@ sure_sentences <- function(upgrade) {
   best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
   needed <-
     sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that lies",
-                  "wholly in its favour or, where the odds are open and can be trusted, an error that falls by a",
-                  "third."),
+                  "wholly in its favour."),
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
@@ -180,27 +179,16 @@ sure_sentences <- function(upgrade) {
   }
   each <- unlist(lapply(adopted, function(m) {
     row <- upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ]
-    c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive), least_squares_sentence(m, upgrade))
+    c(evidence_sentence(row), fallen_sentence(row))
   }))
   c(each, probability_sentence(trials), trust_sentence(upgrade, best))
 }
 
-# Why a mechanism was adopted for which the evidence does not speak by itself.
-fallen_sentence <- function(row, decisive) {
-  if (speaks_for_itself(row, decisive)) return(NULL)
-  why <- if (row$log10_bf >= decisive) "too uncertain to decide"
-         else "not decisive: the discrepancy, which may be anything, does as well or better without it"
-  sprintf(paste("That is %s. It was adopted because the simulation itself gains: its own error in calibration falls to",
-                "%s of what it was."), why, percent(row$error_ratio))
-}
-
-# Why a mechanism was adopted with which the calibrated simulation's own error rises.
-least_squares_sentence <- function(model, upgrade) {
-  if (is.null(model$least_squares)) return(NULL)
-  sprintf(paste("With the calibrated values the simulation's own error rises, as the discrepancy does a part of the",
-                "parameters' work. By least squares %s brings a gain: the error %s."),
-          model$mechanism,
-          change_words(model$least_squares$rmse[1], model$least_squares$rmse[2], upgrade$measurements$unit))
+# Why a mechanism was adopted of which the evidence is not known (may_be_adopted()).
+fallen_sentence <- function(row) {
+  if (row$lower95 > 0) return(NULL)
+  sprintf(paste("That is too uncertain to decide. It was adopted because the simulation itself gains: its own error in",
+                "calibration falls to %s of what it was."), percent(row$error_ratio))
 }
 
 raised_sentence <- function(row) {
@@ -289,8 +277,7 @@ mechanism_words <- function(model, upgrade) {
   changes <- changes_table(upgrade)
   list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
        sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))), collapse = " "),
-       evidence = paste(c(evidence_sentence(row), fallen_sentence(row, upgrade$control$decisive),
-                          least_squares_sentence(model, upgrade)), collapse = " "),
+       evidence = paste(c(evidence_sentence(row), fallen_sentence(row)), collapse = " "),
        brought = step_sentence(upgrade, model), against = doubt_sentence(model),
        also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
        inspect = mechanism_inspections(upgrade, model),
@@ -354,11 +341,17 @@ gain_sentences <- function(upgrade) {
 nearest_run_sentence <- function(upgrade) {
   base <- upgrade$models[[1]]
   if (length(upgrade$models) < 2 || is_several(upgrade$measurements)) return(NULL)
-  nearest <- least_error(base$fit)
+  nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)), nearest_run, 0, base$fit))
   if (nearest > 0.9 * base$scores$calibrate[["rmse"]]) return(NULL)
   sprintf(paste("A part of this fall is not due to the change: one of the base model's runs is wrong by only %s in",
                 "calibration, but its discrepancy did the work of its parameters."),
           with_unit(short(nearest), upgrade$measurements$unit))
+}
+
+# The least RMSE in calibration among the runs that an emulator was trained on.
+nearest_run <- function(emulator, fit) {
+  runs <- tcrossprod(emulator$basis$vectors, emulator$processes$coefficients)
+  sqrt(min(colMeans((runs - fit$measurements$y[fit$rows])^2)))
 }
 
 # What each of several records gains, in its own unit.

@@ -8,10 +8,10 @@ candidates_title <- function(table, decisive) {
            else "No mechanism explains the measurements decisively better than no change")
   }
   adopted <- table[table$adopted, ]
-  by_error <- adopted$mechanism[!speaks_for_itself(adopted, decisive)]
+  by_error <- adopted$mechanism[adopted$lower95 <= 0]
   by_evidence <- setdiff(adopted$mechanism, by_error)
   paste(c(if (length(by_evidence)) paste("The measurements call for", listed(by_evidence)),
-          if (length(by_error)) sprintf("%she fall of the error calls for %s, the evidence does not decide",
+          if (length(by_error)) sprintf("%she fall of the error calls for %s, the evidence is too uncertain",
                                         if (length(by_evidence)) "t" else "T", listed(by_error))), collapse = "; ")
 }
 
@@ -47,11 +47,9 @@ figure_candidates <- function(upgrade) {
     axis +
     figure_titles(candidates_title(table, decisive),
                   sprintf(paste0("Right of the dashed line (odds of %s to 1) a mechanism may be adopted, the best one ",
-                                 "first%s. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals; numbers: ",
+                                 "first. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals; numbers: ",
                                  "estimates%s."),
                           format(10^decisive, big.mark = ","),
-                          if (any(table$adopted & !speaks_for_itself(table, decisive)))
-                            ", or where the error falls by a third" else "",
                           if (any(by_response)) ", those of crosses off by some powers of ten" else ""),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()

@@ -18,43 +18,16 @@ standing <- function(fits, current, full) {
 # The simulation's own error in calibration over that of the fit `current`.
 error_ratio <- function(fit, current) sqrt(mean(left_by_simulation(fit)^2) / mean(left_by_simulation(current)^2))
 
-# The same over the least error that the fit `current` is known to reach: where its discrepancy does the work of its
-# parameters, one of its runs is nearer than its posterior.
-error_fall <- function(fit, current) {
-  error_ratio(fit, current) * max(1, sqrt(mean(left_by_simulation(current)^2)) / least_error(current))
-}
-
-# The least RMSE in calibration among the runs of a fit; of several records that of each, in units of its noise.
-least_error <- function(fit) {
-  fits <- record_fits(fit)
-  least <- vapply(fits, function(one) {
-    min(vapply(list(one$emulator, emulator_over_priors(one$emulator)), nearest_run, 0, one))
-  }, 0, USE.NAMES = FALSE)
-  if (length(fits) == 1) return(least)
-  rows <- vapply(fits, function(one) length(one$rows), 0)
-  noise <- vapply(fits, function(one) one$measurements$noise_sd, 0)
-  sqrt(sum(rows * (least / noise)^2) / sum(rows))
-}
-
-# The least RMSE in calibration among the runs that an emulator was trained on.
-nearest_run <- function(emulator, fit) {
-  runs <- tcrossprod(emulator$basis$vectors, emulator$processes$coefficients)
-  sqrt(min(colMeans((runs - fit$measurements$y[fit$rows])^2)))
-}
-
 raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > risen_error
 
 # Candidates not calibrated in full whose evidence could come near the best that may be adopted, if any could come near
-# adoption; where none is decisive, those with which the error has fallen as well (spoken_for_by_error()).
+# adoption.
 contenders <- function(fits, current, full, control) {
   if (!length(fits)) return(character())
   bf <- standing(fits, current, full)
   reach <- bf$log10_bf + vapply(fits, uncertainty, 0, as_coarse(current), control)
-  free <- !(names(fits) %in% full & vapply(fits, error_ratio, 0, current) > risen_error)
-  leading <- reach >= max(bf$log10_bf[free], control$decisive)
-  falling <- !any(free & speaks_for_itself(bf, control$decisive)) & reach > -control$decisive &
-    vapply(fits, error_fall, 0, current) < fallen_error
-  setdiff(names(fits)[leading | falling], full)
+  barred <- vapply(names(fits), function(name) name %in% full && error_ratio(fits[[name]], current) > risen_error, NA)
+  setdiff(names(fits)[reach >= max(bf$log10_bf[!barred], control$decisive)], full)
 }
 
 # By how many decades the coarse evidence of a fit, beside that of a reference, may lie too low: three standard errors,
@@ -129,14 +102,4 @@ best_trial <- function(table) {
 may_be_adopted <- function(best, current, control) {
   if (!nrow(best) || best$log10_bf < control$decisive) return(FALSE)
   best$lower95 > 0 || (isFALSE(current$check$passed) && best$trusted && isTRUE(best$error_ratio < fallen_error))
-}
-
-# The mechanisms, calibrated in full, of which the evidence is decisive neither for nor against, and with which the
-# simulation's own error falls by a third; best first. A discrepancy may be anything, at little cost however large it
-# is: for the evidence it can do what a mechanism does, but it does not mend the simulation.
-spoken_for_by_error <- function(table, fits, current, control) {
-  open <- table[table$judged_by == "calibration" & table$trusted & table$log10_bf > -control$decisive, ]
-  falls <- vapply(fits[open$mechanism], function(fit) error_fall(fit, current) < fallen_error, NA)
-  open <- open[falls, ]
-  open[order(-open$log10_bf), ]
 }

@@ -64,14 +64,13 @@ screened_mechanisms <- function(current, trials, responses, settings, say) {
   screens
 }
 
-# list(fits, table, current, adopted) of the mechanisms, those that could lead calibrated in full. Where the leader
-# falls back by its full calibration, others may come near: they are calibrated too, until what leads is known in full.
-# What is to be adopted, or the present model if it stays, is settled, and must lead after that too.
+# list(fits, table, current) of the mechanisms, those that could lead calibrated in full. Where the leader falls back by
+# its full calibration, others may come near: they are calibrated too, until what leads is known in full. What is to be
+# adopted, or the present model if it stays, is settled, and must lead after that too.
 tried_in_full <- function(current, trials, screens, settings, say, responses = NULL) {
   fits <- lapply(screens, `[[`, "fit")
   full <- list()
   settled <- character()
-  reached <- least_squares_search(settings)
   repeat {
     left <- if (is.null(screens)) setdiff(names(trials), names(full))
             else contenders(fits, current$fit, names(full), settings$control)
@@ -86,9 +85,9 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
       next
     }
     table <- trial_table(fits, current$fit, current$name, names(full), responses)
-    adopted <- adopted_trial(table, fits, current, settings$control, reached)
-    if (nrow(adopted$row)) {
-      name <- adopted$row$mechanism
+    best <- best_trial(table)
+    if (may_be_adopted(best, current$fit, settings$control)) {
+      name <- best$mechanism
       if (name %in% settled) break
       fits[[name]] <- staged(name, naming_mechanism(name, settled_fit(full[[name]], trial_name(current, name),
                                                                       settings)))
@@ -98,61 +97,7 @@ tried_in_full <- function(current, trials, screens, settings, say, responses = N
       current <- settled_model(current, settings)
     }
   }
-  list(fits = fits, table = table, current = current, adopted = adopted)
-}
-
-# list(row, least_squares) of the mechanism to adopt, no row if there is none: the best by the evidence; where that is
-# not decisive, the first for which the fall of the simulation's own error speaks. One of higher evidence with which the
-# error of the calibrated simulation rises is adopted before it if that of least squares falls, by what `reached` finds
-# (least_squares_search()).
-adopted_trial <- function(table, fits, current, control, reached) {
-  best <- best_trial(table)
-  decided <- may_be_adopted(best, current$fit, control)
-  above <- max(if (decided) best$log10_bf, control$decisive)
-  risen <- table[table$judged_by == "calibration" & raises_error(table) & table$log10_bf >= above &
-                   speaks_for_itself(table, control$decisive), ]
-  for (name in risen$mechanism[order(-risen$log10_bf)]) {
-    gain <- least_squares_gain(reached("the present model", current$fit), reached(name, fits[[name]]))
-    if (isTRUE(gain$rmse[2] < fallen_error * gain$rmse[1])) {
-      return(list(row = table[table$mechanism == name, ], least_squares = gain))
-    }
-  }
-  if (decided) return(list(row = best))
-  list(row = utils::head(spoken_for_by_error(table, fits, current$fit, control), 1))
-}
-
-# Where a discrepancy does a part of the parameters' work, the calibrated values are not those with which the simulation
-# is best. A function that searches for these, once for each name: list(fit, rmse, prediction), that of data held out;
-# NULL where there is no simulator to be run, or one that is not of one record.
-least_squares_search <- function(settings) {
-  found <- list()
-  function(name, fit) {
-    if (is_several(settings$measurements) || is_given(model_of(fit))) return(NULL)
-    if (is.null(found[[name]])) {
-      best <- settings$keep(list("least squares", plain(model_of(fit))),
-                            staged("least squares", best_simulation(fit, settings$threads)))
-      found[[name]] <<- c(list(fit = fit), best)
-    }
-    found[[name]]
-  }
-}
-
-# What least_squares() reaches, or one of the runs if that is nearer.
-best_simulation <- function(fit, threads) {
-  m <- fit$measurements
-  best <- suppress_run_warnings(least_squares(fit, threads))
-  rows <- used_rows(m, "validate")
-  held_out <- if (length(rows)) {
-    suppress_run_warnings(simulate_measured(fit$emulator$simulator, t(best$values), m, "validate", threads))[, 1]
-  }
-  list(rmse = min(sqrt(mean(best$error^2)), least_error(fit)),
-       prediction = data.frame(use = rep("validate", length(rows)), observed = m$y[rows], mean = as.numeric(held_out)))
-}
-
-# list(rmse, held_out) of two such searches, without and with a mechanism: both errors in calibration, held_out_gain().
-least_squares_gain <- function(without, with) {
-  if (is.null(without) || is.null(with)) return(NULL)
-  list(rmse = c(without$rmse, with$rmse), held_out = held_out_gain(without, with))
+  list(fits = fits, table = table, current = current)
 }
 
 naming_mechanism <- function(name, code) {

@@ -8,13 +8,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' (simulated, trained, calibrated); the one of highest evidence is adopted if its log10 Bayes factor is at least
 #' `decisive` (2) with its interval above zero (the word *decisive* asks for an interval above 2); and the loop begins
 #' again with the extended model. A mechanism with which the simulation's own error in calibration rises (by more than 2
-#' %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. But where the model is wrong in other
-#' ways as well, its discrepancy can do for the evidence what a mechanism does, and it can do a part of the parameters'
-#' work. So two more are adopted, and told as likely at most: a mechanism of which the evidence is decisive neither for
-#' nor against and with which the error falls by a third (below what any run of the present model reaches, too); and one
-#' of decisive evidence with which the error rises at the calibrated values, but falls by a third where both models are
-#' fitted by least squares (`least_squares` of the model has both errors, and the gain held out with these values; not
-#' for given runs or several records). Held-out rows only measure; they decide nothing.
+#' %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. Held-out rows only measure; they
+#' decide nothing.
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
 #' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
@@ -31,8 +26,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' second estimator. The others keep their coarse number: `candidates$judged_by` is `"screening"` for them, and
 #' `"calibration"` for those calibrated in full. What is to be adopted, or the present model if it stays, is refined
 #' further, until the intervals of its parameters hold, and must lead after that too. Where the present model's evidence
-#' is not known, as runs refute its emulator to the end, a mechanism with trusted numbers is adopted (and told as
-#' likely) if the simulation's error falls by a third.
+#' is not known, as runs refute its emulator to the end, an interval that reaches below zero is enough if the numbers
+#' are trusted and the simulation's error falls by a third; what is adopted so is likely at most.
 #'
 #' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others: see
 #' [mechanism()]. Then nothing is run: `runs` and refinement do not count, the emulators are checked by runs left out,
@@ -60,8 +55,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   mechanism, as `ais` in [calibrate()]; `NULL`: full calibrations only) and `margin` (1.5, in decades).
 #' @param quiet No progress messages.
 #' @param checkpoint A folder in which every finished model is kept (and the seed, if none is given), so that an
-#'   interrupted loop, called again with the
-#'   same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it when the loop is done.
+#'   interrupted loop, called again with the same arguments, goes on where it stopped; `NULL` keeps nothing. Delete it
+#'   when the loop is done.
 #' @inheritParams calibrate
 #' @return An object of class `amiss_upgrade`: the `models` adopted (first the base model), all `candidates` tried (a
 #'   row each: the model that it extends, `from`, the `mechanism`, `log10_bf` with `lower95` and `upper95` and its
@@ -69,12 +64,12 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   `judged_by`, and the estimates of its `parameters`), the `named_cause`, the `gain`, why the loop stopped
 #'   (`stopped_because`) and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
-#'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error; by least squares if
-#'   it was adopted by them): then it takes the place of something else. `held_out_rivals` names mechanisms that could
-#'   have been adopted in its place and with which data held out are met better. `confounded_with` names parameters that
-#'   are correlated beyond 0.4 with those that it brought: other parts of the model that could do the same. Of several
-#'   records `fit` is what [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and
-#'   `held_out_gain` of each in its own unit.
+#'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
+#'   place of something else. `held_out_rivals` names mechanisms that could have been adopted in its place and with
+#'   which data held out are met better. `confounded_with` names parameters that are correlated beyond 0.4 with those
+#'   that it brought: other parts of the model that could do the same. Of several records `fit` is what
+#'   [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its
+#'   own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
@@ -171,15 +166,14 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
     trials <- staged(paste("step", length(models)), try_mechanisms(current, catalogue[ordered], settings, say))
     candidates <- rbind(candidates, trials$table)
     current <- models[[length(models)]] <- trials$current
-    adopted <- trials$adopted
-    if (!nrow(adopted$row)) {
+    best <- best_trial(trials$table)
+    if (!may_be_adopted(best, current$fit, control)) {
       stopped <- stop_reason(trials$table, current$attribution, control$decisive)
       break
     }
-    chosen <- adopted$row$mechanism
-    say("Adopted {.strong {chosen}}: {adoption_words(adopted, control)}")
+    chosen <- best$mechanism
+    say("Adopted {.strong {chosen}}: {adoption_words(best)}")
     current <- measured_model(trials$fits[[chosen]], paste(current$name, "+", chosen), current$name, chosen, settings)
-    current$least_squares <- adopted$least_squares
     current$held_out_rivals <- held_out_rivals(current, trials, settings)
     report_model(current, say)
     models <- c(models, list(current))
@@ -264,15 +258,10 @@ report_model <- function(model, say) {
             else "shows no response to a boundary condition"))
 }
 
-adoption_words <- function(adopted, control) {
-  row <- adopted$row
+adoption_words <- function(row) {
   found <- sprintf("log10 Bayes factor %.1f", row$log10_bf)
-  if (!is.null(adopted$least_squares)) {
-    return(sprintf("%s; the error of least squares falls from %s to %s", found,
-                   short(adopted$least_squares$rmse[1]), short(adopted$least_squares$rmse[2])))
-  }
-  if (speaks_for_itself(row, control$decisive)) return(found)
-  sprintf("%s [%.1f, %.1f] is not decisive, but the error falls to %s of what it was", found, row$lower95, row$upper95,
+  if (row$lower95 > 0) return(found)
+  sprintf("%s [%.1f, %.1f] is too uncertain, but the error falls to %s of what it was", found, row$lower95, row$upper95,
           percent(row$error_ratio))
 }
 

@@ -3,16 +3,12 @@
 risen_error <- 1.02   # times the simulation's error in calibration before: from there it counts as risen
 fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the evidence
 
-# Whether a Bayes factor is enough by itself.
-speaks_for_itself <- function(bf, decisive) bf$log10_bf >= decisive & bf$lower95 > 0
-
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
 # is a stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely
 # otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
   remains <- much_remains(models, measurements)
   inside <- models[[length(models)]]$scores$validate[["coverage95"]]
-  open <- character()
   for (k in seq_along(models)[-1]) {
     model <- models[[k]]
     parent <- models[[k - 1]]
@@ -20,7 +16,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     row <- trials[trials$mechanism == model$mechanism, ]
     new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
     gain <- held_out_gain(parent, model)
-    no_gain <- isFALSE((model$least_squares$held_out %||% gain)$improves)
+    no_gain <- isFALSE(gain$improves)
     # What was adopted later is no other cause: with both, the evidence is decisively above that of either alone.
     later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
     others <- 1 - row$probability - sum(trials$probability[trials$mechanism %in% later])
@@ -31,12 +27,9 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (row$lower95 < control$decisive + few_runs_error && from_few_runs(model$fit))
         "the runs over the priors are too few for evidence of that size",
-      if (row$log10_bf < control$decisive) "the fall of the error speaks for it, the evidence is not decisive"
-      else if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
+      if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),
-      if (!is.null(model$least_squares)) "in calibration the simulation gains by it only with least squares",
-      if (length(open)) paste("it was found beside", listed(open), "only, which is not decided"),
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
         "the error still answers to what drives it",
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
@@ -50,8 +43,6 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     models[[k]]$confounded_with <- confounded_parameters(model$fit, new)
     models[[k]]$doubts <- doubts
     models[[k]]$verdict <- if (no_gain) "stand-in" else if (length(doubts)) "likely" else "named"
-    # What follows may mend what this one broke.
-    if (!speaks_for_itself(row, control$decisive) || !is.null(model$least_squares)) open <- c(open, model$mechanism)
   }
   models
 }

@@ -54,8 +54,7 @@ test_that("the coarse calibration follows screening, whatever is asked of the fu
 # Calibrations by hand that share a record: `coarse` is the evidence that screening found, `error` the simulation's.
 fit_by_hand <- function(log10_evidence, se = 0.05, lag = 0, coarse = log10_evidence, error = 1) {
   posterior <- list(annealed = c((log10_evidence - lag) * log(10), 0.1), second = c(log10_evidence * log(10), 0.1))
-  emulator <- list(basis = list(vectors = diag(3)), processes = list(coefficients = t(1:3 - error)))
-  structure(list(emulator = emulator, measurements = list(y = 1:3), rows = 1:3, check = list(mean = 1:3 - error),
+  structure(list(measurements = list(y = 1:3), rows = 1:3, check = list(mean = 1:3 - error),
                  log_evidence = log10_evidence * log(10),
                  standard_error = se * log(10), posterior = posterior,
                  coarse = list(log_evidence = coarse * log(10), standard_error = 0)),
@@ -150,59 +149,11 @@ test_that("where the present model's evidence is not known, runs of the simulato
   expect_false(adopted(row()[0, ]))
 })
 
-# What is adopted of trials beside a base model with an error of 1, if least squares takes it to `least_squares`.
-adopted_by_hand <- function(..., trusted = TRUE, full = TRUE, least_squares = 0.5) {
-  fits <- list(...)
-  names(fits) <- letters[seq_along(fits)]
-  current <- fit_by_hand(0, 0)
-  table <- data.frame(mechanism = names(fits), amiss:::standing(fits, current, names(fits)), trusted = trusted,
-                      error_ratio = vapply(fits, amiss:::error_ratio, 0, current),
-                      judged_by = if (full) "calibration" else "screening")
-  reached <- function(name, fit) {
-    list(fit = fit, rmse = if (name %in% names(fits)) least_squares else 1,
-         prediction = data.frame(use = character(), observed = numeric(), mean = numeric()))
-  }
-  amiss:::adopted_trial(table, fits, list(fit = current), list(decisive = 2), reached)
-}
-
-test_that("where the evidence is not decisive, a fall of the simulation's own error decides", {
-  adopted <- function(...) nrow(adopted_by_hand(...)$row) == 1
-  expect_true(adopted(fit_by_hand(1, error = 0.5)))
-  expect_true(adopted(fit_by_hand(-1, error = 0.5)))
-  expect_false(adopted(fit_by_hand(-3, error = 0.5)))  # decisive against it
-  expect_false(adopted(fit_by_hand(1, error = 0.8)))
-  expect_false(adopted(fit_by_hand(1, error = 0.5), trusted = FALSE))
-  expect_false(adopted(fit_by_hand(1, error = 0.5), full = FALSE))
-  # An interval that holds zero decides nothing either.
-  expect_equal(adopted_by_hand(fit_by_hand(3, se = 2, error = 1), fit_by_hand(0.5, error = 0.5))$row$mechanism, "b")
-  expect_true("b" %in% amiss:::contenders(list(a = fit_by_hand(3, se = 2), b = fit_by_hand(0, error = 0.5)),
-                                          fit_by_hand(0, 0), "a", list(margin = 0, decisive = 2)))
-})
-
-test_that("the fall counts from the least error that the model before is known to reach", {
-  near <- fit_by_hand(0, 0)
-  expect_equal(amiss:::error_fall(fit_by_hand(1, error = 0.5), near), 0.5)
-  near$emulator$processes$coefficients <- rbind(near$emulator$processes$coefficients, 1:3 - 0.6)
-  expect_equal(amiss:::error_fall(fit_by_hand(1, error = 0.5), near), 0.5 / 0.6)
-  expect_length(amiss:::contenders(list(a = fit_by_hand(0.5, error = 0.5)), near, character(),
-                                   list(margin = 0, decisive = 2)), 0)
-  expect_equal(amiss:::contenders(list(a = fit_by_hand(0.5, error = 0.5)), fit_by_hand(0, 0), character(),
-                                  list(margin = 0, decisive = 2)), "a")
-})
-
-test_that("decisive evidence with which the calibrated simulation's error rises is believed if least squares gains", {
-  risen <- fit_by_hand(10, error = 1.3)
-  expect_equal(adopted_by_hand(risen)$least_squares$rmse, c(1, 0.5))
-  expect_equal(adopted_by_hand(risen)$row$mechanism, "a")
-  expect_equal(nrow(adopted_by_hand(risen, least_squares = 0.8)$row), 0)
-  expect_equal(nrow(adopted_by_hand(risen, full = FALSE)$row), 0)
-  expect_equal(nrow(adopted_by_hand(fit_by_hand(1, error = 1.3))$row), 0)
-  expect_null(adopted_by_hand(fit_by_hand(10, error = 0.9))$least_squares)
-  # One below the best whose error does not rise is not asked for.
-  expect_null(adopted_by_hand(fit_by_hand(10, error = 0.9), fit_by_hand(8, error = 1.3))$least_squares)
-  expect_equal(adopted_by_hand(fit_by_hand(8, error = 0.9), risen)$row$mechanism, "b")
-  expect_match(amiss:::adoption_words(adopted_by_hand(risen), list(decisive = 2)),
-               "10.0; the error of least squares falls from 1.0 to 0.50")
+test_that("the log says why a mechanism was adopted whose interval reaches below zero", {
+  row <- function(lower95) data.frame(log10_bf = 3, lower95 = lower95, upper95 = 5, error_ratio = 0.5)
+  expect_equal(amiss:::adoption_words(row(1)), "log10 Bayes factor 3.0")
+  expect_match(amiss:::adoption_words(row(-1)), "3.0 [-1.0, 5.0] is too uncertain, but the error falls to 50 %",
+               fixed = TRUE)
 })
 
 test_that("the evidence of a fit that runs confirmed needs a smaller margin, and nothing below it is refined", {
