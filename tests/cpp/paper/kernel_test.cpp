@@ -17,7 +17,7 @@ namespace {
 using namespace test;
 
 // A record of n steps, smooth conditions of which the first two act.
-KernelData make_data(Index n) {
+KernelData smooth_data(Index n) {
   KernelData data;
   const Eigen::ArrayXd hour = Eigen::ArrayXd::LinSpaced(n, 0.0, 96.0);
   data.conditions.resize(n, 3);
@@ -35,13 +35,13 @@ KernelData make_data(Index n) {
   return data;
 }
 
-KernelModel make_model(Index n) {
+KernelModel smooth_model(Index n) {
   KernelPriors priors;
   priors.noise.sd = 0.1;
-  return KernelModel(make_data(n), priors);
+  return KernelModel(smooth_data(n), priors);
 }
 
-KernelParameters make_point(const Eigen::Vector4d& alpha, double amplitude, double lambda) {
+KernelParameters smooth_point(const Eigen::Vector4d& alpha, double amplitude, double lambda) {
   KernelParameters p;
   p.decay = -4.0 * alpha.array().log();
   p.amplitude = amplitude;
@@ -49,9 +49,10 @@ KernelParameters make_point(const Eigen::Vector4d& alpha, double amplitude, doub
   return p;
 }
 
-std::vector<KernelParameters> make_points() {
-  return {make_point({0.4, 0.6, 0.999, 0.9999}, 1.5, 100.0), make_point({0.8, 0.9, 0.95, 0.99}, 4.0, 90.0),
-          make_point({0.99, 0.5, 0.9999, 1.0}, 0.3, 120.0), make_point({0.7, 0.99, 0.99, 0.999}, 20.0, 40.0)};
+std::vector<KernelParameters> smooth_points() {
+  return {smooth_point({0.4, 0.6, 0.999, 0.9999}, 1.5, 100.0),
+          smooth_point({0.8, 0.9, 0.95, 0.99}, 4.0, 90.0), smooth_point({0.99, 0.5, 0.9999, 1.0}, 0.3, 120.0),
+          smooth_point({0.7, 0.99, 0.99, 0.999}, 20.0, 40.0)};
 }
 
 double relabelled_difference(const Target& a, const Target& b) {
@@ -119,8 +120,8 @@ TEST(PivotedCholesky, EqualRowsEndInRounding) {
 }
 
 TEST(LowRankKernel, ExactValueLiesWithinTheBounds) {
-  const KernelModel model = make_model(420);
-  for (const KernelParameters& p : make_points()) {
+  const KernelModel model = smooth_model(420);
+  for (const KernelParameters& p : smooth_points()) {
     const double exact = model.log_likelihood(p);
     for (double tolerance : {1.0, 0.01}) {
       for (Certificate certificate : {Certificate::determinant, Certificate::both}) {
@@ -138,8 +139,8 @@ TEST(LowRankKernel, ExactValueLiesWithinTheBounds) {
 }
 
 TEST(LowRankKernel, LongRecordsTakeTheLowRank) {
-  const KernelModel model = make_model(900);
-  for (const KernelParameters& p : make_points()) {
+  const KernelModel model = smooth_model(900);
+  for (const KernelParameters& p : smooth_points()) {
     KernelModel::Memory memory;
     const BoundedValue v = bounded_likelihood(model, p, 0.01, Certificate::both, memory);
     EXPECT_NEAR(v.value, model.log_likelihood(p), 0.01);
@@ -150,11 +151,11 @@ TEST(LowRankKernel, LongRecordsTakeTheLowRank) {
 TEST(KernelSkeleton, ServesSmootherKernelsAtAnyLength) {
   KernelSkeleton::Memory memory;  // of both lengths
   for (Index n : {300, 900}) {
-    const KernelModel model = make_model(n);
-    const KernelParameters rough = make_point({0.4, 0.5, 0.95, 0.99}, 20.0, 120.0);
+    const KernelModel model = smooth_model(n);
+    const KernelParameters rough = smooth_point({0.4, 0.5, 0.95, 0.99}, 20.0, 120.0);
     const auto skeleton = KernelSkeleton::make(model, rough.decay, 20.0 * 120.0, 0.001, n);
     ASSERT_TRUE(skeleton.has_value());
-    for (const KernelParameters& p : make_points()) {
+    for (const KernelParameters& p : smooth_points()) {
       const bool inside = (p.decay.array() <= rough.decay.array()).all() && p.amplitude * p.lambda <= 2400.0;
       EXPECT_EQ(skeleton->serves(p), inside);
       // Interpolation is not certified: many times the tolerance where the model fits badly.
@@ -162,14 +163,14 @@ TEST(KernelSkeleton, ServesSmootherKernelsAtAnyLength) {
         EXPECT_NEAR(skeleton->log_likelihood(p, memory), model.log_likelihood(p), 0.05);
       }
     }
-    EXPECT_TRUE(skeleton->serves(make_points()[2]));
+    EXPECT_TRUE(skeleton->serves(smooth_points()[2]));
     EXPECT_FALSE(KernelSkeleton::make(model, rough.decay, 2400.0, 0.01, 10).has_value());
   }
 }
 
 TEST(KernelModel, ThinnedModelsKeepTheScales) {
-  const KernelModel model = make_model(240);
-  const KernelParameters p = make_points()[0];
+  const KernelModel model = smooth_model(240);
+  const KernelParameters p = smooth_points()[0];
   EXPECT_NEAR(model.thinned(1).log_likelihood(p), model.log_likelihood(p), 1e-8);
   const KernelModel half = model.thinned(2);
   EXPECT_EQ(half.size(), 120);
@@ -179,7 +180,7 @@ TEST(KernelModel, ThinnedModelsKeepTheScales) {
 
 // The same posterior annealed from the prior with dense values; four standard errors of the difference.
 TEST(KernelSampling, EvidenceIsThatOfTheDenseSampler) {
-  const KernelModel model = make_model(160);
+  const KernelModel model = smooth_model(160);
   AisOptions options;
   const AisResult dense = sample_ais(KernelTarget(model), options, Context());
   const KernelSample fast = sample_kernel(model, options, {}, Context());
@@ -195,7 +196,7 @@ TEST(KernelSampling, EvidenceIsThatOfTheDenseSampler) {
 }
 
 TEST(KernelSampling, CrudeValuesAreCorrected) {
-  const KernelModel model = make_model(240);
+  const KernelModel model = smooth_model(240);
   KernelSamplingOptions crude;
   crude.tolerance = 1.0;
   crude.certified = 200;
@@ -207,7 +208,7 @@ TEST(KernelSampling, CrudeValuesAreCorrected) {
 }
 
 TEST(KernelSampling, ThreadsDoNotMatter) {
-  const KernelModel model = make_model(150);
+  const KernelModel model = smooth_model(150);
   Context two;
   two.threads = 2;
   const KernelSample a = sample_kernel(model, {}, {}, Context()), b = sample_kernel(model, {}, {}, two);
@@ -216,7 +217,7 @@ TEST(KernelSampling, ThreadsDoNotMatter) {
 }
 
 TEST(KernelSampling, ShortRecordsAreAnnealedFromThePrior) {
-  const KernelModel model = make_model(60);
+  const KernelModel model = smooth_model(60);
   const KernelSample sample = sample_kernel(model, {}, {}, Context());
   EXPECT_EQ(sample.posterior.log_evidence, sample_ais(KernelTarget(model), {}, Context()).log_evidence);
   KernelSamplingOptions bad;
@@ -226,7 +227,7 @@ TEST(KernelSampling, ShortRecordsAreAnnealedFromThePrior) {
 
 TEST(KernelTarget, NumberingAndOrderLeaveTheSampledEvidenceUnchanged) {
   const Index n = 60;
-  const KernelData data = make_data(n);
+  const KernelData data = smooth_data(n);
   KernelData other = data;
   std::vector<int> order(static_cast<std::size_t>(n));
   std::iota(order.begin(), order.end(), 0);
@@ -245,9 +246,9 @@ TEST(KernelTarget, NumberingAndOrderLeaveTheSampledEvidenceUnchanged) {
 }
 
 TEST(LowRankKernel, DiscrepancyIsTheDenseOneWithinItsTolerance) {
-  const KernelModel model = make_model(700);
+  const KernelModel model = smooth_model(700);
   const double tolerance = 1e-3;
-  for (const KernelParameters& p : make_points()) {
+  for (const KernelParameters& p : smooth_points()) {
     const KernelDiscrepancy dense = model.discrepancy(p);
     const auto low = low_rank_discrepancy(model, p, tolerance, 700);
     ASSERT_TRUE(low);
@@ -256,20 +257,20 @@ TEST(LowRankKernel, DiscrepancyIsTheDenseOneWithinItsTolerance) {
     EXPECT_LT((low->variance - dense.variance).cwiseAbs().maxCoeff(), tolerance / p.lambda);
     EXPECT_GT(dense.variance.maxCoeff(), 10 * tolerance / p.lambda);
   }
-  EXPECT_FALSE(low_rank_discrepancy(model, make_points()[1], 1e-6, 10));
+  EXPECT_FALSE(low_rank_discrepancy(model, smooth_points()[1], 1e-6, 10));
 }
 
 TEST(LowRankKernel, DiscrepanciesOfSeveralDrawsDoNotHangOnTheThreads) {
-  const KernelModel model = make_model(700);
+  const KernelModel model = smooth_model(700);
   Context two;
   two.threads = 2;
-  const auto one = discrepancies(model, make_points(), Context()),
-             other = discrepancies(model, make_points(), two);
+  const auto one = discrepancies(model, smooth_points(), Context()),
+             other = discrepancies(model, smooth_points(), two);
   ASSERT_EQ(one.size(), 4u);
   for (std::size_t i = 0; i < one.size(); ++i) {
     EXPECT_EQ(one[i].mean, other[i].mean);
     EXPECT_EQ(one[i].variance, other[i].variance);
-    EXPECT_LT((one[i].mean - model.discrepancy(make_points()[i]).mean).norm(), 0.01 * one[i].mean.norm());
+    EXPECT_LT((one[i].mean - model.discrepancy(smooth_points()[i]).mean).norm(), 0.01 * one[i].mean.norm());
   }
 }
 

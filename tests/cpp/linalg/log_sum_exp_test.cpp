@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "ais_helpers.hpp"
+#include "ais/ais_helpers.hpp"
 #include "engine/linalg/log_sum_exp.hpp"
 
 namespace amiss {
