@@ -101,11 +101,16 @@ open_verdict <- function(upgrade) {
   unexplained <- function(headline) list(verdict = "unexplained", tag = tag, headline = headline)
   base <- upgrade$models[[1]]
   answers <- significant_conditions(base$attribution$table)
+  remainder <- remaining_error(base, upgrade$measurements)
+  if (length(answers) && !remainder$large) {
+    return(unexplained(sprintf(paste("The error is hardly larger than the stated noise (%s times), but a part of it",
+                                     "answers to %s: something small is missing from the model, or its state at the",
+                                     "start is off, and %s."), short(remainder$ratio), listed(answers), explained)))
+  }
   if (length(answers)) {
     return(unexplained(sprintf("Something that answers to %s is missing from the model, but %s.", listed(answers),
                                explained)))
   }
-  remainder <- remaining_error(base, upgrade$measurements)
   if (remainder$large) {
     return(unexplained(sprintf(paste("Something is missing from the model, and %s: its error is %s times the stated",
                                      "noise; %s."), explained, short(remainder$ratio),
@@ -150,16 +155,6 @@ improves_held_out <- function(upgrade) {
 evidence_sentence <- function(row) {
   sprintf("The evidence for %s over no change is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf),
           odds_interval(c(row$lower95, row$upper95)))
-}
-
-# Left out where both ends read the same and lie on one side.
-odds_interval <- function(interval) {
-  ends <- power_of_ten(abs(interval))
-  if (ends[1] == ends[2] && prod(interval) >= 0) return("")
-  told <- if (interval[1] >= 0) paste(ends, collapse = " to ")
-  else if (interval[2] <= 0) paste(paste(rev(ends), collapse = " to "), "to 1 against")
-  else paste(ends[1], "to 1 against, to", ends[2], "to 1 in favour")
-  sprintf(" (95 %% interval: %s)", told)
 }
 
 sure_sentences <- function(upgrade) {
@@ -225,7 +220,12 @@ probability_sentence <- function(trials) {
 # Whether the numbers behind the first decision can be trusted, in words; if not, whether the decision hangs on it.
 trust_sentence <- function(upgrade, best) {
   base <- upgrade$models[[1]]$fit$trust
-  if (base$trusted && best$trusted) return("The numbers behind this can be trusted: the sampler passed its own checks.")
+  if (base$trusted && best$trusted) {
+    open <- open_trials(upgrade, upgrade$models[[1]])
+    return(paste0("The numbers behind this can be trusted: the sampler passed its own checks.",
+                  if (NROW(open)) sprintf(" Those of %s are rough, and could reach further than they seem to.",
+                                          listed(open$mechanism))))
+  }
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
   why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
   sprintf("The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
@@ -419,6 +419,7 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
                                   if (has_validation(x)) "{errors(g$rmse_validation)} held out"
                                   else "no data held out",
                                   if (is_several(x$measurements)) paste(",", noise_unit)),
+                     "*" = if (x$runs_total) "{x$runs_total} runs of the simulator",
                      "*" = "stopped because {x$stopped_because}",
                      ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
 })

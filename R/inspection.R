@@ -8,6 +8,7 @@ upgrade_inspections <- function(upgrade) {
             held_out_inspection(last, upgrade$measurements),
             unlist(lapply(adopted, function(m) mechanism_inspections(upgrade, m))),
             nearest_inspection(upgrade),
+            undecided_inspections(upgrade),
             group_inspections(last$attribution),
             answer_inspections(upgrade, last),
             driver_inspections(upgrade),
@@ -222,6 +223,18 @@ nearest_inspection <- function(upgrade) {
                       best$mechanism, odds(best$log10_bf),
                       paste(listed(drivers), if (length(drivers) > 1) "change" else "changes"),
                       if (NROW(new)) sprintf(", or a look for %s on site", called_for(new)) else ""))
+}
+
+# Mechanisms of which the numbers are too rough to rule them out.
+undecided_inspections <- function(upgrade) {
+  open <- do.call(rbind, lapply(upgrade$models, function(model) open_trials(upgrade, model)))
+  if (!NROW(open)) return(NULL)
+  open <- open[!duplicated(open$mechanism, fromLast = TRUE), ]
+  interval <- vapply(seq_len(nrow(open)), function(k) odds_interval(c(open$lower95[k], open$upper95[k])), "")
+  told <- sprintf(paste("Not ruled out is %s: odds of %s%s, by numbers that are not trusted. More runs for each mechanism",
+                        "(runs), or narrower priors, would decide."),
+                  open$mechanism, vapply(open$log10_bf, odds, ""), interval)
+  stats::setNames(told, rep("undecided", length(told)))
 }
 
 group_inspections <- function(attribution) {

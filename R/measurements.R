@@ -46,7 +46,8 @@
 #'   state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
 #' @param time_format What the time column holds, if it does not tell itself: of text `"dmy"` or `"mdy"`; of numbers
-#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` or `"unix"`; of either a format of [strptime()] (`"%Y%m%d%H"`).
+#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` or `"unix"` (`warmup`, `average` and `fill_gaps` stay in hours: 5 s
+#'   are `5 / 3600`); of either a format of [strptime()] (`"%Y%m%d%H"`).
 #' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in: `"UTC"`, or a name
 #'   such as `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular

@@ -11,7 +11,10 @@
 #'   function of two arguments gets the name of the record as the second: of several records it is called for each in
 #'   turn, and may return the simulator as it is where the mechanism does not act. Of a single record that is not given
 #'   in a list it is the name of the measurements.
-#' @param boundary Names of the boundary conditions that drive the mechanism; `character()` for none.
+#' @param boundary Names of the boundary conditions that drive the mechanism: those without which it would do nothing,
+#'   or always the same; `character()` for none. Of a mechanism that acts on a state, those that drive the state. The
+#'   order of trials, what is told of the cause and one doubt (`vignette("algorithm", "amiss")`, *Naming*) go by them;
+#'   evidence does not.
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
 #' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class `amiss_catalogue`.
 #' @examples

@@ -308,3 +308,13 @@ upgrade_gain <- function(models) {
 }
 
 adopted_models <- function(upgrade) upgrade$models[-1]
+
+# Trials of a model by coarse calibrations that runs refute, of which the interval reaches beyond what was adopted, or
+# beyond what adoption asks for.
+open_trials <- function(upgrade, model) {
+  if (is.null(upgrade$candidates)) return(NULL)
+  trials <- upgrade$candidates[upgrade$candidates$from == model$name, ]
+  adopted <- trials$mechanism %in% vapply(adopted_models(upgrade), `[[`, "", "mechanism")
+  needed <- max(upgrade$control$decisive, trials$log10_bf[adopted])
+  trials[!adopted & trials$judged_by == "screening" & !trials$trusted & trials$upper95 >= needed, ]
+}

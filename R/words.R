@@ -71,6 +71,16 @@ odds <- function(x) {
   paste(size, if (x >= 0) "to 1 in favour" else "to 1 against")
 }
 
+# An interval of odds in words, left out where both ends read the same and lie on one side.
+odds_interval <- function(interval) {
+  ends <- power_of_ten(abs(interval))
+  if (ends[1] == ends[2] && prod(interval) >= 0) return("")
+  told <- if (interval[1] >= 0) paste(ends, collapse = " to ")
+  else if (interval[2] <= 0) paste(paste(rev(ends), collapse = " to "), "to 1 against")
+  else paste(ends[1], "to 1 against, to", ends[2], "to 1 in favour")
+  sprintf(" (95 %% interval: %s)", told)
+}
+
 # A point of the parameters' space, for messages.
 point_words <- function(point) {
   names <- colnames(point) %||% names(point)

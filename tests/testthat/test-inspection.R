@@ -90,6 +90,28 @@ test_that("a candidate that is near is named with what would decide it", {
   expect_length(about(inspected(upgrade), "nearest"), 0)
 })
 
+test_that("a candidate whose emulator was too coarse is not ruled out in silence", {
+  upgrade <- base_only(small_upgrade())
+  rough <- which(upgrade$candidates$mechanism == "drift")[1]
+  upgrade$candidates[rough, c("log10_bf", "lower95", "upper95")] <- list(-3.5, -15.9, 54)
+  upgrade$candidates[rough, c("judged_by", "trusted")] <- list("screening", FALSE)
+  expect_match(about(inspected(upgrade), "undecided"), "Not ruled out is drift.*3,200 to 1 against.*in favour")
+  expect_length(about(inspected(upgrade), "nothing"), 0)
+  expect_match(paste(summary(upgrade)$sure, collapse = " "), "Those of drift are rough")
+  upgrade$candidates$upper95[rough] <- 1.9
+  expect_length(about(inspected(upgrade), "undecided"), 0)
+  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "drift are rough")
+  # Beside what was adopted only where it could be better.
+  adopted <- small_upgrade()
+  upper <- adopted$candidates$log10_bf[adopted$candidates$mechanism == "sun"][1]
+  rough <- which(adopted$candidates$mechanism == "drift" & adopted$candidates$from == "base")
+  adopted$candidates[rough, c("judged_by", "trusted")] <- list("screening", FALSE)
+  adopted$candidates$upper95[rough] <- upper - 1
+  expect_length(about(inspected(adopted), "undecided"), 0)
+  adopted$candidates$upper95[rough] <- upper + 1
+  expect_length(about(inspected(adopted), "undecided"), 1)
+})
+
 test_that("numbers that are not trusted come first", {
   upgrade <- small_upgrade()
   upgrade$models[[1]]$fit$check[c("passed", "verdict")] <- list(FALSE, "half of the noise")

@@ -80,6 +80,11 @@ test_that("conditions that cannot be told apart are told as such in what remains
   upgrade$models[[1]]$attribution <- attribution
   told <- summary(upgrade)
   expect_match(told$headline, "Something that answers to Te or Gv is missing")
+  # Where the error is not larger than the noise, no more is said than that.
+  seen <- upgrade$models[[1]]$prediction
+  upgrade$models[[1]]$prediction$mean <- seen$observed + 0.05 * rep_len(c(1, -1), nrow(seen))
+  expect_match(summary(upgrade)$headline,
+               "hardly larger than the stated noise .1.0 times.*answers to Te or Gv: something small")
   expect_match(told$remains, "Te and Gv cannot be told apart in this record", all = FALSE)
 })
 
