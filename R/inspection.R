@@ -231,8 +231,8 @@ undecided_inspections <- function(upgrade) {
   if (!NROW(open)) return(NULL)
   open <- open[!duplicated(open$mechanism, fromLast = TRUE), ]
   interval <- vapply(seq_len(nrow(open)), function(k) odds_interval(c(open$lower95[k], open$upper95[k])), "")
-  told <- sprintf(paste("Not ruled out is %s: odds of %s%s, by numbers that are not trusted. More runs for each mechanism",
-                        "(runs), or narrower priors, would decide."),
+  told <- sprintf(paste("Not ruled out is %s: odds of %s%s, by numbers that are not trusted. More runs for each",
+                        "mechanism (runs), or narrower priors, would decide."),
                   open$mechanism, vapply(open$log10_bf, odds, ""), interval)
   stats::setNames(told, rep("undecided", length(told)))
 }
