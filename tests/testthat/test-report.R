@@ -84,7 +84,7 @@ test_that("conditions that cannot be told apart are told as such in what remains
   seen <- upgrade$models[[1]]$prediction
   upgrade$models[[1]]$prediction$mean <- seen$observed + 0.05 * rep_len(c(1, -1), nrow(seen))
   expect_match(summary(upgrade)$headline,
-               "hardly larger than the stated noise .1.0 times.*answers to Te or Gv: something small")
+               "of the size of the stated noise .1.0 times.*answers to Te or Gv: something small")
   expect_match(told$remains, "Te and Gv cannot be told apart in this record", all = FALSE)
 })
 
