@@ -103,8 +103,8 @@ open_verdict <- function(upgrade) {
   answers <- significant_conditions(base$attribution$table)
   remainder <- remaining_error(base, upgrade$measurements)
   if (length(answers) && !remainder$large) {
-    return(unexplained(sprintf(paste("The error is of the size of the stated noise (%s times), but a part of it answers",
-                                     "to %s: something small is missing from the model, or its state at the",
+    return(unexplained(sprintf(paste("The error is of the size of the stated noise (%s times), but a part of it",
+                                     "answers to %s: something small is missing from the model, or its state at the",
                                      "start is off, and %s."), short(remainder$ratio), listed(answers), explained)))
   }
   if (length(answers)) {
