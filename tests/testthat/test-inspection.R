@@ -98,6 +98,9 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
   expect_match(about(inspected(upgrade), "undecided"), "Not ruled out is drift.*3,200 to 1 against.*in favour")
   expect_length(about(inspected(upgrade), "nothing"), 0)
   expect_match(paste(summary(upgrade)$sure, collapse = " "), "Those of drift are rough")
+  upgrade$candidates$trusted[rough] <- TRUE
+  expect_length(about(inspected(upgrade), "undecided"), 0)
+  upgrade$candidates$trusted[rough] <- FALSE
   upgrade$candidates$upper95[rough] <- 1.9
   expect_length(about(inspected(upgrade), "undecided"), 0)
   expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "drift are rough")
