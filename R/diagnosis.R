@@ -302,11 +302,13 @@ step_sentence <- function(upgrade, model) {
   unit <- upgrade$measurements$unit
   told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
   gain <- model$held_out_gain
-  sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
+  sprintf("With %s the typical error %s in calibration%s%s.", model$mechanism, told("calibrate"),
           if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s", told("validate"),
                                                     if (gain$improves) "a gain beyond its uncertainty"
                                                     else if (gain$mean > 0) "a gain within its uncertainty"
-                                                    else "no gain"))
+                                                    else "no gain"),
+          if (isTRUE(model$gain_beside_later$improves))
+            "; beside what was adopted later, held-out data gain by it beyond the gain's uncertainty" else "")
 }
 
 doubt_sentence <- function(model) {

@@ -140,6 +140,36 @@ held_out_rivals <- function(model, trials, settings) {
   }, others)
 }
 
+# A mechanism by which data held out gained nothing when it was adopted may gain beside those adopted after it: then
+# `gain_beside_later` is the gain of the last model over the same without the mechanism, calibrated coarsely.
+with_gains_beside_later <- function(models, catalogue, settings) {
+  last <- models[[length(models)]]
+  for (k in seq_along(models)[-c(1, length(models))]) {
+    if (!isFALSE(held_out_gain(models[[k - 1]], models[[k]])$improves) || settings$spent()) next
+    later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
+    without <- left_out(models[[k - 1]]$fit, models[[1]]$fit, catalogue[later], settings)
+    if (!is.null(without)) models[[k]]$gain_beside_later <- held_out_gain(without, last)
+  }
+  models
+}
+
+# The model of a fit with mechanisms that were adopted on top of another, as predicted_record() has it; NULL where they
+# cannot be applied, the runs are given or those made refute its emulator.
+left_out <- function(fit, base, mechanisms, settings) {
+  model <- model_of(fit)
+  if (is_given(model)) return(NULL)
+  own <- names(drawn_parameters(base))
+  for (mechanism in mechanisms) {
+    settings$adopted <- setdiff(unlist(lapply(in_list(model), function(s) names(free_parameters(s)))), own)
+    if (!can_extend(mechanism, model, settings)) return(NULL)
+    model <- extended_model(mechanism, model, settings)
+  }
+  name <- paste("without, with", listed(names(mechanisms)))
+  fit <- staged(name, screen_model(model, name, settings)$fit)
+  if (isFALSE(fit$check$passed)) return(NULL)
+  c(list(fit = fit), settings$keep(list("left out", name, plain(model)), predicted_record(fit, settings)))
+}
+
 report_candidate <- function(what, bf, say) {
   say(
     "  {what}: log10 Bayes factor {round(bf$log10_bf, 1)} [{round(bf$lower95, 1)}, {round(bf$upper95, 1)}], {bf$word}")

@@ -64,8 +64,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   `judged_by`, and the estimates of its `parameters`), the `named_cause`, the `gain`, why the loop stopped
 #'   (`stopped_because`) and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
-#'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error): then it takes the
-#'   place of something else. `held_out_rivals` names mechanisms that could have been adopted in its place and with
+#'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error), nor beside what was
+#'   adopted later (`gain_beside_later`): then it takes the place of something else. `held_out_rivals` names mechanisms that could have been adopted in its place and with
 #'   which data held out are met better. `confounded_with` names parameters that are correlated beyond 0.4 with those
 #'   that it brought: other parts of the model that could do the same. Of several records `fit` is what
 #'   [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its
@@ -181,6 +181,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   say("Stopped: {stopped}")
   if (length(models) == 1) models[[1]] <- settled_model(current, settings)
   models[[1]]$full <- NULL
+  models <- with_gains_beside_later(models, catalogue, settings)
   models <- judge_models(models, candidates, catalogue, measurements, control, threads)
   structure(list(format_version = format_version, models = models, candidates = candidates, catalogue = catalogue,
                  named_cause = named_cause(models, candidates, catalogue), gain = upgrade_gain(models),

@@ -4,8 +4,8 @@ risen_error <- 1.02   # times the simulation's error in calibration before: from
 fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the evidence
 
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
-# is a stand-in where data held out do not gain by it; it is named where nothing speaks against it, and likely
-# otherwise.
+# is a stand-in where data held out do not gain by it, nor beside what was adopted later; it is named where nothing
+# speaks against it, and likely otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
   remains <- much_remains(models, measurements)
   inside <- models[[length(models)]]$scores$validate[["coverage95"]]
@@ -16,7 +16,8 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     row <- trials[trials$mechanism == model$mechanism, ]
     new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
     gain <- held_out_gain(parent, model)
-    no_gain <- isFALSE(gain$improves)
+    no_gain <- isFALSE(gain$improves) && !isTRUE(model$gain_beside_later$improves)
+    confounded <- confounded_parameters(model$fit, new)
     # What was adopted later is no other cause: with both, the evidence is decisively above that of either alone.
     later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
     others <- 1 - row$probability - sum(trials$probability[trials$mechanism %in% later])
@@ -32,6 +33,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       risen_words(parent, model),
       if (still_answers(parent, model, catalogue[[model$mechanism]]$boundary))
         "the error still answers to what drives it",
+      only_beside(models[seq_len(k)], confounded, candidates),
       if (any(edge_of_prior(model$fit)[new])) "its value lies at the edge of what was thought possible",
       if (remains) "a good part of the error remains",
       if (isTRUE(inside < least_inside)) sprintf("its 95 %% band holds only %s of the data held out", percent(inside)),
@@ -40,7 +42,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
     for (name in names(model$records)) {
       models[[k]]$records[[name]]$held_out_gain <- held_out_gain(record_model(parent, name), record_model(model, name))
     }
-    models[[k]]$confounded_with <- confounded_parameters(model$fit, new)
+    models[[k]]$confounded_with <- confounded
     models[[k]]$doubts <- doubts
     models[[k]]$verdict <- if (no_gain) "stand-in" else if (length(doubts)) "likely" else "named"
   }
@@ -104,6 +106,21 @@ confounded_parameters <- function(fit, new) {
   r <- stats::cov.wt(posterior_unit(fit), fit$weights, cor = TRUE)$cor
   dimnames(r) <- list(colnames(fit$values), colnames(fit$values))
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > 0.4]
+}
+
+# In words, where the last of `models` has no evidence on the base model and trades off against what was adopted before
+# it: two that imitate a third together look like this.
+only_beside <- function(models, confounded, candidates) {
+  mechanism <- models[[length(models)]]$mechanism
+  alone <- candidates$log10_bf[candidates$from == models[[1]]$name & candidates$mechanism == mechanism]
+  before <- models[-c(1, length(models))]
+  if (!length(before) || !isTRUE(alone < 0)) return(NULL)
+  known <- names(drawn_parameters(models[[1]]$fit))
+  brought <- lapply(models[-length(models)], function(m) setdiff(names(drawn_parameters(m$fit)), known))
+  beside <- before[mapply(function(now, then) any(setdiff(now, then) %in% confounded), brought[-1],
+                          brought[-length(brought)])]
+  if (length(beside))
+    sprintf("it has evidence only beside %s, with which it trades off", listed(vapply(beside, `[[`, "", "mechanism")))
 }
 
 # TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The

@@ -31,7 +31,7 @@ struct StartOptions {
   ModeOptions modes;
 };
 const StartOptions kRoughStart{64, 0.3, 3, 2, {128, 3}};
-const StartOptions kStart{96, 0.5, 5, 2, {64, 3}};  // for each reach
+const StartOptions kStart{160, 0.7, 5, 2, {64, 3}};  // for each reach
 constexpr double kReferenceDof = 8.0;
 constexpr int kRounds = 2;          // that bring the reference closer
 constexpr Index kRoundDraws = 100;  // each, per coordinate
