@@ -121,9 +121,14 @@ open_verdict <- function(upgrade) {
                 headline = paste0("No mechanism is called for, but the numbers behind this are not to be trusted: ",
                                   base$fit$trust$verdict, ".")))
   }
-  list(verdict = "nothing", tag = "Nothing decisive",
-       headline = paste("Nothing decisive is wrong: no mechanism is called for, and the remaining error answers to no",
-                        "boundary condition."))
+  nothing <- paste("no mechanism is called for, and the remaining error answers to no boundary condition")
+  held_out <- held_out_excess(base, upgrade$measurements)
+  if (!is.null(held_out)) {
+    return(list(verdict = "nothing", tag = "Nothing decisive in calibration; the error on held-out data is larger",
+                headline = sprintf("In calibration %s. But on held-out data the error is %s times as large.", nothing,
+                                   short(held_out))))
+  }
+  list(verdict = "nothing", tag = "Nothing decisive", headline = sprintf("Nothing decisive is wrong: %s.", nothing))
 }
 
 # The sentences of all mechanisms adopted, each as firmly as its verdict allows.
@@ -188,7 +193,8 @@ fallen_sentence <- function(row) {
 
 raised_sentence <- function(row) {
   sprintf(paste("It was not adopted, because with %s the simulation's own error in calibration is %s times as large:",
-                "what is gained, the discrepancy gains."), row$mechanism, short(row$error_ratio))
+                "what is gained, the discrepancy gains."), row$mechanism,
+          short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
 }
 
 unjudged_sentence <- function(fit) {
@@ -221,9 +227,9 @@ probability_sentence <- function(trials) {
 trust_sentence <- function(upgrade, best) {
   base <- upgrade$models[[1]]$fit$trust
   if (base$trusted && best$trusted) {
-    open <- open_trials(upgrade, upgrade$models[[1]])
+    open <- open_trials(upgrade)
     return(paste0("The numbers behind this can be trusted: the sampler passed its own checks.",
-                  if (NROW(open)) sprintf(" Those of %s are rough, and could reach further than they seem to.",
+                  if (NROW(open)) sprintf(" Not so those of %s, which was not adopted: see what to inspect next.",
                                           listed(open$mechanism))))
   }
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
@@ -317,7 +323,7 @@ doubt_sentence <- function(model) {
 
 confounded_sentence <- function(model) {
   if (length(model$confounded_with)) {
-    sprintf("A part of what %s does could also be done by %s (correlation beyond 0.4).", model$mechanism,
+    sprintf("How much %s does hangs together with %s (correlation beyond 0.4).", model$mechanism,
             listed(parameter_labels(model$fit, model$confounded_with)))
   }
 }
@@ -345,8 +351,8 @@ nearest_run_sentence <- function(upgrade) {
   if (length(upgrade$models) < 2 || is_several(upgrade$measurements)) return(NULL)
   nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)), nearest_run, 0, base$fit))
   if (nearest > 0.9 * base$scores$calibrate[["rmse"]]) return(NULL)
-  sprintf(paste("A part of this fall is not due to the change: one of the base model's runs is wrong by only %s in",
-                "calibration, but its discrepancy did the work of its parameters."),
+  sprintf(paste("A part of this fall is not due to the change: the base model has a run that errs by only %s in",
+                "calibration. Calibrated it errs by more, as a part of its error was left to the discrepancy."),
           with_unit(short(nearest), upgrade$measurements$unit))
 }
 

@@ -14,6 +14,7 @@ upgrade_inspections <- function(upgrade) {
             driver_inspections(upgrade),
             edge_inspections(last$fit),
             remainder_inspection(last, upgrade$measurements),
+            spike_inspection(last, upgrade$measurements),
             if (grepl("^the limit of", upgrade$stopped_because)) {
               c(steps = "Further causes were not looked for: raise control$max_steps and run the loop again.")
             })
@@ -27,6 +28,7 @@ calibration_inspections <- function(fit, model = NULL) {
     if (!is.null(model)) held_out_inspection(model, fit$measurements),
     edge_inspections(fit), tied_inspections(fit), loose_inspections(fit),
     if (!is.null(model)) remainder_inspection(model, fit$measurements),
+    if (!is.null(model)) spike_inspection(model, fit$measurements),
     cause = paste("What its error answers to, and what may cause it, is not part of a calibration:",
                   "attribute_discrepancy() asks the first, upgrade_model() with a catalogue of mechanisms the second."))
 }
@@ -72,18 +74,26 @@ trust_inspections <- function(fit, name) {
 # ---- data held out
 
 held_out_inspection <- function(model, measurements) {
-  seen <- model$scores$calibrate[["rmse"]]
-  held <- model$scores$validate[["rmse"]]
-  if (is.na(held)) {
+  if (is.na(model$scores$validate[["rmse"]])) {
     return(c(held_out = paste("No data were held out, so that no change could fail a test: keep some days from",
                               "calibration (argument validate of measurements()), or measure some more.")))
   }
-  if (held < 1.5 * max(seen, measurements$noise_sd)) return(NULL)
+  excess <- held_out_excess(model, measurements)
+  if (is.null(excess)) return(NULL)
   beyond <- uncovered_conditions(measurements, model$fit)
   where <- if (!length(beyond)) "compare the two periods for what else differs: settings, use, sensors"
-           else sprintf("there %s outside of what calibration saw; calibrate on data that cover it",
-                        listed(sprintf("%s lies in %s of the steps", names(beyond), percent(beyond))))
-  c(held_out = sprintf("On held-out data the error is %s times that in calibration: %s.", short(held / seen), where))
+           else sprintf("there %s outside of what calibration saw%s; calibrate on data that cover it",
+                        listed(sprintf("%s lies in %s of the steps", names(beyond), percent(beyond))),
+                        if (remaining_error(model, measurements)$large) ", or what is missing acts more" else "")
+  c(held_out = sprintf("On held-out data the error is %s times that in calibration: %s.", short(excess), where))
+}
+
+# How many times as large as in calibration the error on data held out is; NULL where it is no larger than that, or the
+# noise, asks for.
+held_out_excess <- function(model, measurements) {
+  seen <- model$scores$calibrate[["rmse"]]
+  held <- model$scores$validate[["rmse"]]
+  if (is.na(held) || held < 1.5 * max(seen, measurements$noise_sd)) NULL else held / seen
 }
 
 # Share of the held-out steps at which a condition that the model reads lies outside of its range in calibration, if a
@@ -171,7 +181,8 @@ correlation_words <- function(measurements, a, b) {
   used <- measurements$use == "calibrate"
   r <- stats::cor(condition_values(measurements, pairs$a)[used], condition_values(measurements, pairs$b)[used],
                   use = "pairwise.complete.obs")
-  if (is.na(r)) "" else sprintf(" (in this record their correlation is %.2f)", r)
+  if (is.na(r) || abs(r) < 0.4) ""
+  else sprintf(" (in this record the correlation of %s and %s is %.2f)", pairs$a, pairs$b, r)
 }
 
 called_for <- function(parameters) {
@@ -187,7 +198,7 @@ confounded_inspection <- function(upgrade, model) {
   new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
   if (!length(others) || !length(new)) return(NULL)
   labels <- parameter_labels(model$fit, others)
-  sprintf("What %s brings (%s) trades off against %s: measure %s to see how much is due to it.", model$mechanism,
+  sprintf("What %s brings (%s) trades off against %s: with %s measured, it is known better.", model$mechanism,
           listed(parameter_labels(model$fit, new)), listed(labels), if (length(labels) > 1) "one of these" else "that")
 }
 
@@ -210,30 +221,46 @@ site_inspection <- function(upgrade, model) {
 
 # ---- what was not adopted
 
-# The best of the mechanisms left, where the evidence for it is substantial but not decisive.
-nearest_inspection <- function(upgrade) {
-  last <- upgrade$models[[length(upgrade$models)]]
-  trials <- upgrade$candidates[upgrade$candidates$from == last$name, ]
+last_trials <- function(upgrade) {
+  upgrade$candidates[upgrade$candidates$from == upgrade$models[[length(upgrade$models)]]$name, ]
+}
+
+# The best of the mechanisms left, where there is evidence for it that is not decisive: a row of its trial, or none.
+nearest_trial <- function(upgrade) {
+  trials <- last_trials(upgrade)
   if (!NROW(trials)) return(NULL)
   best <- best_trial(trials)
-  if (!nrow(best) || best$probability < rival_probability || best$log10_bf < 0.5) return(NULL)
+  best[best$probability >= rival_probability & best$log10_bf > 0, ]
+}
+
+nearest_inspection <- function(upgrade) {
+  best <- nearest_trial(upgrade)
+  if (!NROW(best)) return(NULL)
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
-  c(nearest = sprintf("Not decided is %s (odds of %s): a longer record in which %s strongly would decide it%s.",
+  c(nearest = sprintf("Not decided is %s (odds of %s%s): a longer record%s would decide it%s.",
                       best$mechanism, odds(best$log10_bf),
-                      paste(listed(drivers), if (length(drivers) > 1) "change" else "changes"),
+                      if (isTRUE(best$error_ratio < clearly_fallen))
+                        sprintf("; with it the error falls to %s", percent(best$error_ratio)) else "",
+                      if (!length(drivers)) "" else sprintf(" in which %s strongly",
+                        paste(listed(drivers), if (length(drivers) > 1) "change" else "changes")),
                       if (NROW(new)) sprintf(", or a look for %s on site", called_for(new)) else ""))
 }
 
+clearly_fallen <- 0.8  # times the simulation's error before: from there down a fall is told, whatever the evidence
+too_rough <- 10        # decades between the ends of an interval from which odds say nothing
+
 # Mechanisms of which the numbers are too rough to rule them out.
 undecided_inspections <- function(upgrade) {
-  open <- do.call(rbind, lapply(upgrade$models, function(model) open_trials(upgrade, model)))
+  open <- open_trials(upgrade)
   if (!NROW(open)) return(NULL)
-  open <- open[!duplicated(open$mechanism, fromLast = TRUE), ]
-  interval <- vapply(seq_len(nrow(open)), function(k) odds_interval(c(open$lower95[k], open$upper95[k])), "")
-  told <- sprintf(paste("Not ruled out is %s: odds of %s%s, by numbers that are not trusted. More runs for each",
-                        "mechanism (runs), or narrower priors, would decide."),
-                  open$mechanism, vapply(open$log10_bf, odds, ""), interval)
+  said <- vapply(seq_len(nrow(open)), function(k) {
+    ends <- c(open$lower95[k], open$upper95[k])
+    if (diff(ends) > too_rough) return("its numbers are too rough for odds")
+    sprintf("odds of %s%s, by numbers that are not trusted", odds(open$log10_bf[k]), odds_interval(ends))
+  }, "")
+  told <- sprintf(paste("Not ruled out is %s: %s. More runs for each mechanism (runs), or narrower priors, would",
+                        "decide."), open$mechanism, said)
   stats::setNames(told, rep("undecided", length(told)))
 }
 
@@ -253,9 +280,23 @@ answer_inspections <- function(upgrade, last) {
   table <- last$attribution$table
   answers <- table$boundary[table$significant & is.na(table$group)]
   left <- setdiff(names(upgrade$catalogue), unlist(lapply(upgrade$models, `[[`, "mechanism")))
+  open <- c(nearest_trial(upgrade)$mechanism, open_trials(upgrade)$mechanism)
+  trials <- last_trials(upgrade)
+  falls <- trials[trials$trusted & !trials$mechanism %in% open &
+                    !is.na(trials$error_ratio) & trials$error_ratio < clearly_fallen, ]
   told <- vapply(answers, function(name) {
     driven <- left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
-    if (length(driven)) {
+    fallen <- falls[falls$mechanism %in% driven, ]
+    if (NROW(fallen)) {
+      best <- fallen[which.min(fallen$error_ratio), ]
+      sprintf(paste("The error still answers to %s. With %s, which it drives, it falls to %s, but the evidence (odds",
+                    "of %s) does not tell that from an unknown response to %s: look for %s on site."),
+              name, best$mechanism, percent(best$error_ratio), odds(best$log10_bf), name,
+              called_for(best$parameters[[1]]))
+    } else if (any(driven %in% open)) {
+      sprintf("The error still answers to %s: %s may be why, and is not decided.", name,
+              listed(intersect(driven, open), "or"))
+    } else if (length(driven)) {
       sprintf(paste("The error still answers to %s. Of the mechanisms that it drives, %s %s tried but not adopted:",
                     "look for another way in which %s acts."),
               name, listed(driven), if (length(driven) > 1) "were" else "was", name)
@@ -330,9 +371,11 @@ remainder_inspection <- function(model, measurements) {
   if (left$large && is.null(left$pattern)) {
     return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: hold a second sensor",
                                    "beside the first; if that noise is right, something is still missing from the",
-                                   "model, perhaps something that acts through two conditions at once or by",
-                                   "thresholds, which an attribution does not show."),
-                             short(left$ratio), noise)))
+                                   "model%s."),
+                             short(left$ratio), noise,
+                             if (any(model$attribution$table$significant)) "" else
+                               paste(", perhaps something that acts through two conditions at once or by thresholds,",
+                                     "which an attribution does not show"))))
   }
   if (left$large) {
     return(c(pattern = sprintf("The error that remains has a pattern: %s. %s", left$pattern$what, left$pattern$where)))

@@ -55,6 +55,15 @@ catalogue <- function(...) {
 }
 
 #' @export
+`[.amiss_catalogue` <- function(x, i) {
+  if (is.character(i) && !all(i %in% names(x))) {
+    abort_input(c("There is no mechanism {.val {setdiff(i, names(x))}} in the catalogue.",
+                  i = "Its mechanisms: {.val {names(x)}}."))
+  }
+  structure(unclass(x)[i], class = "amiss_catalogue")
+}
+
+#' @export
 print.amiss_mechanism <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$name}}, driven by {.field {x$boundary}}: {x$sentence}")
   cli::cli_bullets(c(">" = "next: a {.fun catalogue} of mechanisms"))

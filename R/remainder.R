@@ -12,7 +12,7 @@ remaining_error <- function(model, measurements) {
   list(ratio = ratio, large = ratio > large_remainder,
        pattern = if (ratio > large_remainder) {
          if (is_several(measurements)) worst_pattern(model, measurements)
-         else remainder_pattern(r, model$fit$rows, measurements)
+         else remainder_pattern(r, model$fit$rows, measurements, significant_conditions(model$attribution$table))
        })
 }
 
@@ -26,8 +26,9 @@ worst_pattern <- function(model, measurements) {
   list(what = paste0("in ", worst, ": ", pattern$what), where = pattern$where)
 }
 
-# What it is and where to look, in words; NULL if the calendar explains less than half.
-remainder_pattern <- function(r, rows, measurements) {
+# What it is and where to look, in words; NULL if the calendar explains less than half. What the error `answers` to may
+# be as slow as a drift.
+remainder_pattern <- function(r, rows, measurements, answers) {
   hours <- measurements$hours[rows]
   clock <- clock_hour(measurements$time[rows])
   unit <- measurements$unit
@@ -38,7 +39,8 @@ remainder_pattern <- function(r, rows, measurements) {
     ends <- stats::fitted(stats::lm(r ~ stats::poly(hours, 2)))[c(1, length(r))]
     return(list(what = sprintf("it drifts, by %s from the beginning to the end of the calibration",
                                with_unit(signed(unname(diff(ends))), unit)),
-                where = "Suspect a drifting sensor, or something slow that the inputs do not hold."))
+                where = if (length(answers)) paste("It may be slow as", listed(answers), "may be, to which it answers.")
+                        else "Suspect a drifting sensor, or something slow that the inputs do not hold."))
   }
   profile <- tapply(r, clock, mean)
   peak <- which.max(abs(profile - mean(r)))

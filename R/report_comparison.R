@@ -77,7 +77,7 @@ remains_sentences <- function(comparison) {
   table <- comparison$tables$attribution
   vapply(names(comparison$models), function(name) {
     driving <- table[table$model == name & table$significant, ]
-    sprintf("%s: the discrepancy answers to %s.", name, listed(driving$boundary, "no boundary condition"))
+    sprintf("%s: the discrepancy answers to %s.", name, listed(driving$boundary, none = "no boundary condition"))
   }, "", USE.NAMES = FALSE)
 }
 

@@ -272,13 +272,16 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
       stopped[[as.character(m)]] <- conditionMessage(out)
       next
     }
+    if (is.logical(out) && all(is.na(out))) out <- as.numeric(out)
     check_run(out, nrow(drivers), simulator, point, m)
     runs[, m] <- out
   }
   if (length(stopped)) {
     first <- as.integer(names(stopped)[1])
     warn_input(c("{length(stopped)} of {nrow(values)} run{?s} of {.val {simulator$name}} stopped with an error.",
-                 x = "Run {first} at {point_words(values[first, , drop = FALSE])}: {stopped[[1]]}"))
+                 x = "Run {first} at {point_words(values[first, , drop = FALSE])}: {stopped[[1]]}",
+                 i = paste("It was given the parameters {.field {colnames(values)}} and the columns",
+                           "{.field {colnames(drivers)}}.")))
   }
   runs
 }

@@ -65,7 +65,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   (`stopped_because`) and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
 #'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error), nor beside what was
-#'   adopted later (`gain_beside_later`): then it takes the place of something else. `held_out_rivals` names mechanisms that could have been adopted in its place and with
+#'   adopted later (`gain_beside_later`): then it takes the place of something else.
+#'   `held_out_rivals` names mechanisms that could have been adopted in its place and with
 #'   which data held out are met better. `confounded_with` names parameters that are correlated beyond 0.4 with those
 #'   that it brought: other parts of the model that could do the same. Of several records `fit` is what
 #'   [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its
@@ -271,7 +272,9 @@ stop_reason <- function(table, attribution, decisive) {
   best <- best_trial(table)
   highest <- table[which.max(table$log10_bf), ]
   if (!nrow(best) || highest$log10_bf < decisive) best <- highest
-  found <- sprintf("best: %s, log10 Bayes factor %.1f%s", best$mechanism, best$log10_bf,
+  # As many digits as it takes to see that it is less than what is needed.
+  digits <- if (best$log10_bf < decisive && round(best$log10_bf, 1) >= decisive) 2 else 1
+  found <- sprintf("best: %s, log10 Bayes factor %.*f%s", best$mechanism, digits, best$log10_bf,
                    if (raises_error(best)) ", though the error rises with it" else "")
   why <- if (raises_error(highest) && highest$log10_bf >= decisive) {
     sprintf("no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but raises it)",
@@ -310,12 +313,18 @@ upgrade_gain <- function(models) {
 
 adopted_models <- function(upgrade) upgrade$models[-1]
 
-# Trials of a model by coarse calibrations that runs refute, of which the interval reaches beyond what was adopted, or
-# beyond what adoption asks for.
-open_trials <- function(upgrade, model) {
+# Mechanisms not adopted whose last trial is a coarse calibration that runs refute, of which the interval reaches beyond
+# what was adopted at its step, or beyond what adoption asks for. Where nothing is left to explain, none.
+open_trials <- function(upgrade) {
   if (is.null(upgrade$candidates)) return(NULL)
-  trials <- upgrade$candidates[upgrade$candidates$from == model$name, ]
-  adopted <- trials$mechanism %in% vapply(adopted_models(upgrade), `[[`, "", "mechanism")
-  needed <- max(upgrade$control$decisive, trials$log10_bf[adopted])
-  trials[!adopted & trials$judged_by == "screening" & !trials$trusted & trials$upper95 >= needed, ]
+  adopted <- vapply(adopted_models(upgrade), `[[`, "", "mechanism")
+  trials <- upgrade$candidates
+  needed <- vapply(trials$from, function(from) {
+    max(upgrade$control$decisive, trials$log10_bf[trials$from == from & trials$mechanism %in% adopted])
+  }, 0)
+  last <- upgrade$models[[length(upgrade$models)]]
+  explained <- !remaining_error(last, upgrade$measurements)$large && !any(last$attribution$table$significant)
+  open <- trials$judged_by == "screening" & !trials$trusted & trials$upper95 >= needed &
+    !(explained & trials$from == last$name)
+  trials[open & !trials$mechanism %in% adopted & !duplicated(trials$mechanism, fromLast = TRUE), ]
 }

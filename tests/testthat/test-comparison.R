@@ -188,3 +188,12 @@ test_that("the paper's discrepancy over time lies outside the simulation space, 
                             list(alpha = rbind(alpha), t2 = 0.2, lambda = 10), engine_context(1, 1))
   expect_equal(own$variance[, 1], diag(h %*% covariance %*% t(h)), tolerance = 1e-8)
 })
+
+test_that("what remains of each model is told with the conditions in a list", {
+  told <- function(...) {
+    table <- data.frame(model = "blind", boundary = c("Te", "Gv"), significant = c(...))
+    amiss:::remains_sentences(list(models = list(blind = NULL), tables = list(attribution = table)))
+  }
+  expect_identical(told(TRUE, TRUE), "blind: the discrepancy answers to Te and Gv.")
+  expect_identical(told(FALSE, FALSE), "blind: the discrepancy answers to no boundary condition.")
+})

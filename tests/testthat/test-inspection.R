@@ -19,8 +19,10 @@ test_that("rivals are told apart by what only one of them answers to, or on site
   used <- m$use == "calibrate"
   r <- cor(m$boundary[used, m$condition == 1], m$boundary[used, m$condition == 2])
   told <- about(inspected(upgrade), "rival")
-  expect_match(told, sprintf(paste("tell sun from drift, measure while Gv changes while Te does not, .*correlation",
-                                   "is %.2f"), r))
+  expect_match(told, "tell sun from drift, measure while Gv changes while Te does not, or vice versa")
+  expect_match(told, sprintf("correlation of Gv and Te is %.2f", r))
+  m$boundary[used, m$condition == 2] <- rnorm(sum(used))
+  expect_identical(amiss:::correlation_words(m, "Gv", "Te"), "")
   expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- character()
   expect_match(about(inspected(upgrade), "rival"), "Since sun and drift answer to no condition that was measured")
@@ -29,7 +31,7 @@ test_that("rivals are told apart by what only one of them answers to, or on site
                                                          "sun_gain of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
   expect_match(about(inspected(upgrade), "rival"), paste("What sun brings \\(gain of the sun\\) trades off against",
-                                                         "gain: measure that"), all = FALSE)
+                                                         "gain: with that measured"), all = FALSE)
 })
 
 test_that("a stand-in and a drifting sensor have tests of their own", {
@@ -69,8 +71,16 @@ test_that("conditions that go together, answers without a mechanism and absent d
   attribution$table$significant <- TRUE
   attribution$table$group <- NA_character_
   upgrade$models[[1]]$attribution <- attribution
-  answers <- about(inspected(upgrade), "answer")
-  expect_match(answers, "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted", all = FALSE)
+  answers <- function(log10_bf, error_ratio) {
+    upgrade$candidates$log10_bf[upgrade$candidates$mechanism == "sun"] <- log10_bf
+    upgrade$candidates$error_ratio[upgrade$candidates$mechanism == "sun"] <- error_ratio
+    about(inspected(upgrade), "answer")
+  }
+  expect_match(answers(-1, 0.9), "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted",
+               all = FALSE)
+  expect_match(answers(-1, 0.7), paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against",
+                                       ".*unknown response to Gv: look for a sun_gain of 0.006"), all = FALSE)
+  expect_match(answers(1, 0.7), "answers to Gv: sun may be why, and is not decided", all = FALSE)
   attribution$table$group <- "Te or Gv"
   attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE, correlation = 0.97))
   upgrade$models[[1]]$attribution <- attribution
@@ -84,8 +94,11 @@ test_that("a candidate that is near is named with what would decide it", {
   upgrade <- base_only(small_upgrade())
   upgrade$candidates$log10_bf <- c(1, -1)
   upgrade$candidates$probability <- c(0.8, 0.01)
-  expect_match(about(inspected(upgrade), "nearest"), paste("Not decided is sun \\(odds of 10 to 1 in favour\\).*Gv",
-                                                           "changes strongly"))
+  expect_match(about(inspected(upgrade), "nearest"), paste("Not decided is sun \\(odds of 10 to 1 in favour; with it",
+                                                           "the error falls to 8.*Gv changes strongly"))
+  upgrade$catalogue$sun$boundary <- character()
+  upgrade$candidates$error_ratio <- 0.9
+  expect_match(about(inspected(upgrade), "nearest"), "10 to 1 in favour\\): a longer record would decide it")
   upgrade$candidates$probability <- c(0.04, 0.01)
   expect_length(about(inspected(upgrade), "nearest"), 0)
 })
@@ -93,17 +106,19 @@ test_that("a candidate that is near is named with what would decide it", {
 test_that("a candidate whose emulator was too coarse is not ruled out in silence", {
   upgrade <- base_only(small_upgrade())
   rough <- which(upgrade$candidates$mechanism == "drift")[1]
-  upgrade$candidates[rough, c("log10_bf", "lower95", "upper95")] <- list(-3.5, -15.9, 54)
+  upgrade$candidates[rough, c("log10_bf", "lower95", "upper95")] <- list(-3.5, -5.9, 3)
   upgrade$candidates[rough, c("judged_by", "trusted")] <- list("screening", FALSE)
   expect_match(about(inspected(upgrade), "undecided"), "Not ruled out is drift.*3,200 to 1 against.*in favour")
+  upgrade$candidates$upper95[rough] <- 54
+  expect_match(about(inspected(upgrade), "undecided"), "drift: its numbers are too rough for odds")
   expect_length(about(inspected(upgrade), "nothing"), 0)
-  expect_match(paste(summary(upgrade)$sure, collapse = " "), "Those of drift are rough")
+  expect_match(paste(summary(upgrade)$sure, collapse = " "), "Not so those of drift")
   upgrade$candidates$trusted[rough] <- TRUE
   expect_length(about(inspected(upgrade), "undecided"), 0)
   upgrade$candidates$trusted[rough] <- FALSE
   upgrade$candidates$upper95[rough] <- 1.9
   expect_length(about(inspected(upgrade), "undecided"), 0)
-  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "drift are rough")
+  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "those of drift")
   # Beside what was adopted only where it could be better.
   adopted <- small_upgrade()
   upper <- adopted$candidates$log10_bf[adopted$candidates$mechanism == "sun"][1]

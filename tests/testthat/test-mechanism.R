@@ -103,3 +103,41 @@ test_that("a driver that is not among the conditions is told", {
                                                            attribution = list(surrogates = 19))), "far enough"),
                  "driven by", class = "amiss_warning_input")
 })
+
+test_that("a part of a catalogue is a catalogue", {
+  entries <- box_catalogue()
+  some <- entries[names(entries)[2:3]]
+  expect_s3_class(some, "amiss_catalogue")
+  expect_named(some, names(entries)[2:3])
+  expect_s3_class(entries[-1], "amiss_catalogue")
+  expect_error(entries["nothing"], "no mechanism \"nothing\" in the catalogue.*Its mechanisms: ",
+               class = "amiss_error_input")
+})
+
+test_that("a mechanism by which held-out data gain only beside what was adopted later is no stand-in", {
+  data <- linear_data(240)
+  # The sun has an effect in calibration, the wind in both, and held out the wind hides what the sun brings.
+  held <- data$hour > 180
+  data$Ws <- data$Gv / 100 * ifelse(held, 1, 0) + withr::with_seed(4, stats::rnorm(240, 0, 0.1))
+  data$Ti <- data$Ti + 0.01 * data$Gv - 1.6 * data$Ws
+  m <- linear_measurements(data, boundary = ~ Te + Gv + Ws, validate = held)
+  added <- function(name, column, prior) {
+    mechanism(name, boundary = column, sentence = "It acts.", edit = function(model) {
+      with_parameters(model, free(name, prior), boundary = column,
+                      f = function(values, drivers, base) base(values) + values[[name]] * drivers[, column])
+    })
+  }
+  both <- catalogue(added("wind", "Ws", uniform(-3, 0)), added("sun", "Gv", uniform(0, 0.02)))
+  upgrade <- upgrade_model(linear_simulator(), m, both, runs = 30, seed = 1, quiet = TRUE,
+                           control = list(calibration = quick_ais, attribution = list(surrogates = 19)))
+  expect_identical(vapply(upgrade$models[-1], `[[`, "", "mechanism"), c("sun", "wind"))
+  first <- upgrade$models[[2]]
+  expect_false(first$held_out_gain$improves)
+  expect_true(first$gain_beside_later$improves)
+  expect_false(first$verdict == "stand-in")
+  expect_null(upgrade$models[[3]]$gain_beside_later)
+  expect_match(summary(upgrade)$mechanisms[[1]]$brought, "no gain; beside what was adopted later, held-out data gain")
+  # Without that second look it would be one.
+  upgrade$models[[2]]$gain_beside_later <- NULL
+  expect_identical(rejudged(upgrade)$models[[2]]$verdict, "stand-in")
+})

@@ -147,3 +147,35 @@ test_that("a cause that a drift rivals is only likely", {
   expect_match(upgrade$models[[2]]$doubts, "a drifting sensor would explain the error as well", all = FALSE)
   expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a drifting sensor would explain the error as well")
 })
+
+test_that("a drift in what the error answers to does not put the sensor under suspicion", {
+  r <- withr::with_seed(1, rnorm(240)) + 8 * (seq_len(240) / 240)^2
+  m <- list(hours = seq_len(240), time = seq_len(240), unit = "K", target = "Ti")
+  where <- function(answers) amiss:::remainder_pattern(r, seq_len(240), m, answers)$where
+  expect_match(where(character()), "Suspect a drifting sensor")
+  expect_identical(where("Ws"), "It may be slow as Ws may be, to which it answers.")
+})
+
+test_that("readings that stand apart are told, and what a model leaves otherwise is not", {
+  noise <- withr::with_seed(1, rnorm(2000))
+  apart <- function(r, hours = seq_along(r)) amiss:::spikes(r, hours, 1)
+  expect_length(apart(noise), 0)
+  expect_length(apart(as.numeric(stats::filter(noise, 0.95, "recursive"))), 0)
+  expect_length(apart(noise + 30 * (seq_len(2000) %% 400 > 200)), 0)  # a step is no spike
+  at <- c(50, 700, 1500)
+  with_spikes <- noise
+  with_spikes[at] <- with_spikes[at] + c(12, -14, 20)
+  expect_identical(apart(with_spikes), as.integer(at))
+  gap <- seq_len(2000) + 5 * (seq_len(2000) >= 50)  # after it nothing stands before a reading
+  expect_length(apart(with_spikes, gap), 2)
+  expect_length(apart(rep(0, 100)), 0)
+  upgrade <- small_upgrade()
+  told <- function(k) {
+    p <- upgrade$models[[2]]$prediction
+    p$observed[k] <- p$observed[k] + 1
+    upgrade$models[[2]]$prediction <- p
+    unname(upgrade_inspections(upgrade)["spikes"])
+  }
+  expect_true(is.na(told(integer())))
+  expect_match(told(c(40, 90)), "^2 of 1[0-9][0-9] readings, the first at 2024-03-.* stand apart from those before")
+})

@@ -65,7 +65,7 @@ test_that("each step tells what it brought, and what could do the same", {
                all = FALSE)
   upgrade <- small_upgrade()
   upgrade$models[[2]]$confounded_with <- "gain"
-  expect_match(summary(upgrade)$change, "A part of what sun does could also be done by gain .correlation beyond 0.4",
+  expect_match(summary(upgrade)$change, "How much sun does hangs together with gain .correlation beyond 0.4",
                all = FALSE)
   upgrade$models[[2]]["confounded_with"] <- list(character())
   expect_no_match(paste(summary(upgrade)$change, collapse = " "), "could also be done")

@@ -121,3 +121,15 @@ test_that("parameters of an extended model are checked", {
   expect_error(with_parameters("model", gain), "model", class = "amiss_error_input")
   expect_error(function_simulator(model$f, gain, gain), "declared twice", class = "amiss_error_input")
 })
+
+test_that("a run that returns NA throughout has failed, and what the function was given is told with its error", {
+  runs <- function(f) {
+    s <- function_simulator(f, free("gain", uniform(0, 1)), boundary = "Te")
+    simulate_runs(s, cbind(gain = c(0.2, 0.8)), cbind(Te = 1:5), 1)
+  }
+  made <- runs(function(values, drivers) if (values[["gain"]] > 0.5) rep(NA, 5) else drivers[, "Te"])
+  expect_identical(colSums(is.na(made)), c(0, 5))
+  expect_warning(runs(function(values, drivers) drivers[, "Gv"]), "parameters gain and the columns Te",
+                 class = "amiss_warning_input")
+  expect_error(runs(function(values, drivers) rep(NA, 4)), "5 numbers were expected", class = "amiss_error_input")
+})

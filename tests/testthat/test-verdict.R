@@ -131,7 +131,7 @@ test_that("where the base model's parameters could have come nearer by themselve
     upgrade$models[[1]]$scores$calibrate[["rmse"]] <- rmse
     paste(summary(upgrade)$gain, collapse = " ")
   }
-  expect_match(gain(1.2 * nearest), "base model's runs is wrong by only")
+  expect_match(gain(1.2 * nearest), "base model has a run that errs by only")
   expect_no_match(gain(1.05 * nearest), "by only")
 })
 
@@ -335,4 +335,41 @@ test_that("where the catalogue was empty, no mechanism of it is said to have fai
   upgrade <- base_only(small_upgrade())
   upgrade["candidates"] <- list(NULL)
   expect_match(summary(upgrade)$headline, "Gv is missing from the model, but no mechanism was tried")
+})
+
+test_that("what has evidence only beside what it trades off with is likely at most", {
+  model <- function(name, mechanism, parameters) {
+    list(name = name, mechanism = mechanism,
+         fit = list(values = matrix(0, 1, length(parameters), dimnames = list(NULL, parameters)),
+                    emulator = list(parameters = stats::setNames(nm = as.list(parameters)))))
+  }
+  models <- list(model("base", NULL, "C"), model("base + a", "a", c("C", "of_a")),
+                 model("base + a + b", "b", c("C", "of_a", "of_b")))
+  candidates <- function(alone) data.frame(from = c("base", "base", "base + a"), mechanism = c("a", "b", "b"),
+                                           log10_bf = c(12, alone, 5))
+  told <- function(alone = -1, confounded = c("C", "of_a"), steps = 3) {
+    amiss:::only_beside(models[seq_len(steps)], confounded, candidates(alone))
+  }
+  expect_identical(told(), "it has evidence only beside a, with which it trades off")
+  expect_null(told(alone = 1))
+  expect_null(told(confounded = "C"))
+  expect_null(told(steps = 2))
+})
+
+test_that("where nothing is wrong in calibration and the error on held-out data is larger, the headline says so", {
+  upgrade <- base_only(small_upgrade())
+  base <- upgrade$models[[1]]
+  base$attribution$table$significant <- FALSE
+  p <- base$prediction
+  p$mean <- p$observed + 0.05 * (-1)^seq_len(nrow(p))
+  base$prediction <- p
+  base$scores$calibrate[["rmse"]] <- 0.05
+  upgrade$models[[1]] <- base
+  told <- function(held) {
+    upgrade$models[[1]]$scores$validate[["rmse"]] <- held
+    amiss:::diagnosis_verdict(upgrade)
+  }
+  expect_identical(told(0.07)$tag, "Nothing decisive")
+  expect_identical(told(0.12)$verdict, "nothing")
+  expect_match(told(0.12)$headline, "In calibration no mechanism is called for.* held-out data the error is 2.4 times")
 })
