@@ -78,8 +78,9 @@ test_that("conditions that go together, answers without a mechanism and absent d
   }
   expect_match(answers(-1, 0.9), "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted",
                all = FALSE)
-  expect_match(answers(-1, 0.7), paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against",
-                                       ".*unknown response to Gv: look for a sun_gain of 0.006"), all = FALSE)
+  expect_match(answers(-1, 0.7), paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against.",
+                                       "does not tell that from an unknown response to Gv: look for a sun_gain"),
+               all = FALSE)
   expect_match(answers(1, 0.7), "answers to Gv: sun may be why, and is not decided", all = FALSE)
   attribution$table$group <- "Te or Gv"
   attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE, correlation = 0.97))
