@@ -225,12 +225,14 @@ last_trials <- function(upgrade) {
   upgrade$candidates[upgrade$candidates$from == upgrade$models[[length(upgrade$models)]]$name, ]
 }
 
+told_evidence <- 0.2  # decades, odds of 1.6 to 1, from which a mechanism that is not decided is told
+
 # The best of the mechanisms left, where there is evidence for it that is not decisive: a row of its trial, or none.
 nearest_trial <- function(upgrade) {
   trials <- last_trials(upgrade)
   if (!NROW(trials)) return(NULL)
   best <- best_trial(trials)
-  best[best$probability >= rival_probability & best$log10_bf > 0, ]
+  best[best$probability >= rival_probability & best$log10_bf > told_evidence, ]
 }
 
 nearest_inspection <- function(upgrade) {
