@@ -147,21 +147,21 @@ with_gains_beside_later <- function(models, catalogue, settings) {
   for (k in seq_along(models)[-c(1, length(models))]) {
     if (!isFALSE(held_out_gain(models[[k - 1]], models[[k]])$improves) || settings$spent()) next
     later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
-    without <- left_out(models[[k - 1]]$fit, models[[1]]$fit, catalogue[later], settings)
+    without <- tryCatch(left_out(models[[k - 1]]$fit, models[[1]]$fit, catalogue[later], settings),
+                        amiss_error = function(e) NULL)  # a loop that is done is not lost by this
     if (!is.null(without)) models[[k]]$gain_beside_later <- held_out_gain(without, last)
   }
   models
 }
 
-# The model of a fit with mechanisms that were adopted on top of another, as predicted_record() has it; NULL where they
-# cannot be applied, the runs are given or those made refute its emulator.
+# The model of a fit with mechanisms that were adopted on top of another, as predicted_record() has it; NULL where runs
+# are given or those made refute its emulator.
 left_out <- function(fit, base, mechanisms, settings) {
   model <- model_of(fit)
   if (is_given(model)) return(NULL)
   own <- names(drawn_parameters(base))
   for (mechanism in mechanisms) {
     settings$adopted <- setdiff(unlist(lapply(in_list(model), function(s) names(free_parameters(s)))), own)
-    if (!can_extend(mechanism, model, settings)) return(NULL)
     model <- extended_model(mechanism, model, settings)
   }
   name <- paste("without, with", listed(names(mechanisms)))

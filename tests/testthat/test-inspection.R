@@ -129,6 +129,15 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
   expect_length(about(inspected(adopted), "undecided"), 0)
   adopted$candidates$upper95[rough] <- upper + 1
   expect_length(about(inspected(adopted), "undecided"), 1)
+  # A later trial counts in its place; beside the last model only where something is left to explain.
+  later <- adopted$candidates[rough, ]
+  later$from <- adopted$models[[2]]$name
+  adopted$candidates <- rbind(adopted$candidates, later)
+  expect_length(about(inspected(adopted), "undecided"), 0)
+  adopted$models[[2]]$attribution$table$significant[1] <- TRUE
+  expect_length(about(inspected(adopted), "undecided"), 1)
+  adopted$candidates$trusted[nrow(adopted$candidates)] <- TRUE
+  expect_length(about(inspected(adopted), "undecided"), 0)
 })
 
 test_that("numbers that are not trusted come first", {

@@ -146,6 +146,12 @@ test_that("a mechanism by which held-out data gain only beside what was adopted 
   expect_false(first$verdict == "stand-in")
   expect_null(upgrade$models[[3]]$gain_beside_later)
   expect_match(summary(upgrade)$mechanisms[[1]]$brought, "no gain; beside what was adopted later, held-out data gain")
+  # An error there loses nothing of the loop.
+  settings <- list(spent = function() FALSE)
+  expect_null(amiss:::with_gains_beside_later(lapply(upgrade$models, function(m) {
+    m$gain_beside_later <- NULL
+    m
+  }), both[0], settings)[[2]]$gain_beside_later)
   # Without that second look it would be one.
   upgrade$models[[2]]$gain_beside_later <- NULL
   expect_identical(rejudged(upgrade)$models[[2]]$verdict, "stand-in")
