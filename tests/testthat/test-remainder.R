@@ -162,6 +162,7 @@ test_that("readings that stand apart are told, and what a model leaves otherwise
   expect_length(apart(noise), 0)
   expect_length(apart(as.numeric(stats::filter(noise, 0.95, "recursive"))), 0)
   expect_length(apart(noise + 30 * (seq_len(2000) %% 400 > 200)), 0)  # a step is no spike
+  expect_length(apart(noise + 15 * pmin(pmax(seq_len(2000) - 1000, 0), 2)), 0)  # nor is a ramp of two
   at <- c(50, 700, 1500)
   with_spikes <- noise
   with_spikes[at] <- with_spikes[at] + c(12, -14, 20)
