@@ -67,7 +67,7 @@ fit_runs <- function(ensemble, settings, calibration = settings$control$calibrat
   found <- without_basis_warnings(refine_records(
     unname(ensembles), unname(each_record(settings$measurements)), left, control, settings$seed, settings$threads,
     runs = max(vapply(ensembles, function(e) regional_runs(e$parameters, refined_runs(settings)), 0)), first,
-    function(fits) hopeless(together(fits)), purpose))
+    function(fits) hopeless(together(fits)), purpose, settings$present))
   fits <- lapply(found$fits, function(fit) {
     for (spent in c("rounds", "runs_made")) fit[[spent]] <- fit[[spent]] + (before[[spent]] %||% 0L)
     fit

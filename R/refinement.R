@@ -59,10 +59,10 @@ lost <- 3  # error over noise from which an emulator does not even tell where th
 # Of one record, or of several that share parameters: list(ensembles, fits, made), one of each for each record: the last
 # calibration, the ensemble it was made with, and the runs of its check. `first`: such a list for the ensembles, if one
 # is there already. `hopeless`: a function of coarse fits that tells that no more is wanted of them. `purpose`: what the
-# calibration is for. All fits say in `rounds` and `runs_made` what was spent on all. Where the last round is no better
-# than one before it, that one stays.
+# calibration is for. `present`: joint_centre() of the model that this one extends, if it does. All fits say in `rounds`
+# and `runs_made` what was spent on all. Where the last round is no better than one before it, that one stays.
 refine_records <- function(ensembles, measurements, rounds, control, seed, threads, runs = NULL, first = NULL,
-                           hopeless = function(fits) FALSE, purpose = for_intervals) {
+                           hopeless = function(fits) FALSE, purpose = for_intervals, present = NULL) {
   runs <- runs %||% max(vapply(ensembles, function(e) regional_runs(e$parameters), 0))
   runs_made <- 0
   round <- 0L
@@ -100,7 +100,8 @@ refine_records <- function(ensembles, measurements, rounds, control, seed, threa
     c(list(ensembles = ensembles), found)
   }
   searched <- function(ensembles, sets, centre = NULL) {
-    found <- in_round(staged("search by the simulator", searched_ensembles(ensembles, sets, centre, runs, threads)))
+    starts <- c(list(centre), if (!has_region(ensembles)) starts_over_priors(ensembles, sets, present))
+    found <- in_round(staged("search by the simulator", searched_ensembles(ensembles, sets, starts, runs, threads)))
     runs_made <<- runs_made + found$runs
     calibrated(found$ensembles, coarsely(control$calibration))
   }
@@ -195,30 +196,40 @@ coarsely <- function(calibration) {
   calibration
 }
 
-# list(ensembles, runs): the ensembles of the region to which searches on the simulator lead, and the runs that they
-# and it took. They start from `centre`, if there is one, and over the priors also from their middle and from the run
-# nearest to each record. Where none gets anywhere, as error and discrepancy could not be sampled so far from the
-# records, the ensembles as they were.
-searched_ensembles <- function(ensembles, sets, centre, runs, threads) {
+# Where searches over the priors start, in the coordinates of joint_parameters(): at the posterior of the model that
+# this one extends, `present`, if it does, with the middle of the prior for what is new; at the run nearest to each
+# record and, of the half of the runs that lie farther from that, the nearest; in the middle of the priors. An extension
+# often lies near the model that it extends, where a design over the priors has no run; and of several modes one search
+# finds one.
+starts_over_priors <- function(ensembles, sets, present = NULL) {
   all <- names(joint_parameters(sets))
-  starts <- list(centre)
-  if (any(vapply(ensembles, function(e) is.null(e$region), NA))) {
-    nearest <- Map(function(ensemble, set) {
-      run <- which.min(colMeans((ensemble$outputs - set$measurements$y[set$rows])^2))
-      start <- stats::setNames(numeric(length(all)), all)
-      start[names(ensemble$parameters)] <- to_normal(ensemble$unit[run, ])
-      start
-    }, ensembles, sets)
-    starts <- c(list(centre, numeric(length(all))), unname(nearest))
-  }
-  search <- function(start) tryCatch(search_mode(sets, start, threads), amiss_error_numerical = function(e) NULL)
-  modes <- Filter(Negate(is.null), lapply(Filter(Negate(is.null), starts), search))
-  if (!length(modes)) return(list(ensembles = ensembles, runs = 0))
+  middle <- stats::setNames(numeric(length(all)), all)
+  at <- function(values) replace(middle, names(values), values)
+  nearest <- Map(function(ensemble, set) {
+    x <- to_normal(ensemble$unit)
+    colnames(x) <- names(ensemble$parameters)
+    misfit <- colMeans((ensemble$outputs - set$measurements$y[set$rows])^2)
+    first <- which.min(misfit)
+    apart <- colSums((t(x) - x[first, ])^2)
+    misfit[apart < stats::median(apart)] <- NA
+    lapply(unique(c(first, which.min(misfit))), function(run) at(x[run, ]))
+  }, ensembles, sets)
+  extended <- if (!is.null(present)) list(at(present[intersect(names(present), all)]))
+  c(extended, unlist(unname(nearest), recursive = FALSE), list(middle))
+}
+
+# list(ensembles, runs): the ensembles of the region to which searches on the simulator lead from `starts`, and the runs
+# that they and it took. Where none gets anywhere, as error and discrepancy could not be sampled so far from the
+# records, the ensembles as they were.
+searched_ensembles <- function(ensembles, sets, starts, runs, threads) {
+  all <- names(joint_parameters(sets))
+  found <- search_modes(sets, Filter(Negate(is.null), starts), threads)
+  if (!length(found$modes)) return(list(ensembles = ensembles, runs = found$runs))
   regional <- Map(function(ensemble, set) {
-    region <- region_of_modes(modes, ensemble$parameters, match(names(ensemble$parameters), all))
+    region <- region_of_modes(found$modes, ensemble$parameters, match(names(ensemble$parameters), all))
     regional_ensemble(ensemble, region, set$emulator, set$measurements, runs, threads)
   }, ensembles, sets)
-  list(ensembles = regional, runs = runs * length(ensembles) + sum(vapply(modes, `[[`, 0, "runs")))
+  list(ensembles = regional, runs = runs * length(ensembles) + found$runs)
 }
 
 # The ensemble with as many of the runs at posterior draws as the check asks for.

@@ -29,11 +29,11 @@ wider_region <- function(region) {
   region
 }
 
-# The ellipsoid that holds what search_mode() found from several starts: modes as good as the best, or places along a
+# The ellipsoid that holds what search_modes() found from several starts: modes as good as the best, or places along a
 # ridge. `parameters`: those that are asked for, at `own` among the coordinates.
 region_of_modes <- function(modes, parameters, own) {
   value <- vapply(modes, `[[`, 0, "value")
-  modes <- modes[value > max(value) - 10]
+  modes <- modes[value > max(value) - mode_depth]
   centres <- do.call(rbind, lapply(modes, function(mode) mode$centre[own]))
   centre <- colMeans(centres)
   covariance <- Reduce(`+`, lapply(modes, function(mode) mode$covariance[own, own, drop = FALSE])) / length(modes) +

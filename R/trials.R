@@ -14,6 +14,7 @@ trial_order <- function(catalogue, attribution) {
 # Every mechanism as an extension of the current model: fits of those worth one, and the table of all Bayes factors.
 try_mechanisms <- function(current, catalogue, settings, say) {
   trials <- lapply(catalogue, extended_model, model_of(current$fit), settings)
+  settings$present <- joint_centre(record_fits(current$fit))
   if (is.null(settings$control$screening)) return(tried_in_full(current, trials, NULL, settings, say))
   responses <- staged("responses of the mechanisms", seen_responses(current, trials, settings))
   if (!is.null(responses)) say("  {sum(responses$runs)} runs show in which order mechanisms are tried")
@@ -164,6 +165,7 @@ left_out <- function(fit, base, mechanisms, settings) {
     settings$adopted <- setdiff(unlist(lapply(in_list(model), function(s) names(free_parameters(s)))), own)
     model <- extended_model(mechanism, model, settings)
   }
+  settings$present <- joint_centre(record_fits(fit))
   name <- paste("without, with", listed(names(mechanisms)))
   fit <- staged(name, screen_model(model, name, settings)$fit)
   if (isFALSE(fit$check$passed)) return(NULL)

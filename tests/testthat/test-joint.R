@@ -141,7 +141,7 @@ test_that("a search runs no record again for a parameter that it does not have",
     amiss:::calibration_setting(train_emulator(ensemble, m), m, quick_ais, 1)
   }, simulate_jointly(simulators, both, 12, seed = 1), both))
   calls[] <- 0
-  found <- amiss:::search_mode(sets, c(0, 0, 0), 1)
+  found <- amiss:::search_mode(amiss:::searched_records(sets, 1), c(0, 0, 0))
   expect_equal(found$runs, sum(calls))
   expect_lt(calls[["flux"]], calls[["Ti"]])
   estimate <- amiss:::unit_to_values(matrix(pnorm(found$centre), 1), amiss:::joint_parameters(sets))
