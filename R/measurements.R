@@ -34,7 +34,7 @@
 #' @param time Name of the time column; a series that knows its own needs none.
 #' @param target Name of the measured target.
 #' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws + circular(Wd)` or their
-#'   names. A circular quantity (degrees) enters as sine and cosine.
+#'   names. A circular quantity (degrees) enters as sine and cosine, one that is `TRUE` or `FALSE` as 1 or 0.
 #' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's unit; or
 #'   `"bootstrap"` or [bootstrap_noise()], which estimate it from the readings inside each average. If not given, the
 #'   standard error of the averages is taken. Both need `average`.
@@ -86,6 +86,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                   i = "Leave it out of {.arg boundary}."))
   }
   stamps <- read_time(data[[time]], time, table$format, time_zone)
+  data <- with_switches(data, terms$name)
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
   require_numeric(data, c(target, terms$name))
   drivers <- as.matrix(data[numeric_columns])
@@ -167,6 +168,13 @@ require_columns <- function(data, columns, call = rlang::caller_env()) {
     abort_input(c("{cli::qty(missing)}Column{?s} {.val {missing}} {?is/are} not in the data.",
                   i = "Columns there: {.val {names(data)}}."), call = call)
   }
+}
+
+# What is on or off, as 0 and 1.
+with_switches <- function(data, columns) {
+  switches <- columns[vapply(data[columns], function(x) is.logical(x) && is.null(dim(x)), NA)]
+  data[switches] <- lapply(data[switches], as.numeric)
+  data
 }
 
 require_numeric <- function(data, columns, call = rlang::caller_env()) {

@@ -111,6 +111,7 @@ prediction_record <- function(m, newdata, call = rlang::caller_env()) {
 new_record <- function(m, data, call = rlang::caller_env()) {
   terms <- list(name = m$conditions, circular = tabulate(m$condition, length(m$conditions)) == 2)
   require_columns(data, c("time", terms$name), call)
+  data <- with_switches(data, terms$name)
   require_numeric(data, c(terms$name, intersect(m$target, names(data))), call)
   time <- read_time(data$time, "time", m$time_format, m$time_zone, call)
   hours <- time_hours(time)

@@ -63,6 +63,18 @@ test_that("a missing target value is left out, not refused", {
   expect_equal(length(amiss:::used_rows(linear_measurements(data), "calibrate")), 239)
 })
 
+test_that("a condition that is on or off counts as 1 and 0, in a record and in what is predicted", {
+  data <- linear_data()
+  data$on <- sin(data$hour) > 0
+  m <- linear_measurements(data, boundary = ~ Te + on)
+  expect_identical(unname(m$raw$drivers[, "on"]), as.numeric(data$on))
+  data$time <- data$hour
+  new <- amiss:::new_record(m, data[1:24, ])
+  expect_identical(unname(new$raw$drivers[, "on"]), as.numeric(data$on)[1:24])
+  data$on[5] <- NA
+  expect_error(linear_measurements(data, boundary = ~ Te + on), "on", class = "amiss_error_input")
+})
+
 test_that("circular conditions enter as sine and cosine of one condition", {
   data <- linear_data()
   data$Wd <- (seq_len(nrow(data)) * 37) %% 360
