@@ -6,7 +6,6 @@ search_steps <- 20         # at most
 search_gain <- 0.1         # nats, below which a step is the last
 search_leaps <- 3          # at most
 search_trial <- 4          # steps that each search is given
-mode_depth <- 10           # nats below the best mode from which another does not count
 search_draws <- 8          # of error and discrepancy, by which a step is judged
 search_difference <- 0.02  # of slopes, in standard deviations of the prior
 search_damping <- c(0, 1, 10, 100, 1000, 1e4)

@@ -29,6 +29,8 @@ wider_region <- function(region) {
   region
 }
 
+mode_depth <- 10  # nats below the best mode from which another does not count
+
 # The ellipsoid that holds what search_modes() found from several starts: modes as good as the best, or places along a
 # ridge. `parameters`: those that are asked for, at `own` among the coordinates.
 region_of_modes <- function(modes, parameters, own) {
