@@ -198,9 +198,9 @@ coarsely <- function(calibration) {
 
 # Where searches over the priors start, in the coordinates of joint_parameters(): at the posterior of the model that
 # this one extends, `present`, if it does, with the middle of the prior for what is new; at the run nearest to each
-# record and, of the half of the runs that lie farther from that, the nearest; in the middle of the priors. An extension
-# often lies near the model that it extends, where a design over the priors has no run; and of several modes one search
-# finds one.
+# record and, of a single one, at the nearest of the half of the runs that lie farther from that; in the middle of the
+# priors. An extension often lies near the model that it extends, where a design over the priors has no run; and of
+# several modes one search finds one.
 starts_over_priors <- function(ensembles, sets, present = NULL) {
   all <- names(joint_parameters(sets))
   middle <- stats::setNames(numeric(length(all)), all)
@@ -210,6 +210,7 @@ starts_over_priors <- function(ensembles, sets, present = NULL) {
     colnames(x) <- names(ensemble$parameters)
     misfit <- colMeans((ensemble$outputs - set$measurements$y[set$rows])^2)
     first <- which.min(misfit)
+    if (length(sets) > 1) return(list(at(x[first, ])))
     apart <- colSums((t(x) - x[first, ])^2)
     misfit[apart < stats::median(apart)] <- NA
     lapply(unique(c(first, which.min(misfit))), function(run) at(x[run, ]))

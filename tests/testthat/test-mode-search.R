@@ -78,6 +78,11 @@ test_that("searches start at the present model, at two near runs that stand apar
   expect_equal(unname(starts[[2]]), z[which.min(misfit), ])
   expect_equal(unname(starts[[3]]), z[far[which.min(misfit[far])], ])
   expect_length(amiss:::starts_over_priors(list(runs), list(set)), 3)
+  # Of two records the run nearest to each.
+  other <- set
+  other$measurements$y <- runs$outputs[, 5][match(seq_along(m$y), set$rows)]
+  both <- amiss:::starts_over_priors(list(runs, runs), list(set, other))
+  expect_equal(lapply(both, unname), list(z[which.min(misfit), ], z[5, ], numeric(3)))
 })
 
 test_that("a mechanism is searched from the model that it extends", {
