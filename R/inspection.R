@@ -286,29 +286,35 @@ answer_inspections <- function(upgrade, last) {
   trials <- last_trials(upgrade)
   falls <- trials[trials$trusted & !trials$mechanism %in% open &
                     !is.na(trials$error_ratio) & trials$error_ratio < clearly_fallen, ]
-  told <- vapply(answers, function(name) {
-    driven <- left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
+  driven_by <- function(name) left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
+  undecided <- character()  # of each condition the mechanisms that may be why
+  told <- character()
+  for (name in answers) {
+    driven <- driven_by(name)
     fallen <- falls[falls$mechanism %in% driven, ]
     if (NROW(fallen)) {
       best <- fallen[which.min(fallen$error_ratio), ]
-      sprintf(paste("The error still answers to %s. With %s, which it drives, it falls to %s, but the evidence (odds",
-                    "of %s) does not tell that from an unknown response to %s: look for %s on site."),
-              name, best$mechanism, percent(best$error_ratio), odds(best$log10_bf), name,
-              called_for(best$parameters[[1]]))
+      told <- c(told, sprintf(
+        paste("The error still answers to %s. With %s, which it drives, it falls to %s, but the evidence (odds of %s)",
+              "does not tell that from an unknown response to %s: look for %s on site."),
+        name, best$mechanism, percent(best$error_ratio), odds(best$log10_bf), name, called_for(best$parameters[[1]])))
     } else if (any(driven %in% open)) {
-      sprintf("The error still answers to %s: %s may be why, and is not decided.", name,
-              listed(intersect(driven, open), "or"))
+      undecided[name] <- listed(intersect(driven, open), "or")
     } else if (length(driven)) {
-      sprintf(paste("The error still answers to %s. Of the mechanisms that it drives, %s %s tried but not adopted:",
-                    "look for another way in which %s acts."),
-              name, listed(driven), if (length(driven) > 1) "were" else "was", name)
+      told <- c(told, sprintf(
+        paste("The error still answers to %s. Of the mechanisms that it drives, %s %s tried but not adopted: look for",
+              "another way in which %s acts."),
+        name, listed(driven), if (length(driven) > 1) "were" else "was", name))
     } else {
       ever <- any(vapply(upgrade$catalogue, function(entry) name %in% entry$boundary, NA))
-      sprintf(paste("The error still answers to %s, and no mechanism %s the catalogue is driven by it: think of what",
-                    "acts with %s, and add it."),
-              name, if (ever) "left in" else "of", name)
+      told <- c(told, sprintf(
+        paste("The error still answers to %s, and no mechanism %s the catalogue is driven by it: think of what acts",
+              "with %s, and add it."), name, if (ever) "left in" else "of", name))
     }
-  }, "")
+  }
+  of_reason <- split(answers[answers %in% names(undecided)], factor(undecided, unique(undecided)))
+  told <- c(sprintf("The error still answers to %s: %s may be why, and is not decided.",
+                    vapply(of_reason, listed, ""), names(of_reason)), told)
   stats::setNames(told, rep("answer", length(told)))
 }
 

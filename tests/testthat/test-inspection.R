@@ -82,6 +82,12 @@ test_that("conditions that go together, answers without a mechanism and absent d
                                        "does not tell that from an unknown response to Gv: look for a sun_gain"),
                all = FALSE)
   expect_match(answers(1, 0.7), "answers to Gv: sun may be why, and is not decided", all = FALSE)
+  plain <- upgrade$catalogue
+  upgrade$catalogue$sun$boundary <- c("Te", "Gv")
+  expect_match(answers(1, 0.7), "answers to Te and Gv: sun may be why, and is not decided|to Gv and Te: sun may be",
+               all = FALSE)
+  expect_length(answers(1, 0.7), 1)
+  upgrade$catalogue <- plain
   attribution$table$group <- "Te or Gv"
   attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE, correlation = 0.97))
   upgrade$models[[1]]$attribution <- attribution
