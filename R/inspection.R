@@ -286,11 +286,10 @@ answer_inspections <- function(upgrade, last) {
   trials <- last_trials(upgrade)
   falls <- trials[trials$trusted & !trials$mechanism %in% open &
                     !is.na(trials$error_ratio) & trials$error_ratio < clearly_fallen, ]
-  driven_by <- function(name) left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
   undecided <- character()  # of each condition the mechanisms that may be why
   told <- character()
   for (name in answers) {
-    driven <- driven_by(name)
+    driven <- left[vapply(upgrade$catalogue[left], function(entry) name %in% entry$boundary, NA)]
     fallen <- falls[falls$mechanism %in% driven, ]
     if (NROW(fallen)) {
       best <- fallen[which.min(fallen$error_ratio), ]
