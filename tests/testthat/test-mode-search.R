@@ -135,11 +135,13 @@ test_that("of searches that lead to the same mode one is carried through, and va
   apart <- amiss:::search_mode(records, c(1.2, 0.96))
   both <- amiss:::with_common_values(list(alone$modes[[1]], apart), records)
   expect_lt(abs(both[[1]]$value - both[[2]]$value), 1)
-  # The mean of what each set of draws says of a mode alone.
-  each <- vapply(list(alone$modes[[1]], apart), function(mode) {
-    amiss:::log_likelihoods(records, apart$outputs, mode$tangents)
-  }, 0)
-  expect_equal(both[[2]]$value, log(mean(exp(each - max(each)))) + max(each) - 0.5 * sum(apart$centre^2))
+  # The mean of what each set of draws says of a mode; those of a larger error say something else.
+  vague <- apart
+  vague$tangents[[1]]$variance <- 4 * apart$tangents[[1]]$variance
+  each <- vapply(list(apart, vague), function(mode) amiss:::log_likelihoods(records, apart$outputs, mode$tangents), 0)
+  expect_gt(abs(diff(each)), 1)
+  common <- amiss:::with_common_values(list(apart, vague), records)[[1]]
+  expect_equal(common$value, log(mean(exp(each - max(each)))) + max(each) - 0.5 * sum(apart$centre^2))
   expect_identical(amiss:::with_common_values(list(), records), list())
 })
 
