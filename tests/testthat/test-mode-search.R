@@ -145,6 +145,17 @@ test_that("of searches that lead to the same mode one is carried through, and va
   expect_identical(amiss:::with_common_values(list(), records), list())
 })
 
+test_that("a search that would not come near the best mode at its pace is given up, after some steps", {
+  records <- amiss:::searched_records(list(curved_set()), 1)
+  far_better <- list(list(centre = c(50, 50), covariance = diag(2), value = 1e9))
+  patient <- amiss:::search_mode(records, c(-2, 0))
+  expect_false(patient$given_up)
+  given_up <- amiss:::search_mode(records, c(-2, 0), far_better)
+  expect_true(given_up$given_up)
+  expect_lt(given_up$runs, patient$runs)
+  expect_gte(given_up$runs, 4 * (2 + 6))  # four steps, each of two slopes and six points
+})
+
 test_that("where all starts fail there is no mode, and a search keeps what it found before the numbers failed", {
   set <- curved_set()
   records <- amiss:::searched_records(list(set), 1)
