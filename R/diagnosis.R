@@ -89,10 +89,6 @@ diagnosis_verdict <- function(upgrade) {
   list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
 }
 
-# Where runs of the simulator refute the emulator of the model from which all others start, evidence compares
-# emulators, not simulators.
-unjudged <- function(upgrade) isFALSE(upgrade$models[[1]]$fit$check$passed)
-
 open_verdict <- function(upgrade) {
   explained <- if (is.null(upgrade$candidates)) "no mechanism was tried"
                else if (unjudged(upgrade)) "whether a mechanism of the catalogue explains it cannot be told"
@@ -102,6 +98,12 @@ open_verdict <- function(upgrade) {
   base <- upgrade$models[[1]]
   answers <- significant_conditions(base$attribution$table)
   remainder <- remaining_error(base, upgrade$measurements)
+  if (unjudged(upgrade) && remainder$large) {
+    return(unexplained(sprintf(paste("The error is %s times the stated noise%s. Whether something is missing from the",
+                                     "model or its parameters were not found cannot be told: its emulator is not good",
+                                     "enough."), short(remainder$ratio),
+                               if (length(answers)) paste(" and answers to", listed(answers)) else "")))
+  }
   if (length(answers) && !remainder$large) {
     return(unexplained(sprintf(paste("The error is of the size of the stated noise (%s times), but a part of it",
                                      "answers to %s: something small is missing from the model, or its state at the",
@@ -204,8 +206,9 @@ unjudged_sentence <- function(fit) {
           gsub("not trusted: ", "", fit$trust$verdict), remedy)
 }
 
-# Only where the size of the error itself says that something is missing.
+# Only where the size of the error itself says that something is missing, and not that the parameters were not found.
 missing_sentence <- function(upgrade) {
+  if (unjudged(upgrade)) return(NULL)
   left <- remaining_error(upgrade$models[[1]], upgrade$measurements)
   if (left$large)
     sprintf("That something is missing is plain: the error is %s times the stated noise. What it is stays open.",
@@ -229,8 +232,8 @@ trust_sentence <- function(upgrade, best) {
   if (base$trusted && best$trusted) {
     open <- open_trials(upgrade)
     return(paste0("The numbers behind this can be trusted: the sampler passed its own checks.",
-                  if (NROW(open)) sprintf(" Not so those of %s, which was not adopted: see what to inspect next.",
-                                          listed(open$mechanism))))
+                  if (NROW(open)) sprintf(" Not so those of %s, which %s not adopted: see what to inspect next.",
+                                          listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
   }
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
   why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
@@ -310,11 +313,15 @@ step_sentence <- function(upgrade, model) {
   gain <- model$held_out_gain
   sprintf("With %s the typical error %s in calibration%s%s.", model$mechanism, told("calibrate"),
           if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s", told("validate"),
-                                                    if (gain$improves) "a gain beyond its uncertainty"
-                                                    else if (gain$mean > 0) "a gain within its uncertainty"
-                                                    else "no gain"),
+                                                    if (gain$mean > 0) gain_words(gain) else "no gain"),
           if (isTRUE(model$gain_beside_later$improves))
-            "; beside what was adopted later, held-out data gain by it beyond the gain's uncertainty" else "")
+            paste0("; beside what was adopted later, held-out data gain by it: ", gain_words(model$gain_beside_later))
+          else "")
+}
+
+gain_words <- function(gain) {
+  if (gain$standard_error > 0) sprintf("a gain of %s standard errors", short(gain$mean / gain$standard_error))
+  else "a gain"
 }
 
 doubt_sentence <- function(model) {
@@ -352,7 +359,8 @@ nearest_run_sentence <- function(upgrade) {
   nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)), nearest_run, 0, base$fit))
   if (nearest > 0.9 * base$scores$calibrate[["rmse"]]) return(NULL)
   sprintf(paste("A part of this fall is not due to the change: the base model has a run that errs by only %s in",
-                "calibration. Calibrated it errs by more, as a part of its error was left to the discrepancy."),
+                "calibration, and may have better ones. Calibrated it errs by more, as a part of its error was left to",
+                "the discrepancy."),
           with_unit(short(nearest), upgrade$measurements$unit))
 }
 
@@ -382,18 +390,24 @@ narrow_words <- function(upgrade) {
 
 remaining_sentences <- function(upgrade) {
   answers <- significant_conditions(last_attribution(upgrade))
-  rows <- parameter_rows(upgrade$models[[length(upgrade$models)]]$fit)
+  model <- upgrade$models[[length(upgrade$models)]]
+  rows <- parameter_rows(model$fit)
   edge <- rows$label[rows$at_edge]
-  last <- remaining_error(upgrade$models[[length(upgrade$models)]], upgrade$measurements)
+  moved <- step_moved_words(model)
+  last <- remaining_error(model, upgrade$measurements)
   c(if (length(answers)) sprintf("The remaining error answers to %s.",
                                  listed(answers)) else "The remaining error answers to no boundary condition.",
     if (last$large) sprintf("In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
                             if (is.null(last$pattern))
-                              ": either the stated noise is too small, or something else is missing."
+                              paste0(": either the stated noise is too small, or something else is missing",
+                                     if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
                             else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    reach_sentence(upgrade$models[[length(upgrade$models)]]$fit) %||% if (last$large)
+    reach_sentence(model$fit) %||% if (last$large)
       "The parameters may have taken the place of what is missing: do not read their values as physical.",
-    vapply(group_words(upgrade$models[[length(upgrade$models)]]$attribution), paste0, "", "."),
+    if (!is.null(moved))
+      sprintf("With finer steps of the simulator %s: do not read %s as physical.", moved,
+              if (length(step_moved(model)) > 1) "these values" else "this value"),
+    vapply(group_words(model$attribution), paste0, "", "."),
     if (length(edge))
       sprintf(paste("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these",
                     "parameters make up for something else."),

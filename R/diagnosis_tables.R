@@ -5,6 +5,18 @@ parameter_labels <- function(fit, names) {
   rows$label[match(names, rows$name)]
 }
 
+# Parameters that shorter steps would move beyond their uncertainty.
+step_moved <- function(model) {
+  moved <- do.call(c, c(list(numeric()), lapply(unname(model$steps), `[[`, "moved")))
+  parameter_labels(model$fit, unique(names(moved)[abs(moved) > largest_move]))
+}
+
+step_moved_words <- function(model) {
+  moved <- step_moved(model)
+  if (length(moved)) sprintf("%s %s by more than a standard deviation", listed(moved),
+                             if (length(moved) > 1) "move" else "moves")
+}
+
 # The parameters that each adopted mechanism brought, as the last model sees them.
 changes_table <- function(upgrade) {
   models <- upgrade$models

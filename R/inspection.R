@@ -6,6 +6,7 @@ upgrade_inspections <- function(upgrade) {
   adopted <- adopted_models(upgrade)
   told <- c(unlist(lapply(upgrade$models, function(m) trust_inspections(m$fit, m$name))),
             held_out_inspection(last, upgrade$measurements),
+            shorter_step_inspection(last),
             unlist(lapply(adopted, function(m) mechanism_inspections(upgrade, m))),
             nearest_inspection(upgrade),
             undecided_inspections(upgrade),
@@ -141,9 +142,15 @@ mechanism_inspections <- function(upgrade, model) {
     step_inspection(upgrade, model))
 }
 
-# A time constant about as short as the record's step: the simulator's own steps may be what is seen.
+# Where what a mechanism mends may be the simulator's own steps: as they were seen or, where they could not be, if it
+# brings a time constant about as short as the record's step.
 step_inspection <- function(upgrade, model) {
-  if (is_several(upgrade$measurements)) return(NULL)
+  parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
+  if (!is.null(step_doubt(parent, model, upgrade$measurements))) {
+    return(c(step = sprintf(paste("Let the simulator run with finer steps before you believe in %s: what it mends is",
+                                  "not clearly more than what its steps err by."), model$mechanism)))
+  }
+  if (is_several(upgrade$measurements) || !all(is.na(step_error(parent)))) return(NULL)
   brought <- upgrade$candidates[upgrade$candidates$from == model$parent &
                                   upgrade$candidates$mechanism == model$mechanism, "parameters"][[1]]
   hours <- c(s = 1 / 3600, min = 1 / 60, h = 1, d = 24)[brought$unit]
@@ -152,6 +159,16 @@ step_inspection <- function(upgrade, model) {
   c(step = sprintf(paste("The time that %s brings (%s) is about a step of the record: a simulator whose own steps are",
                          "coarse errs alike. Run it with finer ones before you believe in %s."), model$mechanism,
                    listed(brought$name[short]), model$mechanism))
+}
+
+# What the last model's own steps do to what remains, and to its parameters.
+shorter_step_inspection <- function(last) {
+  error <- max(0, step_error(last), na.rm = TRUE)
+  moved <- step_moved_words(last)
+  if (error <= largest_error_ratio && is.null(moved)) return(NULL)
+  c(steps = paste0("With steps a quarter as long the simulator's output changes by ", short(error),
+                   " of the noise beyond what its parameters can take up",
+                   if (!is.null(moved)) paste0(", and ", moved), ": let it run with finer ones."))
 }
 
 # What would tell two mechanisms apart: conditions that only one answers to, or what each asks to be found on site.
@@ -214,7 +231,9 @@ site_inspection <- function(upgrade, model) {
   brought <- table[table$mechanism == model$mechanism, ]
   if (!NROW(brought)) return(NULL)
   between <- sub(" to ", " and ", brought[["95 % interval"]], fixed = TRUE)
-  hidden <- if (!is.null(reach_sentence(last_fit(upgrade)))) " What remains of the error may be hidden in these values."
+  last <- upgrade$models[[length(upgrade$models)]]
+  hidden <- if (!is.null(reach_sentence(last$fit))) " What remains of the error may be hidden in these values."
+  if (any(brought$parameter %in% step_moved(last))) hidden <- paste(hidden, "Finer steps would move these values.")
   values <- listed(sprintf("%s lies between %s", brought$parameter, with_unit(between, brought$unit)))
   c(site = sprintf("If %s is the cause, %s: check that on site.%s", model$mechanism, values, hidden %||% ""))
 }
@@ -237,7 +256,7 @@ nearest_trial <- function(upgrade) {
 
 nearest_inspection <- function(upgrade) {
   best <- nearest_trial(upgrade)
-  if (!NROW(best)) return(NULL)
+  if (!NROW(best) || unjudged(upgrade) || best$upper95 - best$lower95 > too_rough) return(NULL)
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf("Not decided is %s (odds of %s%s): a longer record%s would decide it%s.",
@@ -250,7 +269,6 @@ nearest_inspection <- function(upgrade) {
 }
 
 clearly_fallen <- 0.8  # times the simulation's error before: from there down a fall is told, whatever the evidence
-too_rough <- 10        # decades between the ends of an interval from which odds say nothing
 
 # Mechanisms of which the numbers are too rough to rule them out.
 undecided_inspections <- function(upgrade) {

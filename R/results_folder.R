@@ -108,7 +108,9 @@ result_list.amiss_upgrade <- function(x) {
       list(log10_evidence = fit$log_evidence / log(10), log10_evidence_interval = fit$interval / log(10),
            trusted = fit$trust$trusted, trust = fit$trust$verdict, verdict = model$verdict,
            doubts = as.list(model$doubts), confounded_with = as.list(model$confounded_with),
-           held_out_gain = model$held_out_gain[c("mean", "standard_error")]),
+           held_out_gain = model$held_out_gain[c("mean", "standard_error")],
+           gain_beside_later = model$gain_beside_later[c("mean", "standard_error")]),
+      if (!several) list(step_error = model$steps[[1]]$error),
       checked(fit), list(refinements = fit$rounds), if (!several) list(reach = as.list(fit$reach)),
       scored(model$scores),
       list(parameters = table_rows(parameter_table(fit)), attribution = answers(model$attribution)))
@@ -120,6 +122,7 @@ result_list.amiss_upgrade <- function(x) {
     c(list(name = name, target = own$fit$measurements$target, unit = own$fit$measurements$unit), made_with(own$fit),
       checked(own$fit), list(reach = as.list(own$fit$reach)), scored(own$scores),
       list(held_out_gain = model$records[[name]]$held_out_gain[c("mean", "standard_error")],
+           step_error = model$steps[[name]]$error,
            attribution = answers(own$attribution)))
   }
   candidate_list <- function(i) {

@@ -7,6 +7,11 @@
 #' edit as `base`, so that edits stack in any order. Make every [mechanism()] of a function in this way: an edit that
 #' writes the model anew would lose what was adopted before it.
 #'
+#' A simulator that integrates in steps should take their length from `info$step_h`: [upgrade_model()] then runs it
+#' with rows a half and a quarter as long, its drivers held. Where its own steps err by a third of what a mechanism
+#' mends, that is not named; parameters that finer steps would move are told. One with steps of its own, or an output
+#' that does not settle so, is taken at its word: see that half the step changes its output by little beside the noise.
+#'
 #' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with the columns of `boundary`,
 #'   one row per interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is
 #'   given a list of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment`
@@ -318,18 +323,25 @@ simulate_measured <- function(simulator, values, measurements, uses, threads, ca
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
   count_runs(nrow(values))
   out <- matrix(NaN, length(measurements$y), nrow(values))
-  wanted <- which(measurements$block %in% rows)
-  segments <- unique(measurements$segment[rows])
-  over <- if (length(segments) > 1) paste0(" (", length(segments), " segments)")
-  counted(paste0("runs of the simulator", over), length(segments) * nrow(values), for (i in seq_along(segments)) {
-    within <- which(measurements$raw$segment == segments[i])
-    within <- within[within <= max(intersect(within, wanted))]  # what comes later changes nothing
+  pieces <- simulated_rows(measurements, rows)
+  over <- if (length(pieces) > 1) paste0(" (", length(pieces), " segments)")
+  counted(paste0("runs of the simulator", over), length(pieces) * nrow(values), for (i in seq_along(pieces)) {
+    within <- pieces[[i]]
     fine <- simulate_rows(simulator, values, measurements$raw, within, threads, call)
     averaged <- block_means(fine, measurements$block[within], measurements$per_step)
     out[as.integer(rownames(averaged)), ] <- averaged
     piece_done(i * nrow(values))
   })
   out[rows, , drop = FALSE]
+}
+
+# The rows of the raw record, segment by segment, that a simulator runs over to give these rows of the averaged one.
+simulated_rows <- function(measurements, rows) {
+  wanted <- which(measurements$block %in% rows)
+  lapply(unique(measurements$segment[rows]), function(segment) {
+    within <- which(measurements$raw$segment == segment)
+    within[within <= max(intersect(within, wanted))]  # what comes later changes nothing
+  })
 }
 
 check_driver_columns <- function(simulator, measurements, call) {

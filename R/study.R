@@ -51,8 +51,10 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' likely cause stands here too), `gain` (`log10_bf`, `interval` and the scores of the first and the last model),
 #' `stopped_because`, `candidates` (as in [upgrade_model()]) and `models`: of each `name`, `parent`, `mechanism`, `N`
 #' rows, `M` runs, `Q` basis vectors, its evidence, `trusted` and why (`trust`), `verdict`, `doubts`, `confounded_with`,
-#' `held_out_gain`, what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`), `refinements`,
-#' `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of the command
+#' `held_out_gain`, `gain_beside_later`, `step_error` (what shorter steps of the simulator change, as in
+#' [upgrade_model()]), what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`),
+#' `refinements`, `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of
+#' the command
 #' `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
 #'
 #' @param path The YAML file.

@@ -90,6 +90,8 @@ added_parameters <- function(fit, parent) {
   table[!table$name %in% names(drawn_parameters(parent)), ]
 }
 
+too_rough <- 10  # decades between the ends of an interval from which odds say nothing
+
 # The row of highest evidence among the mechanisms that may be adopted: they were calibrated (responses alone decide
 # nothing), and the simulation's own error does not rise with them. No row if there is none.
 best_trial <- function(table) {

@@ -8,8 +8,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' (simulated, trained, calibrated); the one of highest evidence is adopted if its log10 Bayes factor is at least
 #' `decisive` (2) with its interval above zero (the word *decisive* asks for an interval above 2); and the loop begins
 #' again with the extended model. A mechanism with which the simulation's own error in calibration rises (by more than 2
-#' %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. Held-out rows only measure; they
-#' decide nothing.
+#' %) is not adopted, whatever its evidence: what it gains, the discrepancy gains. Held-out rows decide nothing of what
+#' is adopted; whether it is called named, likely or a stand-in hangs on them too.
 #'
 #' A few runs of every mechanism, its own parameters over their priors and the others where the posterior of the present
 #' model lies, first show the responses that it adds: four, and two more for each further parameter. The evidence for
@@ -46,7 +46,8 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #' @param runs Runs with which each model begins: two thirds of them fill the space of its parameters (`refine`; give
 #'   ten for each, below five a warning says so), the others lie where the posterior does. Searches, rounds of
 #'   refinement and checks come on top: with eight mechanisms two to ten thousand runs in all are usual, and fewer first
-#'   runs cost more in the end. The budget is `control$runs_total`.
+#'   runs cost more in the end. The budget is `control$runs_total`; a base model that is hard to emulate may spend all
+#'   of it.
 #' @param control List of options: `max_steps` (3), `refine` (share of the runs that is made where the posterior lies;
 #'   1/3, 0 for none), `rounds` (of refinement of a model where the check by runs asks for it; 8), `decisive` (log10
 #'   Bayes factor that a mechanism must earn, with its interval above zero; 2), `runs_total` (budget: once so many runs
@@ -66,11 +67,13 @@ upgrade_control <- list(max_steps = 3, decisive = 2, runs_total = NULL, refine =
 #'   has a `verdict` of its own: `"named"`; `"likely"`, where something of its `doubts` speaks against it; or
 #'   `"stand-in"`, where data held out do not gain by it (`held_out_gain`, with its standard error), nor beside what was
 #'   adopted later (`gain_beside_later`): then it takes the place of something else.
-#'   `held_out_rivals` names mechanisms that could have been adopted in its place and with
-#'   which data held out are met better. `confounded_with` names parameters that are correlated beyond 0.4 with those
-#'   that it brought: other parts of the model that could do the same. Of several records `fit` is what
-#'   [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each in its
-#'   own unit.
+#'   `steps` has, of each record, what shorter steps of the simulator change: the RMS (`error`, in the target's unit) of
+#'   what the parameters cannot take up, and by how many of its standard deviations each would move (`moved`); `NULL`
+#'   where that is not known ([function_simulator()]). `held_out_rivals` names mechanisms that could have been adopted
+#'   in its place and with which data held out are met better. `confounded_with` names parameters that are correlated
+#'   beyond 0.4 with those that it brought: other parts of the model that could do the same. Of several records `fit` is
+#'   what [calibrate_jointly()] gives, and `records` of a model has `prediction`, `scores` and `held_out_gain` of each
+#'   in its own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own: `vignette("algorithm", "amiss")`,
 #'   *Naming*.
 #' @examples
@@ -282,8 +285,9 @@ stop_reason <- function(table, attribution, decisive) {
   } else if (best$log10_bf < decisive) {
     sprintf("no mechanism is decisive (%s; %s or more and an interval above zero are needed)", found, format(decisive))
   } else {
-    sprintf("the evidence for the best mechanism is too uncertain (%s, interval from %.1f to %.1f)", found,
-            best$lower95, best$upper95)
+    sprintf("the evidence for the best mechanism is too uncertain (%s)",
+            if (best$upper95 - best$lower95 > too_rough) paste0("best: ", best$mechanism)
+            else sprintf("%s, interval from %.1f to %.1f", found, best$lower95, best$upper95))
   }
   if (length(significant)) paste0(why, "; what answers to ", paste(significant, collapse = ", "),
                                   " remains unexplained") else paste0(why, " and no boundary condition is significant")
@@ -312,6 +316,10 @@ upgrade_gain <- function(models) {
 }
 
 adopted_models <- function(upgrade) upgrade$models[-1]
+
+# Where runs of the simulator refute the emulator of the model from which all others start, evidence compares
+# emulators, not simulators.
+unjudged <- function(upgrade) isFALSE(upgrade$models[[1]]$fit$check$passed)
 
 # Mechanisms not adopted whose last trial is a coarse calibration that runs refute, of which the interval reaches beyond
 # what was adopted at its step, or beyond what adoption asks for. Where nothing is left to explain, none.

@@ -3,12 +3,17 @@
 risen_error <- 1.02   # times the simulation's error in calibration before: from there it counts as risen
 fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the evidence
 
-# Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism. A mechanism
+# Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism, and `steps`
+# (step_effect() of each record) of all. A mechanism
 # is a stand-in where data held out do not gain by it, nor beside what was adopted later; it is named where nothing
 # speaks against it, and likely otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
   remains <- much_remains(models, measurements)
   inside <- models[[length(models)]]$scores$validate[["coverage95"]]
+  models <- lapply(models, function(model) {
+    model$steps <- lapply(record_fits(model$fit), step_effect, threads)
+    model
+  })
   for (k in seq_along(models)[-1]) {
     model <- models[[k]]
     parent <- models[[k - 1]]
@@ -28,6 +33,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (row$lower95 < control$decisive + few_runs_error && from_few_runs(model$fit))
         "the runs over the priors are too few for evidence of that size",
+      step_doubt(parent, model, measurements),
       if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),

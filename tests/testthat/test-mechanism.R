@@ -145,6 +145,10 @@ test_that("a mechanism by which held-out data gain only beside what was adopted 
   expect_true(first$gain_beside_later$improves)
   expect_false(first$verdict == "stand-in")
   expect_null(upgrade$models[[3]]$gain_beside_later)
+  listed <- amiss:::result_list(upgrade)$models
+  expect_identical(listed[[2]]$gain_beside_later, first$gain_beside_later[c("mean", "standard_error")])
+  expect_null(listed[[3]]$gain_beside_later)
+  expect_true("gain_beside_later" %in% names(listed[[3]]))
   expect_match(summary(upgrade)$mechanisms[[1]]$brought, "no gain; beside what was adopted later, held-out data gain")
   # An error there loses nothing of the loop.
   settings <- list(spent = function() FALSE)

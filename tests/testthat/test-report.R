@@ -61,7 +61,7 @@ test_that("each step tells what it brought, and what could do the same", {
   told <- summary(small_upgrade())$change
   expect_match(told[1], "^sun \\(named\\), driven by Gv: Sun enters")
   expect_match(told,
-               "With sun the typical error falls from .* in calibration; on held-out data it falls .*, a gain beyond",
+               "With sun the typical error falls from .* in calibration; on held-out data it falls .*, a gain of",
                all = FALSE)
   upgrade <- small_upgrade()
   upgrade$models[[2]]$confounded_with <- "gain"

@@ -1,0 +1,115 @@
+# What a simulator's own steps err by: its output at the posterior's centre where every row of the drivers is given as
+# several shorter ones, against that of the rows as they are.
+
+shorter_steps <- c(2, 4)  # times
+largest_step_share <- 1 / 3  # of what a mechanism mends: from there its cause may be the steps
+negligible_step <- 0.1  # of the noise
+largest_move <- 1  # of a parameter, in standard deviations: beyond it its interval is not to be believed
+
+# What steps a quarter as long change in calibration: list(error, moved), the RMS in the target's unit of what the
+# parameters cannot take up, and by how many of its standard deviations each would move. NULL where that is not known:
+# of runs that are given, of a simulator whose steps are not those of its rows, or one whose output does not settle as
+# they get shorter.
+step_effect <- function(fit, threads) {
+  simulator <- fit$emulator$simulator
+  if (!follows_step(simulator)) return(NULL)
+  values <- unit_to_values(stats::pnorm(matrix(posterior_centre(fit), 1)), fit$emulator$parameters)
+  m <- fit$measurements
+  changes <- tryCatch(suppress_run_warnings(suppressWarnings({
+    coarse <- simulate_measured(simulator, values, m, "calibrate", threads)[, 1]
+    lapply(shorter_steps, function(times) simulate_in_steps(simulator, values, m, times, threads) - coarse)
+  })), error = function(e) NULL)
+  if (is.null(changes) || !all(is.finite(unlist(changes)))) return(NULL)
+  # A simulator's value may be the mean of a row or that at its end: what agrees better.
+  as_meant <- which.min(apply(changes[[2]], 2, rms))
+  half <- changes[[1]][, as_meant]
+  quarter <- changes[[2]][, as_meant]
+  settles <- rms(quarter - half) <= 0.75 * rms(half)  # a half in a scheme of first order
+  if (settles || rms(quarter) < negligible_step * m$noise_sd) taken_up(fit, quarter)
+}
+
+# A change of the output, seen by least squares under the priors, white noise and the emulator's slopes.
+taken_up <- function(fit, change) {
+  centre <- posterior_centre(fit)
+  p <- length(centre)
+  by <- 0.05  # standard deviations of the prior
+  coefficients <- function(x) predict_emulator_(fit$emulator$processes, x)$mean
+  around <- matrix(centre, p, p, byrow = TRUE)
+  slopes <- fit$emulator$basis$vectors %*% t(coefficients(around + diag(by, p)) - coefficients(around - diag(by, p))) /
+    (2 * by)
+  weight <- 1 / fit$measurements$noise_sd^2
+  move <- solve(weight * crossprod(slopes) + diag(p), weight * crossprod(slopes, change))[, 1]
+  sd <- sqrt(colSums(fit$weights * sweep(to_normal(posterior_unit(fit)), 2, centre)^2))
+  list(error = rms(change - slopes %*% move), moved = stats::setNames(move / sd, names(fit$emulator$parameters)))
+}
+
+rms <- function(x) sqrt(mean(x^2))
+
+# Whether the steps of a simulator get shorter with the rows of its drivers: those of a function do that reads their
+# length, itself or by a function that it calls. A zone() has steps of its own.
+follows_step <- function(simulator) {
+  if (!inherits(simulator, "amiss_function_simulator")) return(FALSE)
+  while (!is.null(simulator$base)) simulator <- simulator$base
+  reads_step(simulator$f)
+}
+
+# Functions of other packages are not looked into.
+reads_step <- function(f, known = list()) {
+  names <- all.names(body(f))
+  if ("step_h" %in% names) return(TRUE)
+  called <- lapply(unique(names), get0, envir = environment(f), mode = "function")
+  own <- Filter(function(g) {
+    is.function(g) && !is.primitive(g) &&
+      (!isNamespace(environment(g)) || identical(environment(g), topenv(environment(f))))
+  }, called)
+  known <- c(known, f)
+  for (g in own) if (!any(vapply(known, identical, NA, g)) && reads_step(g, known)) return(TRUE)
+  FALSE
+}
+
+# One run at the rows used in calibration with every row of the drivers given as several shorter ones: two columns, the
+# means of those and the last of them, each averaged like the measurements.
+simulate_in_steps <- function(simulator, values, measurements, times, threads) {
+  rows <- which(measurements$use == "calibrate" & !is.na(measurements$y))
+  out <- matrix(NaN, length(measurements$y), 2)
+  count_runs(1)
+  for (within in simulated_rows(measurements, rows)) {
+    raw <- shorter_rows(measurements$raw, within, times)
+    run <- matrix(simulate_rows(simulator, values, raw, seq_along(raw$y), threads, rlang::caller_env()), times)
+    averaged <- block_means(cbind(colMeans(run), run[times, ]), measurements$block[within], measurements$per_step)
+    out[as.integer(rownames(averaged)), ] <- averaged
+  }
+  out[rows, , drop = FALSE]
+}
+
+# These rows of a raw record, each as several that share its length, about its time.
+shorter_rows <- function(raw, rows, times) {
+  each <- rep(rows, each = times)
+  offset <- (rep_len(seq_len(times), length(each)) - (times + 1) / 2) / times * raw$step_h
+  list(drivers = raw$drivers[each, , drop = FALSE], use = raw$use[each], y = raw$y[each], segment = raw$segment[each],
+       step_h = raw$step_h / times,
+       time = raw$time[each] + offset * if (inherits(raw$time, "POSIXct")) 3600 else 1)
+}
+
+# ---- what it says
+
+# In words, where what a model's extension mends is not clearly more than what its parent's own steps err by.
+step_doubt <- function(parent, model, measurements) {
+  known <- !is.na(step_error(parent))
+  squares <- function(model) {
+    vapply(each_view(model, measurements), function(view) {
+      (view$model$scores$calibrate[["rmse"]] / view$measurements$noise_sd)^2
+    }, 0)
+  }
+  error <- sqrt(sum(step_error(parent)^2, na.rm = TRUE))
+  mended <- sqrt(max(0, sum((squares(parent) - squares(model))[known])))
+  if (any(known) && error >= largest_step_share * mended)
+    sprintf("shorter steps of the simulator change %s of the noise where it mends %s", short(error), short(mended))
+}
+
+# Of each record what shorter steps change, over the noise; NA where that is not known.
+step_error <- function(model) {
+  fits <- record_fits(model$fit)
+  unlist(Map(function(effect, fit) (effect$error %||% NA_real_) / fit$measurements$noise_sd,
+             model$steps %||% vector("list", length(fits)), fits))
+}
