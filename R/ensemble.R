@@ -336,7 +336,10 @@ new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, reg
     if (left < max(5, length(parameters) + 2)) {
       abort_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable",
                           "run{?s} {?is/are} too few."),
-                    x = first, i = "Find out why the simulator fails there, or narrow the priors."), call = call)
+                    x = first,
+                    i = if (left) "Find out why the simulator fails there, or narrow the priors."
+                        else "Every run failed: look for a mistake in the simulator before you change its priors."),
+                  call = call)
     }
     warn_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left",
                        "out."), i = first))

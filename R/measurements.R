@@ -124,17 +124,21 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   columns <- boundary_columns(drivers, terms)
   coarse <- average_rows(raw, average, columns$values)
   x <- c(list(values = coarse$boundary), columns[c("names", "condition")])
+  if (sum(coarse$use == "calibrate" & !is.na(coarse$y)) < 20) {
+    abort_input(c(paste("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after",
+                        "averaging and warm-up; at least 20 are needed."),
+                  i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
+  }
+  if (warmup > 0 && !any(use == "warmup")) {
+    warn_input(c("{.arg warmup} is {warmup} h, shorter than a step of {signif(grid$step, 4)} h: no row warms up.",
+                 i = "Give it in hours."))
+  }
   constant <- constant_conditions(x, coarse$use == "calibrate")
   if (length(constant)) {
     warn_input(c(paste("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do} not vary over the",
                        "calibration rows and {?is/are} left out of the analysis."),
                  i = "A condition that is constant cannot be told from the mean."))
     x <- x_keep(x, setdiff(x$names, constant))
-  }
-  if (sum(coarse$use == "calibrate" & !is.na(coarse$y)) < 20) {
-    abort_input(c(paste("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after",
-                        "averaging and warm-up; at least 20 are needed."),
-                  i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
   }
   noise <- noise_level(noise_sd, coarse, raw$y)
   check_target_values(y, target)
@@ -158,7 +162,14 @@ boundary_terms <- function(boundary, call = rlang::caller_env()) {
               "Give a formula such as {.code ~ Te + circular(Wd)}.", call = call)
   is_circular <- grepl("^circular\\(.*\\)$", labels)
   names <- trimws(sub("^circular\\((.*)\\)$", "\\1", labels))
-  if (inherits(boundary, "formula")) names <- gsub("^`|`$", "", names)
+  if (inherits(boundary, "formula")) {
+    computed <- names[grepl("[^`]", gsub("`[^`]*`", "", names)) & !names == make.names(names)]
+    if (length(computed)) {
+      abort_input(c("{.arg boundary} names columns of the data; {.code {computed[1]}} is computed from them.",
+                    i = "Make it a column first. Only {.code circular()} marks a column, of degrees."), call = call)
+    }
+    names <- gsub("^`|`$", "", names)
+  }
   list(name = names, circular = is_circular)
 }
 

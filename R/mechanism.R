@@ -46,7 +46,7 @@ catalogue <- function(...) {
   if (!all(vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))) {
     other <- which(!vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))[1]
     abort_input(c("Every entry of a catalogue must be a mechanism; number {other} is {seen(mechanisms[[other]])}.",
-                  i = "Make each with {.fun mechanism}."))
+                  i = "Make each with {.fun mechanism}; of a list of them {.code do.call(catalogue, list)} makes one."))
   }
   names(mechanisms) <- vapply(mechanisms, `[[`, "", "name")
   if (anyDuplicated(names(mechanisms)))

@@ -285,10 +285,19 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
     first <- as.integer(names(stopped)[1])
     warn_input(c("{length(stopped)} of {nrow(values)} run{?s} of {.val {simulator$name}} stopped with an error.",
                  x = "Run {first} at {point_words(values[first, , drop = FALSE])}: {stopped[[1]]}",
+                 i = subscript_hint(stopped[[1]]),
                  i = paste("It was given the parameters {.field {colnames(values)}} and the columns",
                            "{.field {colnames(drivers)}}.")))
   }
   runs
+}
+
+# What to write where R says that something is not there, or not to be had in this way.
+subscript_hint <- function(message) {
+  if (grepl("subscript out of bounds", message, fixed = TRUE))
+    "A column of the drivers is there only if {.arg boundary} names it, a parameter only if {.fun free} declares it."
+  else if (grepl("$ operator", message, fixed = TRUE))
+    "Values are a vector and drivers a matrix: write {.code values[[\"k\"]]} and {.code drivers[, \"Te\"]}."
 }
 
 check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()) {

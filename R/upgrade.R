@@ -111,7 +111,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = 150, contro
   simulator <- started$simulator
   measurements <- started$measurements
   for (m in each_record(measurements)) check_target_varies(m, used_rows(m, "calibrate"))
-  check_object(catalogue, "amiss_catalogue", "catalogue")
+  check_object(catalogue, "amiss_catalogue", "catalogue", "Make it with {.fun catalogue}.")
   check_given_models(simulator, catalogue, measurements)
   control <- fill_upgrade_control(control, measurements)
   for (m in each_record(measurements)) check_runs_asked(runs, m, control$rounds, control$refine)

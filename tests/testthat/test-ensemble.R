@@ -221,3 +221,9 @@ test_that("runs are added where the posterior lies, and the emulator is better t
                                                 noise_sd = 0.02), runs = 12, seed = 2)
   expect_error(refine_ensemble(shorter, fit), "72 rows.*60", class = "amiss_error_input")
 })
+
+test_that("where every run fails the simulator is asked for, not the priors", {
+  fails <- function_simulator(function(values, drivers) stop("no"), free("k", uniform(0, 1)), boundary = "Te")
+  expect_error(suppressWarnings(simulate_design(fails, linear_measurements(), runs = 20, seed = 1)),
+               "Every run failed: look for a mistake in the simulator", class = "amiss_error_input")
+})

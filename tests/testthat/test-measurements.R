@@ -169,3 +169,19 @@ test_that("rows without a measurement are told, and not counted as data", {
   expect_match(told, "65 calibrate, 19 validate, 10 warm up")
   expect_match(told, "6 without a measurement, left out")
 })
+
+test_that("a formula names columns, and does not compute them", {
+  data <- linear_data()
+  expect_error(linear_measurements(data, boundary = ~ log(Te) + Gv), "`log\\(Te\\)` is computed from them",
+               class = "amiss_error_input")
+  expect_error(linear_measurements(data, boundary = ~ Te * Gv), "`Te:Gv` is computed", class = "amiss_error_input")
+  names(data)[2] <- "Te (out)"
+  expect_identical(linear_measurements(data, boundary = ~ `Te (out)` + Gv)$conditions, c("Te (out)", "Gv"))
+})
+
+test_that("a warm-up of less than a step, or of the whole record, is told as such", {
+  expect_warning(linear_measurements(warmup = 0.5), "`warmup` is 0.5 h, shorter than a step of 1 h",
+                 class = "amiss_warning_input")
+  expect_no_warning(expect_error(linear_measurements(warmup = 1000), "Only 0 rows .* warm-up",
+                                 class = "amiss_error_input"))
+})

@@ -160,3 +160,9 @@ test_that("a mechanism by which held-out data gain only beside what was adopted 
   upgrade$models[[2]]$gain_beside_later <- NULL
   expect_identical(rejudged(upgrade)$models[[2]]$verdict, "stand-in")
 })
+
+test_that("a list is no catalogue, and how it becomes one is told", {
+  expect_error(catalogue(list()), "do.call\\(catalogue, list\\)", class = "amiss_error_input")
+  expect_error(upgrade_model(linear_simulator(), linear_measurements(), list()), "Make it with `catalogue\\(\\)`",
+               class = "amiss_error_input")
+})

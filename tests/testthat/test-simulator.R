@@ -133,3 +133,12 @@ test_that("a run that returns NA throughout has failed, and what the function wa
                  class = "amiss_warning_input")
   expect_error(runs(function(values, drivers) rep(NA, 4)), "5 numbers were expected", class = "amiss_error_input")
 })
+
+test_that("a subscript that fails says what to write", {
+  run <- function(f) simulate_runs(function_simulator(f, free("k", uniform(0, 1)), boundary = "Te"), cbind(k = 0.5),
+                                   cbind(Te = 1:3), step_h = 1)
+  expect_warning(run(function(values, drivers) drivers[, "Gv"]), "only if `boundary` names it")
+  expect_warning(run(function(values, drivers) values[["h"]] * drivers[, "Te"]), "a parameter only if `free\\(\\)`")
+  expect_warning(run(function(values, drivers) values$k * drivers[, "Te"]), "`values\\[\\[\"k\"\\]\\]`")
+  expect_warning(run(function(values, drivers) drivers$Te), "drivers a matrix")
+})
