@@ -106,6 +106,9 @@ test_that("a candidate that is near is named with what would decide it", {
   upgrade$catalogue$sun$boundary <- character()
   upgrade$candidates$error_ratio <- 0.9
   expect_match(about(inspected(upgrade), "nearest"), "10 to 1 in favour\\): a longer record would decide it")
+  wide <- upgrade
+  wide$candidates$lower95 <- -20
+  expect_length(about(inspected(wide), "nearest"), 0)
   upgrade$candidates$probability <- c(0.04, 0.01)
   expect_length(about(inspected(upgrade), "nearest"), 0)
 })

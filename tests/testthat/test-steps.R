@@ -54,6 +54,13 @@ test_that("what shorter steps change is what an own run with them changes, but f
   expect_lt(effect_of(store(20))$error, 0.2 * effect$error)
 })
 
+test_that("a parameter of which the record says nothing takes up nothing", {
+  simulator <- with_parameters(store(2), free("idle", uniform(0, 1)))
+  effect <- effect_of(simulator)
+  expect_equal(effect$error, effect_of(store(2))$error, tolerance = 0.05)
+  expect_lt(abs(effect$moved[["idle"]]), 0.5)  # the emulator's slope is not quite zero
+})
+
 test_that("a value for each row may be the mean of the row or that at its end", {
   mean_of_row <- function(values, drivers, info) {
     parts <- 40
@@ -82,6 +89,9 @@ test_that("nothing is said of steps that are not those of the rows, or that cann
   })
   expect_no_warning(effect <- effect_of(fails))
   expect_null(effect)
+  # One that does not look at how many rows it is given.
+  deaf <- function(values, drivers, info) store_level(values, store_rain[1:120], info$step_h, 2)
+  expect_null(effect_of(store(1, deaf)))
   expect_null(amiss:::step_effect(list(emulator = list(simulator = NULL)), threads = 1))  # runs that are given
 })
 

@@ -306,6 +306,11 @@ test_that("the best of what was not adopted is the one of highest evidence, also
   expect_match(reason, "best: sun, log10 Bayes factor 1.2, though the error rises with it;")
   table$error_ratio <- 1
   expect_match(amiss:::stop_reason(table, upgrade$models[[2]]$attribution, 2), "best: sun, log10 Bayes factor 1.2;")
+  # Numbers that say nothing are not given.
+  table$log10_bf <- c(3913, -2)
+  table$lower95 <- -3e7
+  table$upper95 <- 3e7
+  expect_match(amiss:::stop_reason(table, upgrade$models[[2]]$attribution, 2), "too uncertain \\(best: sun\\)")
 })
 
 test_that("where the base model's emulator is refuted, no mechanism is judged and no odds are given", {
@@ -316,8 +321,12 @@ test_that("where the base model's emulator is refuted, no mechanism is judged an
                                      verdict = "not trusted: the emulator's error is 0.64 of the noise")
   told <- summary(open)
   expect_identical(told$verdict, "unexplained")
-  expect_match(told$headline, "cannot be told")
+  expect_match(told$headline, "answers to Gv. Whether something is missing .* were not found cannot be told")
   expect_match(told$tag, "not good enough")
+  expect_no_match(paste(c(told$sure, told$inspect), collapse = " "), "missing is plain|Not decided is")
+  stand_in(remaining_error = function(...) list(ratio = 3, large = TRUE, pattern = NULL))
+  expect_match(summary(open)$remains, "noise is too small, or something else is missing, or the parameters were not",
+               all = FALSE)
   sure <- paste(told$sure, collapse = " ")
   expect_no_match(sure, "odds of|of the probability")
   expect_match(sure, "No odds can be given for or against any mechanism: the emulator's error is 0.64 of the noise")
