@@ -1,7 +1,6 @@
 # What a simulator's own steps err by: its output at the posterior's centre where every row of the drivers is given as
 # several shorter ones, against that of the rows as they are.
 
-shorter_steps <- c(2, 4)  # times
 largest_step_share <- 1 / 3  # of what a mechanism mends: from there its cause may be the steps
 negligible_step <- 0.1  # of the noise
 largest_move <- 1  # of a parameter, in standard deviations: beyond it its interval is not to be believed
@@ -11,21 +10,48 @@ largest_move <- 1  # of a parameter, in standard deviations: beyond it its inter
 # of runs that are given, of a simulator whose steps are not those of its rows, or one whose output does not settle as
 # they get shorter.
 step_effect <- function(fit, threads) {
+  if (!follows_step(fit$emulator$simulator)) return(NULL)
+  change <- tryCatch(suppress_run_warnings(suppressWarnings(step_change(fit, threads))), error = function(e) NULL)
+  if (!is.null(change)) taken_up(fit, change)
+}
+
+# What steps a quarter as long change in the output at the posterior's centre, or NULL.
+step_change <- function(fit, threads) {
   simulator <- fit$emulator$simulator
-  if (!follows_step(simulator)) return(NULL)
-  values <- unit_to_values(stats::pnorm(matrix(posterior_centre(fit), 1)), fit$emulator$parameters)
   m <- fit$measurements
-  changes <- tryCatch(suppress_run_warnings(suppressWarnings({
-    coarse <- simulate_measured(simulator, values, m, "calibrate", threads)[, 1]
-    lapply(shorter_steps, function(times) simulate_in_steps(simulator, values, m, times, threads) - coarse)
-  })), error = function(e) NULL)
-  if (is.null(changes) || !all(is.finite(unlist(changes)))) return(NULL)
+  values <- unit_to_values(stats::pnorm(matrix(posterior_centre(fit), 1)), fit$emulator$parameters)
+  coarse <- simulate_measured(simulator, values, m, "calibrate", threads)[, 1]
   # A simulator's value may be the mean of a row or that at its end: what agrees better.
-  as_meant <- which.min(apply(changes[[2]], 2, rms))
-  half <- changes[[1]][, as_meant]
-  quarter <- changes[[2]][, as_meant]
-  settles <- rms(quarter - half) <= 0.75 * rms(half)  # a half in a scheme of first order
-  if (settles || rms(quarter) < negligible_step * m$noise_sd) taken_up(fit, quarter)
+  change <- function(times, amounts) {
+    read <- simulate_in_steps(simulator, values, m, times, amounts, threads) - coarse
+    size <- apply(read, 2, rms)
+    if (any(is.finite(size))) read[, which.min(size)] else rep(Inf, length(coarse))
+  }
+  settled <- function(amounts) {
+    half <- change(2, amounts)
+    quarter <- change(4, amounts)
+    settles <- rms(quarter - half) <= 0.75 * rms(half)  # a half in a scheme of first order
+    if (isTRUE(settles || rms(quarter) < negligible_step * m$noise_sd)) quarter
+  }
+  settled(character()) %||% settled(likely_amounts(driver_names(simulator), function(amounts) rms(change(2, amounts))))
+}
+
+# Which drivers are amounts of a row, to be shared among shorter ones, and not what holds over it: those with which the
+# output changes least (`off`), one after the other where that at least halves it.
+likely_amounts <- function(drivers, off) {
+  least <- off(drivers)
+  amounts <- drivers
+  flipped <- function(name) if (name %in% amounts) setdiff(amounts, name) else c(amounts, name)
+  tried <- c(list(character()), as.list(drivers))
+  share <- 1
+  repeat {
+    each <- vapply(tried, off, 0)
+    if (!isTRUE(min(each) < share * least)) return(amounts)
+    least <- min(each)
+    amounts <- tried[[which.min(each)]]
+    tried <- lapply(drivers, flipped)
+    share <- 0.5
+  }
 }
 
 # A change of the output, seen by least squares under the priors, white noise and the emulator's slopes.
@@ -69,12 +95,12 @@ reads_step <- function(f, known = list()) {
 
 # One run at the rows used in calibration with every row of the drivers given as several shorter ones: two columns, the
 # means of those and the last of them, each averaged like the measurements.
-simulate_in_steps <- function(simulator, values, measurements, times, threads) {
+simulate_in_steps <- function(simulator, values, measurements, times, amounts, threads) {
   rows <- which(measurements$use == "calibrate" & !is.na(measurements$y))
   out <- matrix(NaN, length(measurements$y), 2)
   count_runs(1)
   for (within in simulated_rows(measurements, rows)) {
-    raw <- shorter_rows(measurements$raw, within, times)
+    raw <- shorter_rows(measurements$raw, within, times, amounts)
     run <- matrix(simulate_rows(simulator, values, raw, seq_along(raw$y), threads, rlang::caller_env()), times)
     averaged <- block_means(cbind(colMeans(run), run[times, ]), measurements$block[within], measurements$per_step)
     out[as.integer(rownames(averaged)), ] <- averaged
@@ -82,11 +108,13 @@ simulate_in_steps <- function(simulator, values, measurements, times, threads) {
   out[rows, , drop = FALSE]
 }
 
-# These rows of a raw record, each as several that share its length, about its time.
-shorter_rows <- function(raw, rows, times) {
+# These rows of a raw record, each as several that share its length and the `amounts` among its drivers, about its time.
+shorter_rows <- function(raw, rows, times, amounts) {
   each <- rep(rows, each = times)
   offset <- (rep_len(seq_len(times), length(each)) - (times + 1) / 2) / times * raw$step_h
-  list(drivers = raw$drivers[each, , drop = FALSE], use = raw$use[each], y = raw$y[each], segment = raw$segment[each],
+  drivers <- raw$drivers[each, , drop = FALSE]
+  drivers[, amounts] <- drivers[, amounts] / times
+  list(drivers = drivers, use = raw$use[each], y = raw$y[each], segment = raw$segment[each],
        step_h = raw$step_h / times,
        time = raw$time[each] + offset * if (inherits(raw$time, "POSIXct")) 3600 else 1)
 }

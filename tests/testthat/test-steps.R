@@ -69,20 +69,33 @@ test_that("a value for each row may be the mean of the row or that at its end", 
   }
   fit <- store_fit(store(40, mean_of_row))
   k <- amiss:::unit_to_values(stats::pnorm(t(amiss:::posterior_centre(fit))), fit$emulator$parameters)
-  changes <- amiss:::simulate_in_steps(store(40, mean_of_row), k, store_record(), 4, threads = 1) -
+  changes <- amiss:::simulate_in_steps(store(40, mean_of_row), k, store_record(), 4, character(), threads = 1) -
     simulate_runs(store(40, mean_of_row), k, cbind(rain = store_rain[1:120]), 1)[, 1]
   at_end <- sqrt(mean(changes[, 2]^2))
   expect_gt(at_end, 0.05)
   expect_lt(amiss:::step_effect(fit, threads = 1)$error, 0.1 * at_end)
 })
 
+test_that("what is an amount of a row is shared among shorter ones", {
+  amounts <- store(4, function(values, drivers, info) {
+    store_level(values, drivers[, "rain"] / info$step_h, info$step_h, 4)
+  })
+  expect_equal(effect_of(amounts), effect_of(store(4)))
+  # With each driver taken wrongly the output changes by as much as it counts.
+  counts <- c(a = 5, b = 0.1, c = 1, d = 2)
+  off_by <- function(right) function(amounts) {
+    wrong <- union(setdiff(amounts, right), setdiff(right, amounts))
+    0.01 + abs(sum(c(1, 1, -1, 1)[match(wrong, names(counts))] * counts[wrong]))
+  }
+  for (right in list(c("a", "c"), "d", character(), names(counts)))
+    expect_setequal(amiss:::likely_amounts(names(counts), off_by(right)), right)
+})
+
 test_that("nothing is said of steps that are not those of the rows, or that cannot be told", {
   by_row <- store(1, function(values, drivers) store_level(values, drivers[, "rain"], 1, 2))
   expect_null(effect_of(by_row))
-  amounts <- store(1, function(values, drivers, info) {
-    store_level(values, drivers[, "rain"] / info$step_h, info$step_h, 20)
-  })
-  expect_null(effect_of(amounts))
+  unheeded <- store(1, function(values, drivers, info) store_level(values, drivers[, "rain"], 1 + 0 * info$step_h, 2))
+  expect_null(effect_of(unheeded))
   fails <- store(1, function(values, drivers, info) {
     if (info$step_h < 1) stop("no such step")
     store_level(values, drivers[, "rain"], info$step_h, 2)
