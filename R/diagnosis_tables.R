@@ -7,7 +7,7 @@ parameter_labels <- function(fit, names) {
 
 # Parameters that shorter steps would move beyond their uncertainty.
 step_moved <- function(model) {
-  moved <- do.call(c, c(list(numeric()), lapply(unname(model$steps), `[[`, "moved")))
+  moved <- step_moves(model)
   parameter_labels(model$fit, unique(names(moved)[abs(moved) > largest_move]))
 }
 

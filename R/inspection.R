@@ -146,9 +146,9 @@ mechanism_inspections <- function(upgrade, model) {
 # brings a time constant about as short as the record's step.
 step_inspection <- function(upgrade, model) {
   parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
-  if (!is.null(step_doubt(parent, model, upgrade$measurements))) {
-    return(c(step = sprintf(paste("Let the simulator run with finer steps before you believe in %s: what it mends is",
-                                  "not clearly more than what its steps err by."), model$mechanism)))
+  if (any(grepl("shorter steps", model$doubts))) {
+    return(c(step = sprintf(paste("Let the simulator run with finer steps before you believe in %s: its steps may be",
+                                  "what it mends."), model$mechanism)))
   }
   if (is_several(upgrade$measurements) || !all(is.na(step_error(parent)))) return(NULL)
   brought <- upgrade$candidates[upgrade$candidates$from == model$parent &

@@ -37,20 +37,17 @@ step_change <- function(fit, threads) {
 }
 
 # Which drivers are amounts of a row, to be shared among shorter ones, and not what holds over it: those with which the
-# output changes least (`off`), one after the other where that at least halves it.
+# output changes least (`off`) of none, each and all, and of what then differs by one where that at least halves it.
 likely_amounts <- function(drivers, off) {
-  least <- off(drivers)
-  amounts <- drivers
-  flipped <- function(name) if (name %in% amounts) setdiff(amounts, name) else c(amounts, name)
-  tried <- c(list(character()), as.list(drivers))
-  share <- 1
+  tried <- c(list(character(), drivers), as.list(drivers))
+  amounts <- NULL
+  least <- Inf
   repeat {
     each <- vapply(tried, off, 0)
-    if (!isTRUE(min(each) < share * least)) return(amounts)
+    if (!is.null(amounts) && min(each) >= 0.5 * least) return(amounts)
     least <- min(each)
     amounts <- tried[[which.min(each)]]
-    tried <- lapply(drivers, flipped)
-    share <- 0.5
+    tried <- lapply(drivers, function(name) if (name %in% amounts) setdiff(amounts, name) else c(amounts, name))
   }
 }
 
@@ -121,8 +118,10 @@ shorter_rows <- function(raw, rows, times, amounts) {
 
 # ---- what it says
 
-# In words, where what a model's extension mends is not clearly more than what its parent's own steps err by.
-step_doubt <- function(parent, model, measurements) {
+# In words, where the steps may be the cause instead of the parameters `new` that a model has beside its parent: what it
+# mends is not clearly more than what the parent's own steps err by, or shorter ones would move it by a good part of its
+# distance from no effect. Evidence of ln B is that of z^2 / 2 = ln B at z standard deviations.
+step_doubt <- function(parent, model, new, log10_bf, measurements) {
   known <- !is.na(step_error(parent))
   squares <- function(model) {
     vapply(each_view(model, measurements), function(view) {
@@ -132,8 +131,17 @@ step_doubt <- function(parent, model, measurements) {
   error <- sqrt(sum(step_error(parent)^2, na.rm = TRUE))
   mended <- sqrt(max(0, sum((squares(parent) - squares(model))[known])))
   if (any(known) && error >= largest_step_share * mended)
-    sprintf("shorter steps of the simulator change %s of the noise where it mends %s", short(error), short(mended))
+    return(sprintf("shorter steps of the simulator change %s of the noise where it mends %s", short(error),
+                   short(mended)))
+  moved <- step_moves(model)
+  move <- max(0, abs(moved[names(moved) %in% new]))
+  away <- sqrt(2 * log(10) * max(0, log10_bf))
+  if (move > 0 && move >= largest_step_share * away)
+    sprintf("shorter steps of the simulator move its values by %s standard deviations, where %s make its evidence",
+            short(move), short(away))
 }
+
+step_moves <- function(model) do.call(c, c(list(numeric()), lapply(unname(model$steps), `[[`, "moved")))
 
 # Of each record what shorter steps change, over the noise; NA where that is not known.
 step_error <- function(model) {

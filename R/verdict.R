@@ -33,7 +33,7 @@ judge_models <- function(models, candidates, catalogue, measurements, control, t
       if (!parent$fit$trust$trusted || !model$fit$trust$trusted) "the numbers behind it are not trusted",
       if (row$lower95 < control$decisive + few_runs_error && from_few_runs(model$fit))
         "the runs over the priors are too few for evidence of that size",
-      step_doubt(parent, model, measurements),
+      step_doubt(parent, model, new, row$log10_bf, measurements),
       if (row$lower95 <= 0) "the fall of the error speaks for it, the evidence is not known",
       if (no_gain) "data held out do not gain by it",
       risen_words(parent, model),

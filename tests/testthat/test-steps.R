@@ -143,7 +143,18 @@ test_that("a mechanism that mends the simulator's own steps is not named", {
   expect_match(told$inspect, "finer steps before you believe in bypass", all = FALSE)
   expect_match(told$inspect, "With steps a quarter as long the simulator's output changes by", all = FALSE)
   expect_equal(amiss:::result_list(upgrade)$models[[1]]$step_error, upgrade$models[[1]]$steps[[1]]$error)
-  expect_match(amiss:::step_doubt(upgrade$models[[1]], model, upgrade$measurements), "change [0-9.]+ of the noise")
+  # So is one that finer steps would take back: its distance from no effect is what makes its evidence.
+  doubt <- function(moved, log10_bf) {
+    parent <- upgrade$models[[1]]
+    parent$steps[[1]]$error <- 0
+    model$steps[[1]]$moved[["bypass"]] <- moved
+    amiss:::step_doubt(parent, model, "bypass", log10_bf, upgrade$measurements)
+  }
+  expect_match(doubt(-2, 4), "move its values by 2.0 standard deviations, where 4.3 make its evidence")
+  expect_null(doubt(-1.4, 4))
+  expect_null(doubt(-2, 10))
+  expect_null(amiss:::step_doubt(upgrade$models[[1]][c("fit", "scores")], model[c("fit", "scores")], "bypass", 4,
+                                 upgrade$measurements))  # steps are not known
 })
 
 test_that("one that is there is named by a simulator whose steps are fine, and none by it where none is hidden", {
