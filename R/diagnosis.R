@@ -183,7 +183,10 @@ sure_sentences <- function(upgrade) {
     row <- upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ]
     c(evidence_sentence(row), fallen_sentence(row))
   }))
-  c(each, probability_sentence(trials), trust_sentence(upgrade, best))
+  first <- trials[1, ]
+  c(each, probability_sentence(trials),
+    if (first$mechanism != best$mechanism && raises_error(first)) raised_sentence(first, " first"),
+    trust_sentence(upgrade, best))
 }
 
 # Why a mechanism was adopted of which the evidence is not known (may_be_adopted()).
@@ -193,9 +196,9 @@ fallen_sentence <- function(row) {
                 "calibration falls to %s of what it was."), percent(row$error_ratio))
 }
 
-raised_sentence <- function(row) {
-  sprintf(paste("It was not adopted, because with %s the simulation's own error in calibration is %s times as large:",
-                "what is gained, the discrepancy gains."), row$mechanism,
+raised_sentence <- function(row, when = "") {
+  sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration is %s times as large:",
+                "what is gained, the discrepancy gains."), when, row$mechanism,
           short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
 }
 

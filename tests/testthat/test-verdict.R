@@ -382,3 +382,15 @@ test_that("where nothing is wrong in calibration and the error on held-out data 
   expect_identical(told(0.12)$verdict, "nothing")
   expect_match(told(0.12)$headline, "In calibration no mechanism is called for.* held-out data the error is 2.4 times")
 })
+
+test_that("why the one of highest evidence was not adopted is told", {
+  upgrade <- small_upgrade()
+  other <- upgrade$candidates$mechanism != "sun"
+  upgrade$candidates$log10_bf[other] <- max(upgrade$candidates$log10_bf) + 1
+  upgrade$candidates$error_ratio[other] <- 1.2
+  told <- paste(summary(upgrade)$sure, collapse = " ")
+  expect_match(told, paste("not adopted first, because with", upgrade$candidates$mechanism[other][1],
+                           "the simulation's own error in calibration is 1.2 times as large"))
+  upgrade$candidates$error_ratio[other] <- 1
+  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "not adopted first")
+})
