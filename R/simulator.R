@@ -8,9 +8,10 @@
 #' writes the model anew would lose what was adopted before it.
 #'
 #' A simulator that integrates in steps should take their length from `info$step_h`: [upgrade_model()] then runs it
-#' with rows a half and a quarter as long, its drivers held. Where its own steps err by a third of what a mechanism
-#' mends, that is not named; parameters that finer steps would move are told. One with steps of its own, or an output
-#' that does not settle so, is taken at its word: see that half the step changes its output by little beside the noise.
+#' with rows a half and a quarter as long. Where its own steps err by a third of what a mechanism mends, or finer ones
+#' would take that back by a third, it is not named; parameters that they would move are told. One with steps of its
+#' own, or an output that does not settle so, is taken at its word: see that half the step changes its output by little
+#' beside the noise.
 #'
 #' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with the columns of `boundary`,
 #'   one row per interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is
