@@ -54,8 +54,7 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' `held_out_gain`, `gain_beside_later`, `step_error` (what shorter steps of the simulator change, as in
 #' [upgrade_model()]), what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`),
 #' `refinements`, `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of
-#' the command
-#' `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
+#' the command `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It

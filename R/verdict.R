@@ -4,9 +4,8 @@ risen_error <- 1.02   # times the simulation's error in calibration before: from
 fallen_error <- 2 / 3  # times it: from there down it has fallen, whatever the evidence
 
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism, and `steps`
-# (step_effect() of each record) of all. A mechanism
-# is a stand-in where data held out do not gain by it, nor beside what was adopted later; it is named where nothing
-# speaks against it, and likely otherwise.
+# (step_effect() of each record) of all. A mechanism is a stand-in where data held out do not gain by it, nor beside
+# what was adopted later; it is named where nothing speaks against it, and likely otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
   remains <- much_remains(models, measurements)
   inside <- models[[length(models)]]$scores$validate[["coverage95"]]
