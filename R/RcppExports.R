@@ -17,8 +17,8 @@ make_basis_ <- function(outputs, control) {
     .Call(`_amiss_make_basis_`, outputs, control)
 }
 
-train_emulator_ <- function(normal, region, basis_list, control, context) {
-    .Call(`_amiss_train_emulator_`, normal, region, basis_list, control, context)
+train_emulator_ <- function(normal, region, basis_list, trend, control, context) {
+    .Call(`_amiss_train_emulator_`, normal, region, basis_list, trend, control, context)
 }
 
 predict_emulator_ <- function(emulator, normal) {
@@ -43,6 +43,10 @@ drop_conditions_ <- function(records, fit, conditions, ais, context_list) {
 
 tangent_posterior_ <- function(data, priors, x0, run, slopes, draws, ais, context) {
     .Call(`_amiss_tangent_posterior_`, data, priors, x0, run, slopes, draws, ais, context)
+}
+
+tangent_given_ <- function(data, priors, points, x0, run, slopes, context) {
+    .Call(`_amiss_tangent_given_`, data, priors, points, x0, run, slopes, context)
 }
 
 response_evidence_ <- function(data, priors, tangent, responses, ais, context) {

@@ -129,10 +129,7 @@ calibration_setting <- function(emulator, measurements, control, seed, call = rl
   rows <- emulated_rows(emulator, measurements, call)
   check_target_varies(measurements, rows, call)
   control <- fill_calibration_control(control, measurements, length(rows), call = call)
-  priors <- list(noise_sd = measurements$noise_sd, noise_shape = length(rows) * control$confidence,
-                 discarded_variance = mean(emulator$basis$discarded_sd^2), inclusion = control$inclusion,
-                 amplitude = control$amplitude,
-                 correlation_times = control$error_times, ratios = control$error_ratios, reach = control$reach)
+  priors <- history_priors(measurements, control, length(rows), mean(emulator$basis$discarded_sd^2))
   list(emulator = emulator, measurements = measurements, rows = rows, control = control, priors = priors,
        seed = pick_seed(seed))
 }
@@ -192,7 +189,7 @@ fill_calibration_control <- function(control, measurements, n, what = "control",
 fit_trust <- function(fit) {
   why <- c(if (!fit$posterior$trusted) fit$posterior$verdict,
            if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
-           if (fit$posterior$trusted && fit$standard_error > largest_error)
+           if (fit$posterior$trusted && fit$standard_error > rules$evidence_error)
              "not trusted: corrected by the runs, the evidence has a standard error of more than one nat")
   list(trusted = is.null(why), verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }

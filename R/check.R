@@ -1,11 +1,6 @@
 # The simulator has the last word: the emulator's error where the posterior lies, seen by runs of the simulator at draws
 # of it or, for runs made elsewhere, by runs left out.
 
-largest_error_ratio <- 1 / 3  # of the noise: above it the emulator is not good enough
-least_effective <- 0.1        # share of the runs under their own likelihoods
-largest_border_share <- 0.05  # of the posterior in the outer tenth of the emulator's region
-largest_error <- 1            # of the evidence, in nats
-
 # list(fits, made): calibrations that have the same draws with their checks, and the runs of each (NULL where none were
 # made).
 checked_by_runs <- function(fits, threads) {
@@ -75,10 +70,10 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
   ratio <- error_over_noise(fit, error)
   noise <- if (ratio > 0) rms / ratio else fit$measurements$noise_sd
   border <- sum(fit$weights[region_distance(fit$emulator$processes$region, posterior_unit(fit)) > 0.9])
-  passed <- ratio <= largest_error_ratio && border <= largest_border_share
+  passed <- ratio <= rules$error_ratio && border <= rules$border
   told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by, format(signif(ratio, 2)),
                   if (failed) sprintf(" (%d more failed)", failed) else "")
-  verdict <- if (ratio > largest_error_ratio) paste0(told, ", more than a third: it is not good enough")
+  verdict <- if (ratio > rules$error_ratio) paste0(told, ", more than a third: it is not good enough")
              else if (!passed) sprintf("%s, but the posterior reaches the end of the region where it holds (%.0f %%)",
                                        told, 100 * border)
              else told
@@ -151,7 +146,7 @@ exact_evidence <- function(fits, made, threads) {
 
 corrected <- function(fit, effective, correction, error) {
   fit$check$effective <- effective
-  if (fit$check$passed && effective < least_effective) {
+  if (fit$check$passed && effective < rules$effective) {
     fit$check$passed <- FALSE
     fit$check$verdict <- sprintf("%s, but few of these runs are as likely as it says (effective share %.2f)",
                                  fit$check$verdict, effective)

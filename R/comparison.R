@@ -109,7 +109,7 @@ fill_comparison_control <- function(control, measurements, method, call = rlang:
 }
 
 compared_model <- function(simulator, name, settings) {
-  fit <- rlang::try_fetch(fit_model(simulator, name, settings), amiss_error = function(e) {
+  fit <- rlang::try_fetch(compared_fit(simulator, settings), amiss_error = function(e) {
     rlang::abort(paste0("Model \"", name, "\" could not be calibrated."), parent = e,
                  class = setdiff(class(e), c("rlang_error", "error", "condition")), call = NULL)
   })
@@ -122,6 +122,19 @@ compared_model <- function(simulator, name, settings) {
          best = staged("least squares", least_squares(fit, settings$threads)), heat_loss = posterior_heat_loss(fit))
   })
 }
+
+# By the paper's method from runs over the priors, the same for all models; by the package's own from a search.
+compared_fit <- function(simulator, settings) settings$keep(list("fit", plain(simulator)), {
+  m <- settings$measurements
+  if (identical(settings$calibrate, calibrate)) {
+    context <- new_context(settings$seed, settings$threads, settings$control)
+    calibrate_model(new_model(list(simulator), list(loop_record(m, settings$control$calibration))), context)$fit
+  } else without_basis_warnings({
+    runs <- simulate_design(simulator, m, settings$runs, seed = settings$seed, threads = settings$threads)
+    emulator <- train_emulator(runs, m, settings$control$emulator, threads = settings$threads)
+    settings$calibrate(emulator, m, settings$control$calibration, seed = settings$seed, threads = settings$threads)
+  })
+})
 
 # The heat loss coefficient at equally weighted posterior draws, in the mean wind of the calibration rows.
 posterior_heat_loss <- function(fit, draws = 200) {

@@ -137,16 +137,11 @@ open_verdict <- function(upgrade) {
 cause_headline <- function(upgrade) {
   adopted <- adopted_models(upgrade)
   sentence <- function(m) upgrade$catalogue[[m$mechanism]]$sentence
-  rivals <- function(m) {
-    told <- vapply(upgrade$catalogue[m$held_out_rivals], `[[`, "", "sentence")
-    if (length(told)) paste0(" But by the data held out: ", paste(told, collapse = " Or: "))
-  }
   adopted <- adopted[order(match(vapply(adopted, `[[`, "", "verdict"), c("named", "likely", "stand-in")))]
   told <- vapply(seq_along(adopted), function(k) {
     m <- adopted[[k]]
     switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
-           likely = paste0(if (k > 1) "Likely as well: " else if (length(m$held_out_rivals)) "By the evidence: "
-                           else "Most likely: ", sentence(m), rivals(m)),
+           likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
            paste0("\"", m$mechanism, "\" fits", if (k > 1) " too",
                   ", but data held out do not gain by it: take it as a stand-in for something else."))
   }, "")
@@ -181,19 +176,12 @@ sure_sentences <- function(upgrade) {
   }
   each <- unlist(lapply(adopted, function(m) {
     row <- upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ]
-    c(evidence_sentence(row), fallen_sentence(row))
+    evidence_sentence(row)
   }))
   first <- trials[1, ]
   c(each, probability_sentence(trials),
     if (first$mechanism != best$mechanism && raises_error(first)) raised_sentence(first, " first"),
     trust_sentence(upgrade, best))
-}
-
-# Why a mechanism was adopted of which the evidence is not known (may_be_adopted()).
-fallen_sentence <- function(row) {
-  if (row$lower95 > 0) return(NULL)
-  sprintf(paste("That is too uncertain to decide. It was adopted because the simulation itself gains: its own error in",
-                "calibration falls to %s of what it was."), percent(row$error_ratio))
 }
 
 raised_sentence <- function(row, when = "") {
@@ -206,7 +194,7 @@ unjudged_sentence <- function(fit) {
   remedy <- if (is_given(model_of(fit))) "more runs where the posterior lies, or narrower priors"
             else "more runs, narrower priors or a shorter record"
   sprintf("No odds can be given for or against any mechanism: %s. What would change it: %s.",
-          gsub("not trusted: ", "", fit$trust$verdict), remedy)
+          fit$trust$verdict, remedy)
 }
 
 # Only where the size of the error itself says that something is missing, and not that the parameters were not found.
@@ -314,12 +302,9 @@ step_sentence <- function(upgrade, model) {
   unit <- upgrade$measurements$unit
   told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
   gain <- model$held_out_gain
-  sprintf("With %s the typical error %s in calibration%s%s.", model$mechanism, told("calibrate"),
+  sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
           if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s", told("validate"),
-                                                    if (gain$mean > 0) gain_words(gain) else "no gain"),
-          if (isTRUE(model$gain_beside_later$improves))
-            paste0("; beside what was adopted later, held-out data gain by it: ", gain_words(model$gain_beside_later))
-          else "")
+                                                    if (gain$mean > 0) gain_words(gain) else "no gain"))
 }
 
 gain_words <- function(gain) {
@@ -417,8 +402,8 @@ remaining_sentences <- function(upgrade) {
               listed(edge))
     else "No parameter is at the edge of its range.",
     sprintf("The search stopped because %s%s.",
-            sub("(;| and) (what answers to .*|no boundary condition is significant)$", "", upgrade$stopped_because),
-            if (grepl("^the limit of", upgrade$stopped_because)) "; further causes were not looked for" else ""))
+            upgrade$stopped_reason,
+            if (upgrade$stopped_id == "steps") "; further causes were not looked for" else ""))
 }
 
 #' @export

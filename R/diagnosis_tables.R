@@ -49,16 +49,14 @@ candidates_words <- function(upgrade) {
   if (is.null(upgrade$candidates)) return(NULL)
   table <- candidate_table(upgrade)
   table <- table[order(table$step, -table$log10_bf), ]
-  # Responses are off by decades: they have an estimate, and no interval or word that could be relied upon.
-  seen <- function(words) ifelse(table$judged_by == "response", "", words)
   drives <- vapply(table$mechanism, function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
              "log10 Bayes factor" = signed(table$log10_bf),
-             "95 % interval" = seen(paste(signed(table$lower95), "to", signed(table$upper95))),
-             evidence = seen(table$word),
+             "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)),
+             evidence = table$word,
              probability = percent(table$probability),
              "error in calibration" = error_words(table$error_ratio),
-             estimate = ifelse(table$judged_by == "response", "by responses", ifelse(table$trusted, "sound", "rough")),
+             estimate = ifelse(table$judged_by == "runs", "verified", ifelse(table$trusted, "trial", "rough")),
              decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
 }
 

@@ -70,13 +70,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   check_object(ensemble, "amiss_ensemble", "ensemble")
   if (inherits(noise_sd, "amiss_measurements")) {
-    rows <- used_rows(noise_sd, "calibrate")
-    if (nrow(ensemble$outputs) != length(rows)) {
-      abort_input(
-        c("The runs have {nrow(ensemble$outputs)} steps and the measurements {length(rows)} calibration rows.",
-                    i = "Give the runs at exactly these rows."))
-    }
-    check_same_rows(ensemble$hours, noise_sd)
+    check_ensemble_rows(ensemble, noise_sd)
     noise_sd <- noise_sd$noise_sd
   }
   check_input(checkmate::check_number(noise_sd, lower = 0, finite = TRUE), "noise_sd")
@@ -84,10 +78,15 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   threads <- check_threads(threads)
   check_runs_differ(ensemble)
   check_training_size(ncol(ensemble$outputs), "ensemble (runs)")
-  basis <- call_engine(make_basis_(ensemble$outputs, c(control, noise_sd = noise_sd)))
+  tangent <- ensemble$tangent
+  basis <- call_engine(make_basis_(cbind(ensemble$outputs, along_tangent(tangent)),
+                                   c(control, noise_sd = noise_sd)))
+  basis$columns <- nrow(basis$coefficients)
+  basis$coefficients <- basis$coefficients[seq_len(ncol(ensemble$outputs)), , drop = FALSE]
   basis$discarded_sd <- discarded_sd(basis, ensemble$outputs)
+  trend <- tangent_trend(tangent, basis, ensemble$region)
   trained <- staged(paste("training the emulator of", ncol(ensemble$outputs), "runs"), call_engine(train_emulator_(
-    to_normal(ensemble$unit), ensemble$region, basis, control, engine_context(1, threads))))
+    to_normal(ensemble$unit), ensemble$region, basis, trend, control, engine_context(1, threads))))
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   selection <- trained$selection
   selection$parameter <- names(ensemble$parameters)[selection$parameter]
@@ -95,7 +94,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
     structure(list(format_version = format_version, parameters = ensemble$parameters, simulator = ensemble$simulator,
                  basis = basis[c("vectors", "singular_values", "explained", "discarded_rms", "discarded_ss",
                                  "discarded_sd")],
-                 processes = c(trained[c("inputs", "coefficients", "hyperparameters")], list(region = ensemble$region)),
+                 processes = c(trained[c("inputs", "coefficients", "hyperparameters")],
+                               list(region = ensemble$region, trend = trend)),
                  unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
                  left_out = list(error = trained$coefficients - trained$loo_mean, variance = trained$loo_variance),
                  selection = selection,
@@ -105,6 +105,27 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
                  noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
   warn_coarse_basis(emulator, "control$max_vectors")
   emulator
+}
+
+# Outputs along a tangent, list(centre, slopes): two units of the region's root either way. They put
+# its directions into the basis, of which a few runs may not hold all.
+along_tangent <- function(tangent) {
+  if (!is.null(tangent)) cbind(tangent$centre + 2 * tangent$slopes, tangent$centre - 2 * tangent$slopes)
+}
+
+# The tangent as the mean of each coefficient, linear in the inputs v of the region: with t = R^-1 (s - c)
+# in units of its root, v = 1/2 + t / (2 rho).
+tangent_trend <- function(tangent, basis, region) {
+  if (is.null(tangent)) return(NULL)
+  slopes <- 2 * region$radius * project_outputs(tangent$slopes, basis)
+  unname(cbind(project_outputs(cbind(tangent$centre), basis) - rowSums(slopes) / 2, slopes))
+}
+
+# Coefficients (Q x n) of outputs (rows x n): the last vector is constant, the others have mean zero.
+project_outputs <- function(outputs, basis) {
+  last <- ncol(basis$vectors)
+  moving <- basis$vectors[, -last, drop = FALSE]
+  rbind(crossprod(moving, outputs) / colSums(moving^2), colMeans(outputs))
 }
 
 coarse_basis <- function(basis, noise_sd) noise_sd > 0 && basis$discarded_rms > noise_sd
@@ -163,9 +184,10 @@ fill_emulator_control <- function(control, what = "control", call = rlang::calle
 }
 
 # The part of the runs outside the basis, as of runs that the basis was not chosen with: raised by M / (M - Q + 1), for
-# the Q - 1 singular vectors that the runs determine (the vector of ones is given).
+# the Q - 1 singular vectors that the M runs determine (the vector of ones is given). Outputs along a tangent count
+# among them.
 discarded_part <- function(basis, outputs) {
-  runs <- ncol(outputs)
+  runs <- basis$columns
   (outputs - tcrossprod(basis$vectors, basis$coefficients)) * runs / (runs - ncol(basis$vectors) + 1)
 }
 

@@ -255,6 +255,17 @@ check_same_rows <- function(hours, measurements, use = "calibrate", call = rlang
                 i = "Use the measurements that the ensemble was made with, or make the runs anew."), call = call)
 }
 
+# Whether an ensemble has the calibration rows of the measurements.
+check_ensemble_rows <- function(ensemble, measurements, call = rlang::caller_env()) {
+  rows <- used_rows(measurements, "calibrate")
+  if (nrow(ensemble$outputs) != length(rows)) {
+    abort_input(c(paste("The runs have {nrow(ensemble$outputs)} steps and the measurements {length(rows)}",
+                        "calibration rows."),
+                  i = "Give the runs at exactly these rows."), call = call)
+  }
+  check_same_rows(ensemble$hours, measurements, call = call)
+}
+
 check_varies <- function(name, values, call = rlang::caller_env()) {
   if (diff(range(values)) == 0) {
     abort_input(c("Parameter {.val {name}} has the same value, {signif(values[1], 4)}, in all {length(values)} runs.",
@@ -300,20 +311,6 @@ check_enough_runs <- function(runs, parameters, of = runs, call = rlang::caller_
                                 "where the posterior does ({.code control$refine})."))),
                     call = call)
   }
-}
-
-# How far a simulator can move under the priors, of which the reach of its discrepancy is a matter, is measured by the
-# runs that fill their space: with fewer than these for each parameter, evidences were decades off
-# (`vignette("measured")`, What a verdict costs in runs).
-runs_per_parameter <- 5
-
-few_runs <- function(runs, parameters) runs < runs_per_parameter * parameters
-
-warn_few_runs <- function(runs, parameters) {
-  if (!few_runs(runs, parameters)) return(invisible())
-  warn_result(c(paste("{runs} runs fill the space of {parameters} parameter{?s}, fewer than {runs_per_parameter} for",
-                      "each: evidences may be decades off, as they say too little of how far the simulator can move."),
-                i = "Ten times the number of parameters is a good start."), class = "amiss_warning_runs")
 }
 
 unit_to_values <- function(unit, parameters) {

@@ -7,50 +7,41 @@ candidates_title <- function(table, decisive) {
            else if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero"
            else "No mechanism explains the measurements decisively better than no change")
   }
-  adopted <- table[table$adopted, ]
-  by_error <- adopted$mechanism[adopted$lower95 <= 0]
-  by_evidence <- setdiff(adopted$mechanism, by_error)
-  paste(c(if (length(by_evidence)) paste("The measurements call for", listed(by_evidence)),
-          if (length(by_error)) sprintf("%she fall of the error calls for %s, the evidence is too uncertain",
-                                        if (length(by_evidence)) "t" else "T", listed(by_error))), collapse = "; ")
+  paste("The measurements call for", listed(table$mechanism[table$adopted]))
 }
 
 figure_candidates <- function(upgrade) {
-  if (is.null(upgrade$candidates)) return(figure_of_nothing("No mechanism was tried"))
+  table <- if (!is.null(upgrade$candidates)) candidate_table(upgrade)
+  if (!NROW(table)) return(figure_of_nothing("No mechanism was tried"))
   decisive <- upgrade$control$decisive
-  table <- candidate_table(upgrade)
   adopted <- c("no change", table$mechanism[table$adopted])
   table$panel <- factor(ifelse(table$step == 1, "added to the base model", paste("added after", adopted[table$step])))
   table$panel <- factor(table$panel, unique(table$panel[order(table$step)]))
   table$row <- paste(formatC(rank(table$log10_bf), width = 4, flag = "0"), table$mechanism)
-  states <- c("adopted", "tried", "tried, estimate rough", "not calibrated, by a few runs")
-  by_response <- table$judged_by == "response"
-  table$state <- factor(ifelse(table$adopted, states[1],
-                               ifelse(by_response, states[4], ifelse(table$trusted, states[2], states[3]))), states)
+  states <- c("adopted", "tried", "tried, estimate rough")
+  table$state <- factor(ifelse(table$adopted, states[1], ifelse(table$trusted, states[2], states[3])), states)
   of_state <- function(...) stats::setNames(c(...), states)
-  shown <- states[c(TRUE, TRUE, TRUE, any(by_response))]
   grey <- "grey45"
   axis <- signed_log_axis(unlist(table[c("lower95", "upper95")]), decisive)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$log10_bf, .data$row, colour = .data$state, shape = .data$state)) +
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
     ggplot2::geom_vline(xintercept = decisive, linetype = "dashed", colour = "grey20") +
-    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), table[!by_response, ],
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), table,
                             linewidth = 1.1, show.legend = FALSE) +
     ggplot2::geom_point(ggplot2::aes(size = .data$state), fill = "white", stroke = 1.2) +
-    ggplot2::scale_size_manual(values = of_state(6, 3.4, 3.4, 2.6), limits = shown) +
+    ggplot2::scale_size_manual(values = of_state(6, 3.4, 3.4), limits = states) +
     ggplot2::geom_text(ggplot2::aes(x = Inf, label = paste0("  ", signed(.data$log10_bf))), hjust = 0, size = 4.4,
                        show.legend = FALSE) +
-    ggplot2::scale_colour_manual(values = of_state(stage_colours[["after"]], grey, grey, "grey70"), limits = shown) +
-    ggplot2::scale_shape_manual(values = of_state(18, 19, 21, 4), limits = shown) +
+    ggplot2::scale_colour_manual(values = of_state(stage_colours[["after"]], grey, grey), limits = states) +
+    ggplot2::scale_shape_manual(values = of_state(18, 19, 21), limits = states) +
     ggplot2::scale_y_discrete(labels = function(x) wrap_labels(0.36)(sub("^[0-9.]+ ", "", x))) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y", labeller = wrap_strips()) +
     axis +
     figure_titles(candidates_title(table, decisive),
                   sprintf(paste0("Right of the dashed line (odds of %s to 1) a mechanism may be adopted, the best one ",
                                  "first. Scale in powers of ten: 2 is 100 to 1. Lines: 95 %% intervals; numbers: ",
-                                 "estimates%s."),
-                          format(10^decisive, big.mark = ","),
-                          if (any(by_response)) ", those of crosses off by some powers of ten" else ""),
+                                 "estimates."),
+                          format(10^decisive, big.mark = ",")),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), paste0("   ", signed(table$log10_bf)))

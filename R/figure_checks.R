@@ -12,7 +12,7 @@ check_words <- function(fits) {
   ratio <- vapply(checks, `[[`, 0, "ratio")
   if (!length(ratio)) return("The emulator was not checked by runs")
   sprintf("Where the posterior lies, the emulator's error is %s of the noise: %s", listed(unique(short(ratio))),
-          if (all(ratio <= largest_error_ratio)) "good enough" else "too much, more runs are needed")
+          if (all(ratio <= rules$error_ratio)) "good enough" else "too much, more runs are needed")
 }
 
 figure_emulator <- function(fits) {
@@ -55,7 +55,7 @@ figure_sampler <- function(results) {
   trusted <- vapply(results, function(r) isTRUE(r$trusted), TRUE)
   title <- if (all(trusted)) "The sampler passed its own checks"
            else paste("The sampler is not to be trusted:",
-                      sub("^not trusted: ", "", results[[which(!trusted)[1]]]$verdict))
+                      results[[which(!trusted)[1]]]$verdict)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$beta, .data$value, colour = .data$stage, shape = .data$stage)) +
     ggplot2::geom_line(ggplot2::aes(linetype = .data$stage), linewidth = 0.8) +
     ggplot2::geom_point(size = 3) +

@@ -16,7 +16,7 @@ upgrade_inspections <- function(upgrade) {
             edge_inspections(last$fit),
             remainder_inspection(last, upgrade$measurements),
             spike_inspection(last, upgrade$measurements),
-            if (grepl("^the limit of", upgrade$stopped_because)) {
+            if (upgrade$stopped_id == "steps") {
               c(steps = "Further causes were not looked for: raise control$max_steps and run the loop again.")
             })
   if (length(told)) told
@@ -68,7 +68,7 @@ trust_inspections <- function(fit, name) {
     if (!sampler$trusted) {
       c(sampler = sprintf(paste("The sampler's result for %s is not trusted (%s): give it more chains",
                                 "(pilot_chains, %d now)."), name,
-                          sub("^not trusted: ", "", sampler$verdict), as.integer(fit$control$ais$pilot_chains)))
+                          sampler$verdict, as.integer(fit$control$ais$pilot_chains)))
     })
 }
 
@@ -130,12 +130,12 @@ mechanism_inspections <- function(upgrade, model) {
     if (model$verdict == "stand-in") stand_in_inspection(model)
     else if (describes(upgrade$catalogue[[model$mechanism]])) description_inspection(upgrade, model)
     else site_inspection(upgrade, model),
-    if (any(grepl("drifting sensor", model$doubts))) {
+    if ("drift" %in% names(model$doubts)) {
       c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: a drift of it would",
                               "explain as much as %s."),
                         upgrade$measurements$target, model$mechanism))
     },
-    if (any(grepl("changes slowly", model$doubts))) {
+    if ("slow" %in% names(model$doubts)) {
       c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: it tells whether the",
                               "sensor changes or what it measures."), upgrade$measurements$target))
     },
@@ -146,7 +146,7 @@ mechanism_inspections <- function(upgrade, model) {
 # brings a time constant about as short as the record's step.
 step_inspection <- function(upgrade, model) {
   parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
-  if (any(grepl("shorter steps", model$doubts))) {
+  if ("steps" %in% names(model$doubts)) {
     return(c(step = sprintf(paste("Let the simulator run with finer steps before you believe in %s: its steps may be",
                                   "what it mends."), model$mechanism)))
   }
@@ -165,7 +165,7 @@ step_inspection <- function(upgrade, model) {
 shorter_step_inspection <- function(last) {
   error <- max(0, step_error(last), na.rm = TRUE)
   moved <- step_moved_words(last)
-  if (error <= largest_error_ratio && is.null(moved)) return(NULL)
+  if (error <= rules$error_ratio && is.null(moved)) return(NULL)
   c(steps = paste0("With steps a quarter as long the simulator's output changes by ", short(error),
                    " of the noise beyond what its parameters can take up",
                    if (!is.null(moved)) paste0(", and ", moved), ": let it run with finer ones."))
@@ -279,7 +279,7 @@ undecided_inspections <- function(upgrade) {
     if (diff(ends) > too_rough) return("its numbers are too rough for odds")
     sprintf("odds of %s%s, by numbers that are not trusted", odds(open$log10_bf[k]), odds_interval(ends))
   }, "")
-  told <- sprintf(paste("Not ruled out is %s: %s. More runs for each mechanism (runs), or narrower priors, would",
+  told <- sprintf(paste("Not ruled out is %s: %s. A larger budget (control$runs_total), or narrower priors, would",
                         "decide."), open$mechanism, said)
   stats::setNames(told, rep("undecided", length(told)))
 }

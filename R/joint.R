@@ -48,25 +48,14 @@
 #' fit
 #' confint(fit)
 #' @export
-calibrate_jointly <- function(ensembles, measurements, rounds = 8, runs = NULL, control = NULL, seed = NULL,
-                              threads = 1, quiet = FALSE) {
+calibrate_jointly <- function(ensembles, measurements, rounds = rules$verify_rounds, runs = NULL,
+                              control = NULL, seed = NULL, threads = 1, quiet = FALSE) {
   hush(quiet)
   check_records(ensembles, measurements, "ensembles", function(x) check_object(x, "amiss_ensemble", "ensembles"))
   check_one_prior(lapply(ensembles, `[[`, "parameters"))
-  check_input(checkmate::check_count(rounds), "rounds")
-  check_input(checkmate::check_count(runs, positive = TRUE, null.ok = TRUE), "runs")
-  for (m in measurements) check_runs_asked(runs %||% 40, m)
-  check_training_size((runs %||% 40) * 1.3^rounds, "rounds", rounds)
-  control <- merge_control(list(emulator = list(), calibration = list()), control)
-  fill_emulator_control(control$emulator, "control$emulator")
-  for (m in measurements) {
-    fill_calibration_control(control$calibration, m, length(used_rows(m, "calibrate")), "control$calibration")
-  }
-  last <- refine_records(unname(ensembles), unname(measurements[names(ensembles)]), rounds, control, pick_seed(seed),
-                         check_threads(threads), runs)
-  fits <- stats::setNames(last$fits, names(ensembles))
-  for (name in names(fits)) warn_coarse_basis(fits[[name]]$emulator, "control$emulator$max_vectors", name)
-  new_joint(fits)
+  measurements <- measurements[names(ensembles)]
+  control <- check_refining(measurements, rounds, runs, control)
+  calibrate_ensembles(ensembles, measurements, rounds, runs, control, pick_seed(seed), check_threads(threads))
 }
 
 #' @rdname calibrate_jointly
@@ -343,4 +332,10 @@ tidy.amiss_joint_attribution <- function(x, ...) {
   rlang::check_dots_empty()
   each <- Map(function(name, attribution) cbind(record = name, attribution$table), names(x$records), x$records)
   do.call(rbind, unname(each))
+}
+
+# The parameters of records that share those of the same name.
+joint_parameters <- function(fits) {
+  all <- do.call(c, lapply(unname(fits), function(fit) fit$emulator$parameters))
+  all[!duplicated(names(all))]
 }

@@ -62,9 +62,8 @@ check_zone_size <- function(zone, runs, rows, step_s, control, call = rlang::cal
 }
 
 # Runs at the rows of the measurements, and an emulator of them; each round of refinement makes 1.3 times as many.
-check_runs_asked <- function(runs, measurements, rounds = 0, refine = 0, call = rlang::caller_env()) {
+check_runs_asked <- function(runs, measurements, call = rlang::caller_env()) {
   check_input(checkmate::check_count(runs, positive = TRUE), "runs", call = call)
   check_run_number(runs, length(measurements$raw$hours), call = call)
   check_training_size(runs, call = call)
-  check_training_size(max(40, refine * runs) * 1.3^rounds, "control$rounds", rounds, call)
 }

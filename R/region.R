@@ -1,46 +1,54 @@
-# Regions of the parameters' space: where the posterior lies, in the coordinates in which the priors are N(0, I). An
-# emulator of runs in such a region, along its axes, needs few of them; NULL stands for everywhere.
+# Regions of the parameters' space: where the posterior lies, in the coordinates in which the priors
+# are N(0, I). An emulator of runs in such a region, along its axes, needs few of them; NULL stands
+# for everywhere.
 
-# `uniform`: which parameters have uniform priors, in whose probabilities and not in normal coordinates they are linear.
+# `uniform`: which parameters have flat priors (is_flat()), in whose probabilities and not in normal
+# coordinates they are linear.
 new_region <- function(centre, root, radius, parameters) {
-  uniform <- vapply(parameters, function(p) p$prior$family == "uniform", NA, USE.NAMES = FALSE)
-  list(centre = centre, root = root, radius = radius, uniform = uniform)
+  list(centre = centre, root = root, radius = radius, uniform = are_flat(parameters))
 }
 
-# The ellipsoid that holds a posterior. Tails that the draws do not show are allowed for by their number, by the radius,
-# and by `growth` where the posterior is not trusted.
+# The straightened coordinates s of the engine's Region in those of coordinates.R: the point z at s = c,
+# and dz/ds.
+straightened <- function(region) {
+  spread <- sqrt(1 + rowSums(region$root^2))
+  side <- stats::pnorm(region$centre / spread)
+  slope <- stats::dnorm(region$centre / spread) / spread
+  list(z = ifelse(region$uniform, 2 * flat_limit * (side - 0.5), region$centre),
+       slope = ifelse(region$uniform, 2 * flat_limit * slope, 1))
+}
+
+# The ellipsoid that holds a posterior, wider by `growth` if that is not trusted.
 posterior_region <- function(fit, growth = 1) {
-  z <- to_normal(posterior_unit(fit))
-  w <- fit$weights / sum(fit$weights)
+  region_of_draws(posterior_unit(fit), fit$weights, fit$emulator$parameters, growth)
+}
+
+# The ellipsoid that holds weighted draws in the unit cube. Tails that they do not show are allowed for
+# by their number and by the radius.
+region_of_draws <- function(unit, weights, parameters, growth = 1) {
+  z <- to_normal(unit)
+  w <- weights / sum(weights)
   centre <- colSums(w * z)
   apart <- sweep(z, 2, centre)
   covariance <- crossprod(apart * sqrt(w)) / (1 - sum(w^2))
   # Fewer draws know less of the correlations.
   shrinkage <- ncol(z) / (ncol(z) + 1 / sum(w^2))
-  covariance <- (1 - shrinkage) * covariance + shrinkage * diag(diag(covariance), ncol(z)) + diag(1e-10, ncol(z))
+  covariance <- (1 - shrinkage) * covariance + shrinkage * diag(diag(covariance), ncol(z)) +
+    diag(1e-10, ncol(z))
   root <- growth * t(chol(covariance))
   distance <- sqrt(colSums(forwardsolve(root, t(apart))^2))
-  new_region(centre, root, 1.1 * max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999)),
-             fit$emulator$parameters)
+  farthest <- max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999))
+  new_region(centre, root, 1.1 * farthest, parameters)
 }
 
-wider_region <- function(region) {
-  region$root <- 1.5 * region$root
+# The region as the parameters `own` see it.
+region_part <- function(region, own) {
+  if (identical(own, seq_along(region$centre))) return(region)
+  covariance <- tcrossprod(region$root)[own, own, drop = FALSE]
+  region$centre <- region$centre[own]
+  region$root <- t(chol(covariance))
+  region$uniform <- region$uniform[own]
   region
-}
-
-mode_depth <- 10  # nats below the best mode from which another does not count
-
-# The ellipsoid that holds what search_modes() found from several starts: modes as good as the best, or places along a
-# ridge. `parameters`: those that are asked for, at `own` among the coordinates.
-region_of_modes <- function(modes, parameters, own) {
-  value <- vapply(modes, `[[`, 0, "value")
-  modes <- modes[value > max(value) - mode_depth]
-  centres <- do.call(rbind, lapply(modes, function(mode) mode$centre[own]))
-  centre <- colMeans(centres)
-  covariance <- Reduce(`+`, lapply(modes, function(mode) mode$covariance[own, own, drop = FALSE])) / length(modes) +
-    crossprod(sweep(centres, 2, centre)) / length(modes)
-  new_region(centre, t(chol(covariance)), 1.1 * sqrt(stats::qchisq(0.999, length(centre))), parameters)
 }
 
 # Of points of the unit cube (one a row), how far out they lie: 1 is where the region ends.

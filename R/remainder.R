@@ -112,5 +112,24 @@ drift_evidence <- function(base, threads) {
   hours <- base$measurements$hours[base$rows]
   if (length(hours) < 10) return(NULL)
   parabola <- error_sd(base) * sqrt(length(hours)) * stats::poly(hours, 2)
-  responses_factor(base, threads)(parabola)$log10_bf
+  responses_factor(base, parabola, threads)$log10_bf
+}
+
+response_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1,
+                     importance_draws = 300, ess_drop = 0.3, gradient = FALSE)
+
+response_scales <- c(1, 0.25, 0.0625)
+
+# What the record says of responses (rows x k) beside the model of a calibration, taken as its tangent: their
+# log10 Bayes factor against none, its 95 % interval and the word. Amounts are N(0, 1) times the scale that suits
+# the record best.
+responses_factor <- function(fit, responses, threads, scales = response_scales) {
+  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  ais <- fill_ais_control(utils::modifyList(fit$control$ais, response_ais))
+  evidence <- function(responses) {
+    call_engine(response_evidence_(data, fit$priors, fit$tangent, responses, ais, engine_context(fit$seed, threads)))
+  }
+  of <- lapply(scales, function(scale) evidence(scale * responses))
+  nothing <- evidence(matrix(0, length(fit$rows), 0))
+  factor_of(of[[which.max(vapply(of, `[[`, 0, "log_evidence"))]], nothing)
 }

@@ -107,9 +107,8 @@ result_list.amiss_upgrade <- function(x) {
       list(name = model$name, parent = model$parent, mechanism = model$mechanism), if (!several) made_with(fit),
       list(log10_evidence = fit$log_evidence / log(10), log10_evidence_interval = fit$interval / log(10),
            trusted = fit$trust$trusted, trust = fit$trust$verdict, verdict = model$verdict,
-           doubts = as.list(model$doubts), confounded_with = as.list(model$confounded_with),
-           held_out_gain = model$held_out_gain[c("mean", "standard_error")],
-           gain_beside_later = model$gain_beside_later[c("mean", "standard_error")]),
+           doubts = as.list(unname(model$doubts)), confounded_with = as.list(model$confounded_with),
+           held_out_gain = model$held_out_gain[c("mean", "standard_error")]),
       if (!several) list(step_error = model$steps[[1]]$error),
       checked(fit), list(refinements = fit$rounds), if (!several) list(reach = as.list(fit$reach)),
       scored(model$scores),
@@ -129,7 +128,7 @@ result_list.amiss_upgrade <- function(x) {
     row <- x$candidates[i, ]
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf, interval = c(row$lower95, row$upper95),
          probability = row$probability, error_ratio = row$error_ratio, trusted = row$trusted,
-         screened = row$screened, judged_by = row$judged_by,
+         judged_by = row$judged_by, runs = row$runs,
          parameters = table_rows(row$parameters[[1]]))
   }
   cause <- x$named_cause

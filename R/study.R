@@ -51,7 +51,7 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' likely cause stands here too), `gain` (`log10_bf`, `interval` and the scores of the first and the last model),
 #' `stopped_because`, `candidates` (as in [upgrade_model()]) and `models`: of each `name`, `parent`, `mechanism`, `N`
 #' rows, `M` runs, `Q` basis vectors, its evidence, `trusted` and why (`trust`), `verdict`, `doubts`, `confounded_with`,
-#' `held_out_gain`, `gain_beside_later`, `step_error` (what shorter steps of the simulator change, as in
+#' `held_out_gain`, `step_error` (what shorter steps of the simulator change, as in
 #' [upgrade_model()]), what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`),
 #' `refinements`, `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of
 #' the command `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
@@ -95,7 +95,7 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
     upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
                   seed = seed, threads = threads, quiet = quiet, checkpoint = stages)
   } else {
-    compare_models(study$models, study$measurements, study$method, runs = study$runs, control = study$control,
+    compare_models(study$models, study$measurements, study$method, runs = study$runs %||% 150, control = study$control,
                    seed = seed, threads = threads, quiet = quiet, checkpoint = stages, truth = study$truth)
   })
   result$study <- study$study
@@ -127,7 +127,7 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
   measured <- if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure()
   if (is.null(study$records)) measured <- measured[[1]]
   pieces <- if (is.null(study$models)) upgrade_pieces(of_each, measured) else comparison_pieces(files, study$method)
-  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs %||% 150,
+  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs,
          control = study$control),
     pieces, list(measurements = measured, code = content_hash(lapply(files[is_code(files)], study_code))))
 }

@@ -56,10 +56,10 @@ gain_table <- function(upgrade) {
   table[!is.na(table$value), ]
 }
 
-# Every trial, with its step and whether it was adopted there.
+# Every trial that has a number, with its step and whether it was adopted there.
 candidate_table <- function(upgrade) {
-  table <- upgrade$candidates
-  steps <- unique(table$from)
+  table <- upgrade$candidates[!is.na(upgrade$candidates$log10_bf), ]
+  steps <- unique(upgrade$candidates$from)
   adopted <- as.character(unlist(lapply(upgrade$models, `[[`, "mechanism")))
   table$step <- match(table$from, steps)
   table$adopted <- table$mechanism == adopted[table$step] & !is.na(adopted[table$step])

@@ -59,17 +59,18 @@ BEGIN_RCPP
 END_RCPP
 }
 // train_emulator_
-Rcpp::List train_emulator_(const Eigen::MatrixXd& normal, const Rcpp::RObject& region, const Rcpp::List& basis_list, const Rcpp::List& control, const Rcpp::List& context);
-RcppExport SEXP _amiss_train_emulator_(SEXP normalSEXP, SEXP regionSEXP, SEXP basis_listSEXP, SEXP controlSEXP, SEXP contextSEXP) {
+Rcpp::List train_emulator_(const Eigen::MatrixXd& normal, const Rcpp::RObject& region, const Rcpp::List& basis_list, const Rcpp::RObject& trend, const Rcpp::List& control, const Rcpp::List& context);
+RcppExport SEXP _amiss_train_emulator_(SEXP normalSEXP, SEXP regionSEXP, SEXP basis_listSEXP, SEXP trendSEXP, SEXP controlSEXP, SEXP contextSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type normal(normalSEXP);
     Rcpp::traits::input_parameter< const Rcpp::RObject& >::type region(regionSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type basis_list(basis_listSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::RObject& >::type trend(trendSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type control(controlSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
-    rcpp_result_gen = Rcpp::wrap(train_emulator_(normal, region, basis_list, control, context));
+    rcpp_result_gen = Rcpp::wrap(train_emulator_(normal, region, basis_list, trend, control, context));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -157,6 +158,23 @@ BEGIN_RCPP
     Rcpp::traits::input_parameter< const Rcpp::List& >::type ais(aisSEXP);
     Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
     rcpp_result_gen = Rcpp::wrap(tangent_posterior_(data, priors, x0, run, slopes, draws, ais, context));
+    return rcpp_result_gen;
+END_RCPP
+}
+// tangent_given_
+Rcpp::List tangent_given_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& points, const Eigen::VectorXd& x0, const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes, const Rcpp::List& context);
+RcppExport SEXP _amiss_tangent_given_(SEXP dataSEXP, SEXP priorsSEXP, SEXP pointsSEXP, SEXP x0SEXP, SEXP runSEXP, SEXP slopesSEXP, SEXP contextSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type data(dataSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type priors(priorsSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type points(pointsSEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type x0(x0SEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type run(runSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type slopes(slopesSEXP);
+    Rcpp::traits::input_parameter< const Rcpp::List& >::type context(contextSEXP);
+    rcpp_result_gen = Rcpp::wrap(tangent_given_(data, priors, points, x0, run, slopes, context));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -271,13 +289,14 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_ais_defaults_", (DL_FUNC) &_amiss_ais_defaults_, 0},
     {"_amiss_cpu_has_avx2_", (DL_FUNC) &_amiss_cpu_has_avx2_, 0},
     {"_amiss_make_basis_", (DL_FUNC) &_amiss_make_basis_, 2},
-    {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 5},
+    {"_amiss_train_emulator_", (DL_FUNC) &_amiss_train_emulator_, 6},
     {"_amiss_predict_emulator_", (DL_FUNC) &_amiss_predict_emulator_, 2},
     {"_amiss_filter_bank_", (DL_FUNC) &_amiss_filter_bank_, 4},
     {"_amiss_calibrate_", (DL_FUNC) &_amiss_calibrate_, 3},
     {"_amiss_attribute_", (DL_FUNC) &_amiss_attribute_, 5},
     {"_amiss_drop_conditions_", (DL_FUNC) &_amiss_drop_conditions_, 5},
     {"_amiss_tangent_posterior_", (DL_FUNC) &_amiss_tangent_posterior_, 8},
+    {"_amiss_tangent_given_", (DL_FUNC) &_amiss_tangent_given_, 7},
     {"_amiss_response_evidence_", (DL_FUNC) &_amiss_response_evidence_, 6},
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},

@@ -33,6 +33,11 @@ inline AisOptions ais_options(const Rcpp::List& control) {
   return options;
 }
 
+// NULL: none.
+inline Eigen::MatrixXd matrix(const Rcpp::RObject& given) {
+  return given.isNULL() ? Eigen::MatrixXd() : Rcpp::as<Eigen::MatrixXd>(given);
+}
+
 // NULL: everywhere.
 inline Region region(const Rcpp::RObject& given) {
   if (given.isNULL()) return Region();
@@ -43,7 +48,8 @@ inline Region region(const Rcpp::RObject& given) {
 
 inline EmulatorState emulator_state(const Rcpp::List& emulator) {
   return {Rcpp::as<Eigen::MatrixXd>(emulator["inputs"]), Rcpp::as<Eigen::MatrixXd>(emulator["coefficients"]),
-          Rcpp::as<Eigen::MatrixXd>(emulator["hyperparameters"]), region(emulator["region"])};
+          Rcpp::as<Eigen::MatrixXd>(emulator["hyperparameters"]), region(emulator["region"]),
+          emulator.containsElementNamed("trend") ? matrix(emulator["trend"]) : Eigen::MatrixXd()};
 }
 
 inline Rcpp::List ais_list(const AisResult& result) {

@@ -203,14 +203,14 @@ Rcpp::List make_basis_(const Eigen::MatrixXd& outputs, const Rcpp::List& control
                             _["discarded_rms"] = basis.discarded_rms, _["discarded_ss"] = basis.discarded_ss);
 }
 
-// Of runs at points (a row each) in the coordinates N(0, I), in their region.
+// Of runs at points (a row each) in the coordinates N(0, I), in their region; with a linear trend (or NULL).
 // [[Rcpp::export]]
 Rcpp::List train_emulator_(const Eigen::MatrixXd& normal, const Rcpp::RObject& region,
-                           const Rcpp::List& basis_list, const Rcpp::List& control,
-                           const Rcpp::List& context) {
+                           const Rcpp::List& basis_list, const Rcpp::RObject& trend,
+                           const Rcpp::List& control, const Rcpp::List& context) {
   const MatrixXd inputs = convert::region(region).inputs(normal.transpose());
-  const Emulator emulator =
-      Emulator::train(inputs, read_basis(basis_list), emulator_options(control), convert::context(context));
+  const Emulator emulator = Emulator::train(inputs, read_basis(basis_list), emulator_options(control),
+                                            convert::context(context), convert::matrix(trend));
   MatrixXd mean, variance;
   emulator.leave_one_out(mean, variance);
   const EmulatorState state = emulator.state();
@@ -293,6 +293,17 @@ Rcpp::List tangent_posterior_(const Rcpp::List& data, const Rcpp::List& priors, 
       Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
   add_points(out, result.history);
   return out;
+}
+
+// The same for points of error and discrepancy that are known.
+// [[Rcpp::export]]
+Rcpp::List tangent_given_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& points,
+                          const Eigen::VectorXd& x0, const Eigen::VectorXd& run,
+                          const Eigen::MatrixXd& slopes, const Rcpp::List& context) {
+  const TangentPosterior result =
+      tangent_given(make_history_data(data), make_history_priors(priors), make_points(points), x0, run, slopes,
+                    convert::context(context));
+  return Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
 }
 
 // Evidence of a calibration's tangent and of the responses (N x k) to a change of the simulator.

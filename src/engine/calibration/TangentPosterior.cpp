@@ -14,50 +14,79 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors, const VectorXd& x0,
-                                   const VectorXd& run, const MatrixXd& slopes, int draws,
-                                   const AisOptions& options, const Context& context) {
-  const Index p = x0.size();
-  if (slopes.cols() != p || slopes.rows() != run.size() || run.size() != data.y.size())
-    throw std::invalid_argument("tangent: lengths differ");
-  std::vector<Index> acting;  // parameters that change nothing keep their prior
-  for (Index j = 0; j < p; ++j) {
+namespace {
+
+// Parameters that change something; the others keep their prior.
+std::vector<Index> acting_parameters(const MatrixXd& slopes) {
+  std::vector<Index> acting;
+  for (Index j = 0; j < slopes.cols(); ++j) {
     if (slopes.col(j).squaredNorm() > 0) acting.push_back(j);
   }
-  const Index d = static_cast<Index>(acting.size());
-  data.y -= run;
-  data.basis.resize(run.size(), d);
-  for (Index j = 0; j < d; ++j) {
-    const Index parameter = acting[static_cast<std::size_t>(j)];
-    data.basis.col(j) = slopes.col(parameter);
-    data.y += x0[parameter] * slopes.col(parameter);
-  }
-  const HistoryModel model(std::move(data), priors, context);
-  const HistoryTarget target(model, conditions_but(model, {}), {VectorXd::Zero(d), MatrixXd::Identity(d, d)});
-  long evaluations = 0;
-  const MatrixXd population =
-      sample_population(target, StandardNormal(target.dimension()), options, context, evaluations);
+  return acting;
+}
 
+// y - f0 + J x0 in place of y, and the slopes that act as the basis.
+HistoryData along_tangent(HistoryData data, const std::vector<Index>& acting, const VectorXd& x0,
+                          const VectorXd& run, const MatrixXd& slopes) {
+  if (slopes.cols() != x0.size() || slopes.rows() != run.size() || run.size() != data.y.size())
+    throw std::invalid_argument("tangent: lengths differ");
+  data.y += slopes * x0 - run;
+  data.basis.resize(run.size(), static_cast<Index>(acting.size()));
+  for (std::size_t j = 0; j < acting.size(); ++j)
+    data.basis.col(static_cast<Index>(j)) = slopes.col(acting[j]);
+  return data;
+}
+
+// The parameters given each point, their prior N(0, I).
+TangentPosterior parameters_given(const HistoryModel& model, const std::vector<HistoryParameters>& history,
+                                  const std::vector<Index>& acting, Index p) {
+  const double draws = static_cast<double>(history.size());
   TangentPosterior out;
-  MatrixXd means = MatrixXd::Zero(p, draws);
-  out.covariance = MatrixXd::Zero(p, p);
-  for (int k = 0; k < draws; ++k) {
-    out.history.push_back(target.parameters(population.col((2 * k + 1) * population.cols() / (2 * draws))));
-    const CoefficientLikelihood::Posterior given = model.given(out.history.back()).posterior();
-    for (Index i = 0; i < d; ++i) {
-      const Index row = acting[static_cast<std::size_t>(i)];
-      means(row, k) = given.mean[i];
-      for (Index j = 0; j < d; ++j)
-        out.covariance(row, acting[static_cast<std::size_t>(j)]) += given.covariance(i, j) / draws;
+  out.history = history;
+  MatrixXd means = MatrixXd::Zero(p, static_cast<Index>(history.size()));
+  out.covariance = MatrixXd::Identity(p, p);
+  for (Index i : acting) out.covariance(i, i) = 0.0;
+  for (std::size_t k = 0; k < history.size(); ++k) {
+    const CoefficientLikelihood::Posterior given = model.given(history[k]).posterior();
+    for (std::size_t i = 0; i < acting.size(); ++i) {
+      const Index row = static_cast<Index>(i);
+      means(acting[i], static_cast<Index>(k)) = given.mean[row];
+      for (std::size_t j = 0; j < acting.size(); ++j)
+        out.covariance(acting[i], acting[j]) += given.covariance(row, static_cast<Index>(j)) / draws;
     }
-  }
-  for (Index j = 0; j < p; ++j) {
-    if (std::find(acting.begin(), acting.end(), j) == acting.end()) out.covariance(j, j) = 1.0;
   }
   out.mean = means.rowwise().mean();
   means.colwise() -= out.mean;
   out.covariance += means * means.transpose() / draws;
   return out;
+}
+
+}  // namespace
+
+TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors, const VectorXd& x0,
+                                   const VectorXd& run, const MatrixXd& slopes, int draws,
+                                   const AisOptions& options, const Context& context) {
+  const std::vector<Index> acting = acting_parameters(slopes);
+  const HistoryModel model(along_tangent(std::move(data), acting, x0, run, slopes), priors, context);
+  const Index d = static_cast<Index>(acting.size());
+  const HistoryTarget target(model, conditions_but(model, {}), {VectorXd::Zero(d), MatrixXd::Identity(d, d)});
+  long evaluations = 0;
+  const MatrixXd population =
+      sample_population(target, StandardNormal(target.dimension()), options, context, evaluations);
+  std::vector<HistoryParameters> history;
+  for (int k = 0; k < draws; ++k)
+    history.push_back(target.parameters(population.col((2 * k + 1) * population.cols() / (2 * draws))));
+  return parameters_given(model, history, acting, x0.size());
+}
+
+TangentPosterior tangent_given(HistoryData data, const HistoryPriors& priors,
+                               const std::vector<HistoryParameters>& history, const VectorXd& x0,
+                               const VectorXd& run, const MatrixXd& slopes, const Context& context) {
+  const std::vector<Index> acting = acting_parameters(slopes);
+  std::vector<int> settings;
+  for (const HistoryParameters& point : history) settings.push_back(point.setting);
+  const HistoryModel model(along_tangent(std::move(data), acting, x0, run, slopes), priors, context, settings);
+  return parameters_given(model, history, acting, x0.size());
 }
 
 }  // namespace amiss

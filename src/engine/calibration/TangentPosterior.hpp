@@ -22,4 +22,10 @@ TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors
                                    const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes, int draws,
                                    const AisOptions& options, const Context& context);
 
+/// The same with points of error and discrepancy that are known, each of equal weight.
+TangentPosterior tangent_given(HistoryData data, const HistoryPriors& priors,
+                               const std::vector<HistoryParameters>& history, const Eigen::VectorXd& x0,
+                               const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes,
+                               const Context& context);
+
 }  // namespace amiss

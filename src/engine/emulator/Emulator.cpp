@@ -23,12 +23,16 @@ constexpr std::uint64_t kRegionSeed = 20;
 
 }  // namespace
 
-Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients)
-    : inputs_(inputs), coefficients_(coefficients), centre_(coefficients.colwise().mean()) {
+Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients, const MatrixXd& trend)
+    : inputs_(inputs), coefficients_(coefficients), trend_(trend), bends_(coefficients) {
   if (inputs.rows() != coefficients.rows())
     throw std::invalid_argument("emulator: inputs and coefficients differ in rows");
   if (inputs.cols() == 0) throw std::invalid_argument("emulator: at least one parameter is needed");
-  const MatrixXd centred = coefficients.rowwise() - centre_;
+  if (trend.size() > 0 && (trend.rows() != coefficients.cols() || trend.cols() != inputs.cols() + 1))
+    throw std::invalid_argument("emulator: the trend needs a row for each coefficient, a column for each slope");
+  if (trend.size() > 0) bends_ -= trend_at(inputs);
+  centre_ = bends_.colwise().mean();
+  const MatrixXd centred = bends_.rowwise() - centre_;
   scale_ = (centred.colwise().squaredNorm() / static_cast<double>(std::max<Index>(1, inputs.rows() - 1)))
                .cwiseSqrt();
   for (Index q = 0; q < scale_.size(); ++q) {
@@ -36,9 +40,13 @@ Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients)
   }
 }
 
-Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.coefficients) {
+MatrixXd Emulator::trend_at(const MatrixXd& inputs) const {
+  return (inputs * trend_.rightCols(inputs.cols()).transpose()).rowwise() + trend_.col(0).transpose();
+}
+
+Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.coefficients, state.trend) {
   for (Index q = 0; q < coefficients_.cols(); ++q) {
-    processes_.emplace_back(inputs_, (coefficients_.col(q).array() - centre_[q]) / scale_[q],
+    processes_.emplace_back(inputs_, (bends_.col(q).array() - centre_[q]) / scale_[q],
                             GaussianProcessParameters::unpack(state.parameters.row(q).transpose()));
   }
   region_ = state.region;
@@ -54,8 +62,8 @@ Emulator::Emulator(const EmulatorState& state) : Emulator(state.inputs, state.co
 }
 
 Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
-                         const Context& context) {
-  Emulator emulator(inputs, basis.coefficients);
+                         const Context& context, const MatrixXd& trend) {
+  Emulator emulator(inputs, basis.coefficients, trend);
   const double runs = static_cast<double>(inputs.rows());
   const GammaPrior& lambda = options.priors.lambda;
   const double shape = lambda.shape + 0.5 * runs * static_cast<double>(basis.vectors.rows() - basis.size());
@@ -67,8 +75,7 @@ Emulator Emulator::train(const MatrixXd& inputs, const Basis& basis, const Emula
   std::vector<std::optional<GaussianProcess>> fitted(static_cast<std::size_t>(basis.size()));
   parallel_for(static_cast<int>(basis.size()), context, [&](int q) {
     const double norm = basis.vectors.col(q).squaredNorm() * emulator.scale_[q] * emulator.scale_[q];
-    const VectorXd values =
-        (emulator.coefficients_.col(q).array() - emulator.centre_[q]) / emulator.scale_[q];
+    const VectorXd values = (emulator.bends_.col(q).array() - emulator.centre_[q]) / emulator.scale_[q];
     HyperPriors priors = options.priors;
     priors.lambda = {shape, rate / norm};
     fitted[q] = GaussianProcess::fit(inputs, values, priors, options.search);
@@ -86,6 +93,7 @@ void Emulator::predict(const MatrixXd& inputs, MatrixXd& mean, MatrixXd& varianc
     mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
     variance.col(q) = (variance.col(q).array() + processes_[q].noise()) * (scale_[q] * scale_[q]);
   }
+  if (trend_.size() > 0) mean += trend_at(inputs);
 }
 
 void Emulator::predict_at(const MatrixXd& points, MatrixXd& mean, MatrixXd& variance) const {
@@ -96,6 +104,7 @@ void Emulator::predict_at(const MatrixXd& points, MatrixXd& mean, MatrixXd& vari
     processes_[static_cast<std::size_t>(q)].predict(inputs, mean.col(q));
     mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
   }
+  if (trend_.size() > 0) mean += trend_at(inputs);
   variance = typical_variance_.replicate(inputs.rows(), 1);
 }
 
@@ -108,9 +117,11 @@ MatrixXd Emulator::slopes_at(const MatrixXd& points, const ByMean& by_mean) cons
     processes_[k].predict(inputs, mean.col(q), slopes[k]);
     mean.col(q) = (mean.col(q).array() * scale_[q] + centre_[q]).matrix();
   }
-  const MatrixXd along = by_mean(mean) * scale_.asDiagonal();
+  if (trend_.size() > 0) mean += trend_at(inputs);
+  const MatrixXd along = by_mean(mean);
   for (Index q = 0; q < n_outputs(); ++q)
-    by_input += along.col(q).asDiagonal() * slopes[static_cast<std::size_t>(q)];
+    by_input += (along.col(q) * scale_[q]).asDiagonal() * slopes[static_cast<std::size_t>(q)];
+  if (trend_.size() > 0) by_input += along * trend_.rightCols(n_inputs());
   return region_.pulled_back(points, by_input);
 }
 
@@ -125,12 +136,13 @@ void Emulator::leave_one_out(MatrixXd& mean, MatrixXd& variance) const {
     mean.col(q) = (process.left_out_mean.array() * scale_[q] + centre_[q]).matrix();
     variance.col(q) = process.left_out_variance * (scale_[q] * scale_[q]);
   }
+  if (trend_.size() > 0) mean += trend_at(inputs_);
 }
 
 EmulatorState Emulator::state() const {
   MatrixXd parameters(n_outputs(), n_inputs() + 3);
   for (Index q = 0; q < n_outputs(); ++q) parameters.row(q) = processes_[q].parameters().pack().transpose();
-  return {inputs_, coefficients_, parameters, region_};
+  return {inputs_, coefficients_, parameters, region_, trend_};
 }
 
 VectorXd Emulator::widened() const {

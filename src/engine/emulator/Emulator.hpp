@@ -16,6 +16,9 @@ struct EmulatorState {
   Eigen::MatrixXd coefficients;  ///< M x Q
   Eigen::MatrixXd parameters;    ///< Q rows of GaussianProcessParameters::pack()
   Region region;                 ///< where it holds
+  /// Q x (P + 1): mean of each coefficient, its value at an input of zero and its slopes, which the processes
+  /// add to; empty for none.
+  Eigen::MatrixXd trend;
 };
 
 struct EmulatorOptions {
@@ -38,8 +41,10 @@ class Emulator {
   /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2. The variances of
   /// each process are widened to its leave-one-out errors, of hyper-parameters that have not seen the run
   /// left out (GaussianProcess::widen()).
+  /// @param trend  as in EmulatorState, or empty. A simulator's tangent is one: the processes are left with what
+  ///   bends, so that a handful of runs do.
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
-                        const Context& context);
+                        const Context& context, const Eigen::MatrixXd& trend = {});
 
   /// Mean and variance (n x Q) of the coefficients of runs at inputs (n x P): those that the projection of
   /// such a run on the basis has. They vary about the smooth part of the process by the nugget and 1 /
@@ -70,9 +75,11 @@ class Emulator {
   std::vector<std::vector<SelectionStep>> selections() const;
 
  private:
-  Emulator(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& coefficients);
+  Emulator(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& coefficients, const Eigen::MatrixXd& trend);
+  Eigen::MatrixXd trend_at(const Eigen::MatrixXd& inputs) const;  // n x Q
 
-  Eigen::MatrixXd inputs_, coefficients_;
+  Eigen::MatrixXd inputs_, coefficients_, trend_;
+  Eigen::MatrixXd bends_;  // coefficients less the trend
   Eigen::RowVectorXd centre_, scale_;
   Region region_;
   Eigen::RowVectorXd typical_variance_;  // of an emulator made of its state

@@ -1,0 +1,105 @@
+# The modes of a model's parameters: what searches from several starts lead to, whether they agree, and
+# the region that holds them.
+
+# list(model, modes, agree): the base model after scouts and searches, the best mode first.
+find_modes <- function(model, context) {
+  model <- with_scouts(model, context)
+  modes <- list()
+  for (start in start_runs(model)) {
+    if (is_spent(context) && length(modes)) break
+    search <- begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
+    search <- run_search(search, context)
+    model <- search$model
+    modes <- c(modes, list(search))
+    if (length(modes) > 1) {
+      ranked <- ranked_modes(model, modes, context)
+      model <- ranked$model
+      modes <- ranked$modes
+      if (ranked$agree) break
+    }
+  }
+  list(model = model, modes = modes, agree = length(modes) > 1 && ranked$agree)
+}
+
+# Runs over the priors, as many as it takes to begin; those that are known count.
+with_scouts <- function(model, context) {
+  p <- length(model$parameters)
+  n <- max(0, (model$scouts %||% (rules$scouts_base + rules$scouts_parameter * p)) - nrow(model$runs$z))
+  if (n == 0) return(model)
+  unit <- with_seed(context$seed, lhs::randomLHS(n, p))
+  model <- with_runs(model, from_unit(unit, model$flat), context)$model
+  check_some_succeeded(model)
+  model
+}
+
+check_some_succeeded <- function(model, call = rlang::caller_env()) {
+  if (sum(succeeded(model)) >= min(3, nrow(model$runs$z))) return(invisible())
+  n <- nrow(model$runs$z)
+  failed <- which(!succeeded(model))
+  unit <- to_unit(model$runs$z[failed[1], , drop = FALSE], model$flat)
+  abort_input(c("{length(failed)} of {n} runs over the priors hold values that are not finite.",
+                x = paste("The first is run {failed[1]} at",
+                          "{point_words(unit_to_values(unit, model$parameters))}."),
+                i = paste("Find out why the simulator fails there, or narrow the priors. If every run",
+                          "fails, look for a mistake in the simulator first.")), call = call)
+}
+
+# Where searches begin: the run nearest to the record; the nearest of the half that lies farther from
+# it; and so on, each time of the half that lies farther from all before.
+start_runs <- function(model) {
+  misfit <- colMeans(((model$runs$outputs - model$target) / model$noise)^2)
+  misfit[!succeeded(model)] <- Inf
+  starts <- which.min(misfit)
+  for (k in seq_len(min(rules$most_starts, sum(is.finite(misfit))) - 1)) {
+    apart <- apply(model$runs$z, 1, function(z) min(colSums((t(model$runs$z[starts, , drop = FALSE]) - z)^2)))
+    far <- is.finite(misfit) & apart >= stats::median(apart[is.finite(misfit)]) & apart > 0
+    if (!any(far)) break
+    starts <- c(starts, which(far)[which.min(misfit[far])])
+  }
+  starts
+}
+
+# The modes by their values, which are compared by the draws of all of them, the best first; `agree` if
+# another search ended at the mode of the best.
+ranked_modes <- function(model, modes, context) {
+  at <- vapply(modes, `[[`, 0, "at")
+  each <- vapply(modes, function(mode) values_at(model, at, mode$history, mode$slopes, context), at)
+  value <- apply(each, 1, log_mean_exp)
+  order <- order(-value)
+  modes <- Map(function(mode, value) replace(mode, "value", value), modes[order], value[order])
+  for (other in modes[-1]) {
+    same <- is_same_mode(model, modes[[1]], other, context)
+    model <- same$model
+    if (same$yes) return(list(model = model, modes = modes, agree = TRUE))
+  }
+  list(model = model, modes = modes, agree = FALSE)
+}
+
+# Near each other as both see it, or without a valley between them: a ridge is one mode. list(model, yes).
+is_same_mode <- function(model, one, other, context) {
+  apart <- model$runs$z[other$at, ] - model$runs$z[one$at, ]
+  distance <- function(covariance) sum(apart * solve(covariance, apart))
+  if (max(distance(one$covariance), distance(other$covariance)) < 2 * length(apart)) {
+    return(list(model = model, yes = TRUE))
+  }
+  if (one$value - other$value > rules$mode_depth) return(list(model = model, yes = FALSE))
+  made <- with_runs(model, rbind(model$runs$z[one$at, ] + apart / 2), context)
+  if (!length(made$at)) return(list(model = model, yes = FALSE))
+  between <- values_at(made$model, made$at, one$history, one$slopes, context)
+  list(model = made$model, yes = between > other$value - rules$resample_gain)
+}
+
+# ---- the region that holds them
+
+region_draws <- 600
+
+# Of modes that count beside the best, in shares of their values.
+region_of_modes <- function(model, modes, seed) {
+  value <- vapply(modes, function(mode) mode$value %||% 0, 0)
+  modes <- modes[value > max(value) - rules$mode_depth]
+  draws <- lapply(modes, function(mode) {
+    draws_within(mode$mean, mode$covariance, model$limit, region_draws, seed)
+  })
+  unit <- to_unit(do.call(rbind, draws), model$flat)
+  region_of_draws(unit, rep(1, nrow(unit)), model$parameters)
+}

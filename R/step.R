@@ -1,0 +1,197 @@
+# The loop: a state that is passed on from step to step. A step tries what is left of the catalogue on the
+# present model, verifies what could win, and adopts the winner or says why there is none.
+
+first_state <- function(started, catalogue, runs, context) {
+  context$say("Calibrating the base model")
+  base <- staged("base", base_model(started, runs, context))
+  measured <- measured_model(base, context)
+  report_model(measured, context)
+  list(present = base, models = list(measured), started = started, catalogue = catalogue,
+       candidates = NULL, off = list(), base = names(base$parameters))
+}
+
+next_step <- function(state, context) {
+  left <- mechanisms_left(state)
+  stopped <- reason_to_stop(state, left, context)
+  if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
+  state$present <- as_present(state$present, context)
+  trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
+  trials <- race(state$present, trials, context)
+  table <- trial_table(trials, state$present, left)
+  state$candidates <- rbind(state$candidates, table)
+  state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
+  best <- best_trial(table)
+  if (!may_be_adopted(best, context$control)) {
+    return(c(state, list(stopped = no_winner(table, last_model(state$models), context))))
+  }
+  context$say("Adopted {.strong {best$mechanism}}: log10 Bayes factor {round(best$log10_bf, 1)}")
+  state$present <- trials[[best$mechanism]]
+  measured <- measured_model(state$present, context)
+  report_model(measured, context)
+  state$models <- c(state$models, list(measured))
+  state
+}
+
+# Mechanisms that were not adopted and can be applied on top of what was.
+mechanisms_left <- function(state) {
+  left <- setdiff(names(state$catalogue), unlist(lapply(state$models, `[[`, "mechanism")))
+  brought <- setdiff(names(state$present$parameters), state$base)
+  left <- left[vapply(state$catalogue[left], applies, NA, brought)]
+  left[vapply(state$catalogue[left], can_extend, NA, state, brought)]
+}
+
+# list(id, words), or NULL.
+reason_to_stop <- function(state, left, context) {
+  stop_for <- function(id, words) list(id = id, words = words)
+  control <- context$control
+  if (!length(state$catalogue)) return(stop_for("empty", "the catalogue is empty"))
+  if (length(state$models) > length(state$catalogue)) {
+    return(stop_for("all", "every mechanism of the catalogue has been adopted"))
+  }
+  if (!length(left)) {
+    return(stop_for("none_applies", "no mechanism that is left can be applied on top of what was adopted"))
+  }
+  if (is_spent(context)) return(stop_for("budget", budget_words(context)))
+  if (length(state$models) > control$max_steps) {
+    stop_for("steps", sprintf("the limit of %d step%s was reached", control$max_steps,
+                              if (control$max_steps == 1) "" else "s"))
+  }
+}
+
+budget_words <- function(context) {
+  sprintf("the budget of %d runs of the simulator was spent", as.integer(context$control$runs_total))
+}
+
+# ---- trials
+
+# Those first that the discrepancy speaks for.
+try_all <- function(state, left, context) {
+  trials <- list()
+  ordered <- trial_order(state$catalogue[left], last_model(state$models)$attribution)
+  turn <- turns("mechanism", length(ordered))
+  for (name in ordered) {
+    if (is_spent(context)) break
+    simulators <- extended_simulators(state$catalogue[[name]], state)
+    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, needed_factor(trials, state$present, context), context))
+    report_trial(trials[[name]], state$present, context)
+  }
+  trials
+}
+
+# A mechanism that cannot be computed is told as such, and the others go on.
+try_one <- function(state, name, simulators, bar, context) {
+  present <- state$present
+  if (is_given(simulators)) return(given_trial(present, name, simulators, context))
+  tryCatch(try_mechanism(present, name, simulators, state$off[[name]], bar, context),
+           amiss_error_numerical = function(e) {
+    failed <- new_model(simulators, present$records, paste(present$name, "+", name), present$name, name)
+    utils::modifyList(failed, list(level = "failed", reason = conditionMessage(e)))
+  })
+}
+
+# Mechanisms driven by what the attribution names come first.
+trial_order <- function(catalogue, attribution) {
+  table <- attribution$table
+  weight <- vapply(catalogue, function(m) {
+    lost <- table$log10_bf_dropped[table$boundary %in% m$boundary & table$significant]
+    if (length(lost)) max(lost) else 0
+  }, 0)
+  names(catalogue)[order(-weight)]
+}
+
+# The present simulators with a mechanism, of each record in turn; what was adopted may act on some of them.
+extended_simulators <- function(mechanism, state) {
+  brought <- setdiff(names(state$present$parameters), state$base)
+  simulators <- state$present$simulators
+  extended <- Map(function(simulator, record) {
+    extend(simulator, mechanism, intersect(brought, names(parameters_of(simulator))), record)
+  }, simulators, names(simulators) %||% state$started$record)
+  check_one_prior(lapply(unname(extended), parameters_of))
+  extended
+}
+
+parameters_of <- function(simulator) {
+  if (inherits(simulator, "amiss_ensemble")) simulator$parameters else free_parameters(simulator)
+}
+
+# An edit that could be made on the base model may not be possible on top of what was adopted: then the loop
+# goes on without it.
+can_extend <- function(mechanism, state, brought) {
+  if (!length(brought)) return(TRUE)
+  tryCatch({
+    extended_simulators(mechanism, state)
+    TRUE
+  }, amiss_error_edit = function(e) {
+    warn_result(c("Mechanism {.val {mechanism$name}} is left out: it cannot be applied on top of what was adopted.",
+                  x = "{conditionMessage(e)}"), class = "amiss_warning_edit")
+    FALSE
+  })
+}
+
+# ---- what is said on the way
+
+report_model <- function(model, context) {
+  first <- utils::head(model$attribution$table[model$attribution$table$significant, ], 1)
+  context$say(paste(
+    "{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
+    "{signif(model$scores$validate[['rmse']], 3)} held out; {runs_spent(context)} runs so far; discrepancy",
+    if (nrow(first)) paste("responds most to {.field {first$boundary}}",
+                           "(log10 Bayes factor {round(first$log10_bf_dropped, 1)})")
+    else "shows no response to a boundary condition"))
+}
+
+report_trial <- function(trial, present, context) {
+  what <- switch(trial$level, silent = "changes nothing", failed = "could not be computed",
+                 untried = "could not be tried: its runs failed",
+                 sprintf("log10 Bayes factor %.1f%s", log10_factor(trial, present),
+                         if (trial$level == "verified") ", verified by runs" else ""))
+  context$say("  {trial$mechanism}: {what}")
+  if (trial$level == "silent") warn_no_response(trial$mechanism)
+  if (trial$level == "failed") {
+    warn_result(c("Mechanism {.val {trial$mechanism}} could not be tried.", x = "{trial$reason}"),
+                class = "amiss_warning_trial")
+  }
+}
+
+warn_no_response <- function(mechanism) {
+  warn_input(c(
+    "Mechanism {.val {mechanism}} changes nothing: every run with it is that of the model without it.",
+    i = paste("Does this record hold what it acts on, and does the simulator use its parameters? See",
+              "{.code vignette(\"mechanisms\")}, Inside a simulator.")))
+}
+
+# Why no mechanism was adopted: list(id, words).
+no_winner <- function(table, present, context) {
+  decisive <- context$control$decisive
+  reason <- why_not(table, decisive, context)
+  significant <- significant_conditions(present$attribution$table)
+  open <- if (!length(significant)) " and no boundary condition is significant"
+          else paste0("; what responds to ", paste(significant, collapse = ", "), " remains unexplained")
+  list(id = reason$id, words = paste0(reason$words, open), reason = reason$words)
+}
+
+why_not <- function(table, decisive, context) {
+  seen <- table[!is.na(table$log10_bf), ]
+  if (!nrow(seen)) return(list(id = "none_computed", words = "no mechanism could be computed"))
+  best <- best_trial(table)
+  highest <- seen[which.max(seen$log10_bf), ]
+  if (raises_error(highest) && highest$log10_bf >= decisive) {
+    return(list(id = "raises_error", words = sprintf(
+      "no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but raises it)",
+      highest$mechanism, highest$log10_bf)))
+  }
+  if (!nrow(best) || highest$log10_bf < decisive) best <- highest
+  # As many digits as it takes to see that it is less than what is needed.
+  digits <- if (best$log10_bf < decisive && round(best$log10_bf, 1) >= decisive) 2 else 1
+  found <- sprintf("best: %s, log10 Bayes factor %.*f", best$mechanism, digits, best$log10_bf)
+  if (best$log10_bf < decisive) {
+    list(id = "not_decisive", words = sprintf(
+      "no mechanism is decisive (%s; %s or more and an interval above zero are needed)", found,
+      format(decisive)))
+  } else if (is_spent(context)) {
+    list(id = "budget", words = sprintf("%s (%s, not verified)", budget_words(context), found))
+  } else {
+    list(id = "uncertain",
+         words = sprintf("the evidence for the best mechanism is too uncertain (%s)", found))
+  }
+}
