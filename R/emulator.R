@@ -311,6 +311,7 @@ emulator_over_priors <- function(emulator) emulator$over_priors %||% emulator
 
 # Root of the covariance that the output has under the priors (rows x r).
 simulator_moves <- function(emulator) {
+  if (!is.null(emulator$moves)) return(emulator$moves$root)
   wide <- emulator_over_priors(emulator)
   wide$basis$vectors %*% wide$spread
 }

@@ -42,6 +42,7 @@ posterior_of <- function(model, context, ais = NULL, border = rules$border_inter
   for (try in seq_len(rules$region_tries)) {
     fits <- fits_in_region(model, context, ais)
     outside <- border_share(model, fits)
+    if (outside <= rules$border) model <- with_draws(model, fits)
     if (outside <= border || try == rules$region_tries) break
     model$region <- region_of_draws(joint_unit(model, fits), fits[[1]]$weights, model$parameters,
                                     growth = if (outside > 0.2) 1.5 else 1.2)
@@ -49,11 +50,17 @@ posterior_of <- function(model, context, ais = NULL, border = rules$border_inter
   list(model = model, fits = fits)
 }
 
-# The model with the region of its posterior.
+# The model with the region of its posterior, and draws of it.
 following <- function(found) {
-  model <- found$model
+  model <- with_draws(found$model, found$fits)
   model$region <- region_of_draws(joint_unit(model, found$fits), found$fits[[1]]$weights, model$parameters,
                                   growth = rules$region_growth)
+  model
+}
+
+with_draws <- function(model, fits) {
+  drawn <- even_draws(fits[[1]], rules$slope_draws)
+  model$draws <- from_unit(joint_unit(model, fits)[drawn, , drop = FALSE], model$flat)
   model
 }
 
@@ -113,7 +120,7 @@ record_setting <- function(model, k, context, ais) {
   control <- utils::modifyList(list(noise_fraction = rules$basis_error), as.list(context$control$emulator))
   emulator <- without_basis_warnings(
     train_emulator(ensemble, record$measurements, control, threads = context$threads))
-  emulator$spread <- project_outputs(unname(model$centre$slopes[model$rows[[k]], own, drop = FALSE]), emulator$basis)
+  emulator$moves <- local_moves(model, k, emulator)
   control <- record$control
   if (!is.null(ais)) {
     control$ais <- fill_ais_control(utils::modifyList(control$ais, ais))
@@ -122,6 +129,46 @@ record_setting <- function(model, k, context, ais) {
        priors = history_priors(record$measurements, control, length(record$rows),
                                mean(emulator$basis$discarded_sd^2)),
        seed = context$seed)
+}
+
+# How far the simulator moves where the posterior lies: a root E (N x r) of the mean of J J' over draws of the
+# posterior, J its slopes for a standard deviation of the prior of each parameter. J is the tangent's, and the
+# emulator says how it turns from draw to draw. It is not put on the emulator's basis, which holds the posterior
+# to a hundredth of the noise: over a prior a hundred times as wide, that would be the noise itself.
+# E = [J, K] combine, K the basis.
+local_moves <- function(model, k, emulator) {
+  own <- model$own[[k]]
+  slopes <- unname(model$centre$slopes[model$rows[[k]], own, drop = FALSE])
+  p <- length(own)
+  q <- ncol(emulator$basis$vectors)
+  combine <- rbind(diag(p), matrix(0, q, p))
+  both <- cbind(slopes, emulator$basis$vectors)
+  if (!is.null(model$draws)) combine <- turning_combination(model, own, emulator)
+  energy <- eigen(crossprod(both %*% combine), symmetric = TRUE)
+  acts <- energy$values > (1e-3 * model$records[[k]]$priors$noise_sd)^2
+  combine <- combine %*% energy$vectors[, acts, drop = FALSE]
+  list(root = both %*% combine, combine = combine, z = model$runs$z[model$tangent$at, own])
+}
+
+# Combinations of the tangent's slopes and of the basis vectors, one for each draw and parameter.
+turning_combination <- function(model, own, emulator) {
+  z <- rbind(model$runs$z[model$tangent$at, own], model$draws[, own, drop = FALSE])
+  n <- nrow(z) - 1
+  step <- pmax(0.1 * apply(z[-1, , drop = FALSE], 2, stats::sd), 1e-4)
+  parts <- lapply(seq_along(own), function(j) {
+    limit <- model$limit[own[j]]
+    up <- down <- z
+    up[, j] <- pmin(z[, j] + step[j], limit)
+    down[, j] <- pmax(z[, j] - step[j], -limit)
+    seen <- lapply(list(up, down), function(z) {
+      predict_emulator_(emulator$processes, to_normal(to_unit(z, model$flat[own])))$mean
+    })
+    turned <- (seen[[1]] - seen[[2]]) / (up[, j] - down[, j])
+    own_slope <- matrix(0, length(own), n)
+    own_slope[j, ] <- 1
+    rbind(own_slope, t(turned[-1, , drop = FALSE]) - turned[1, ]) / sqrt(n)
+  })
+  do.call(cbind, parts)
 }
 
 # Runs inside the region or, if they are few, the nearest ones.

@@ -149,22 +149,46 @@ seen_response <- function(fit) {
   lacking_response(fit, responses[fit$rows, , drop = FALSE], simulator_moves(fit$emulator))
 }
 
-# simulator_moves() at other rows: the same combinations of the first ensemble's runs, without those that fail there.
+# simulator_moves() at other rows.
 moves_at <- function(fit, use, threads, record = fit$measurements) {
-  emulator <- emulator_over_priors(fit$emulator)
+  emulator <- fit$emulator
+  if (is.null(emulator$moves)) {
+    wide <- emulator_over_priors(emulator)
+    return(vectors_at(fit, wide, use, threads, record) %*% wide$spread)
+  }
+  slopes <- slopes_at(fit, use, threads, record)
+  cbind(slopes, vectors_at(fit, emulator, use, threads, record)) %*% emulator$moves$combine
+}
+
+# The simulator's slopes at other rows, where the tangent of its emulator was taken.
+slopes_at <- function(fit, use, threads, record) {
+  parameters <- fit$emulator$parameters
+  flat <- are_flat(parameters)
+  z <- fit$emulator$moves$z
+  step <- rules$search_difference * difference_side(z)
+  around <- rbind(z, matrix(z, length(z), length(z), byrow = TRUE) + diag(step, length(z)))
+  runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, flat), parameters), use, threads, record)
+  sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, step, "/")
+}
+
+# The vectors of an emulator's basis at other rows: the same combinations of its runs.
+vectors_at <- function(fit, emulator, use, threads, record) {
   w <- emulator$processes$coefficients
   last <- ncol(w)
-  values <- unit_to_values(emulator$unit, emulator$parameters)
   runs <- if (is.null(fit$emulator$simulator)) runs_given(fit, use)
-          else suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
-  made <- colSums(!is.finite(runs)) == 0
-  if (sum(made) < last) {
-    abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
+          else runs_elsewhere(fit, unit_to_values(emulator$unit, emulator$parameters), use, threads, record)
+  coordinates <- w[, -last, drop = FALSE]
+  shifted <- sweep(runs, 2, w[, last])
+  cbind(shifted %*% coordinates %*% solve(crossprod(coordinates) + diag(1e-12, last - 1)), 1)
+}
+
+runs_elsewhere <- function(fit, values, use, threads, record) {
+  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
+  failed <- sum(colSums(!is.finite(runs)) > 0)
+  if (failed) {
+    abort_numerical("The simulator failed at {failed} of {ncol(runs)} runs of the emulator, made at these rows.")
   }
-  coordinates <- w[made, -last, drop = FALSE]
-  shifted <- sweep(runs[, made, drop = FALSE], 2, w[made, last])
-  vectors <- cbind(shifted %*% coordinates %*% solve(crossprod(coordinates)), 1)
-  vectors %*% emulator$spread
+  runs
 }
 
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy

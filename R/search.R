@@ -112,7 +112,7 @@ difference_slopes <- function(model, at, context, which = seq_along(model$parame
     list(model = made$model, slopes = slopes)
   }
   asked <- names(z)[which]
-  side <- stats::setNames(ifelse(z[asked] > 1, -1, 1), asked)
+  side <- difference_side(z[asked])
   found <- seen(model, rules$search_difference * side)
   flat <- asked[colSums(found$slopes^2) == 0]
   if (!length(flat)) return(found)
@@ -122,6 +122,8 @@ difference_slopes <- function(model, at, context, which = seq_along(model$parame
   found$slopes[, match(flat, asked)] <- (up$slopes + down$slopes) / 2
   list(model = down$model, slopes = found$slopes)
 }
+
+difference_side <- function(z) ifelse(z > 1, -1, 1)
 
 # Slopes at a run from reference slopes, corrected by the runs near it. With s_i the way to run i and
 # r_i what the reference misses of it,

@@ -3,7 +3,7 @@
 fit_seed <- function(world) world$seed + 77L  # never the world's own
 
 score_world <- function(world, control = list(max_steps = 2, calibration = list(ais = list(precision = 0.3))),
-                        runs = 120, rivals = TRUE, least_squares = TRUE) {
+                        runs = NULL, rivals = TRUE, least_squares = TRUE) {
   started <- proc.time()[["elapsed"]]
   upgrade <- amiss::upgrade_model(world$base, world$measurements, world$catalogue, runs = runs, control = control,
                                   seed = fit_seed(world), threads = 1, quiet = TRUE)
@@ -22,12 +22,13 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
               attributed_condition = attributed, mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
               verdicts = mechanism_verdicts(upgrade, verdict$verdict), check_passed = check_passed(upgrade),
               verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained", headline = verdict$headline,
-              log10_bf = max(upgrade$candidates$log10_bf[upgrade$candidates$from == upgrade$models[[1]]$name]),
+              log10_bf = max(upgrade$candidates$log10_bf[upgrade$candidates$from == upgrade$models[[1]]$name],
+                             na.rm = TRUE),
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
               rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall,
               runs_total = upgrade$runs_total)
   if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world),
-                       list(paper_condition = paper_condition(world, runs)))
+                       list(paper_condition = paper_condition(world, 120)))
   row
 }
 
@@ -114,7 +115,7 @@ rival_conditions <- function(fit, world, most = 400) {
   unit <- apply(x, 2, function(v) (v - min(v)) / diff(range(v)))
   thin <- seq(1, length(r), by = ceiling(length(r) / most))
   ard <- amiss:::train_emulator_(amiss:::to_normal(unit[thin, , drop = FALSE]), NULL, list(
-    vectors = matrix(1, 3, 1), coefficients = matrix(r[thin]), singular_values = 1, discarded_ss = 0),
+    vectors = matrix(1, 3, 1), coefficients = matrix(r[thin]), singular_values = 1, discarded_ss = 0), NULL,
                                  utils::modifyList(amiss:::emulator_control,
                                                    list(starts = 2, searches = 1, max_evaluations = 40)),
                                  list(seed = 1, threads = 1))
