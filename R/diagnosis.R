@@ -194,7 +194,7 @@ unjudged_sentence <- function(fit) {
   remedy <- if (is_given(model_of(fit))) "more runs where the posterior lies, or narrower priors"
             else "more runs, narrower priors or a shorter record"
   sprintf("No odds can be given for or against any mechanism: %s. What would change it: %s.",
-          fit$trust$verdict, remedy)
+          gsub("not trusted: ", "", fit$trust$verdict), remedy)
 }
 
 # Only where the size of the error itself says that something is missing, and not that the parameters were not found.
@@ -277,7 +277,7 @@ mechanism_words <- function(model, upgrade) {
   changes <- changes_table(upgrade)
   list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
        sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))), collapse = " "),
-       evidence = paste(c(evidence_sentence(row), fallen_sentence(row)), collapse = " "),
+       evidence = evidence_sentence(row),
        brought = step_sentence(upgrade, model), against = doubt_sentence(model),
        also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
        inspect = mechanism_inspections(upgrade, model),

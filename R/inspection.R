@@ -68,7 +68,7 @@ trust_inspections <- function(fit, name) {
     if (!sampler$trusted) {
       c(sampler = sprintf(paste("The sampler's result for %s is not trusted (%s): give it more chains",
                                 "(pilot_chains, %d now)."), name,
-                          sampler$verdict, as.integer(fit$control$ais$pilot_chains)))
+                          sub("^not trusted: ", "", sampler$verdict), as.integer(fit$control$ais$pilot_chains)))
     })
 }
 
@@ -250,7 +250,8 @@ told_evidence <- 0.2  # decades, odds of 1.6 to 1, from which a mechanism that i
 nearest_trial <- function(upgrade) {
   trials <- last_trials(upgrade)
   if (!NROW(trials)) return(NULL)
-  best <- best_trial(trials)
+  open <- trials[!is.na(trials$log10_bf) & !raises_error(trials), ]
+  best <- open[which.max(open$log10_bf), ]
   best[best$probability >= rival_probability & best$log10_bf > told_evidence, ]
 }
 

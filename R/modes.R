@@ -46,10 +46,10 @@ check_some_succeeded <- function(model, call = rlang::caller_env()) {
 
 # Where searches begin: the run nearest to the record; the nearest of the half that lies farther from
 # it; and so on, each time of the half that lies farther from all before.
-start_runs <- function(model) {
+start_runs <- function(model, starts = NULL) {
   misfit <- colMeans(((model$runs$outputs - model$target) / model$noise)^2)
   misfit[!succeeded(model)] <- Inf
-  starts <- which.min(misfit)
+  starts <- starts %||% which.min(misfit)
   for (k in seq_len(min(rules$most_starts, sum(is.finite(misfit))) - 1)) {
     apart <- apply(model$runs$z, 1, function(z) min(colSums((t(model$runs$z[starts, , drop = FALSE]) - z)^2)))
     far <- is.finite(misfit) & apart >= stats::median(apart[is.finite(misfit)]) & apart > 0

@@ -25,10 +25,8 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
   looked <- look_at_mechanism(model, present, off, context)
   model <- looked$model
   if (looked$silent) return(utils::modifyList(model, list(level = "silent")))
-  if (is.null(looked$start)) return(utils::modifyList(model, list(level = "untried")))
-  search <- begin_search(model, looked$start, looked$slopes, rules$trial_stale, rules$trial_steps,
-                         renews = FALSE)
-  search <- run_search(search, context)
+  if (!length(looked$starts)) return(utils::modifyList(model, list(level = "untried")))
+  search <- search_trial(looked, context)
   model <- with_mode(search$model, search, region_of_modes(search$model, list(search), context$seed))
   model$off <- looked$off
   model$status <- search$status
@@ -37,8 +35,27 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
   model
 }
 
+# A search from the most promising start of the first look. An extension holds the present model, with its
+# mechanism switched off, and cannot be worse: if the search ends below that, it goes on from the next start.
+search_trial <- function(looked, context) {
+  model <- looked$model
+  best <- NULL
+  for (start in utils::head(looked$starts, rules$trial_starts)) {
+    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps)
+    search <- run_search(search, context)
+    model <- search$model
+    others <- c(best$at, looked$off_at)
+    value <- values_at(model, c(search$at, others), search$history, search$slopes, context)
+    if (is.null(best) || value[1] > value[2]) best <- search
+    if (is_spent(context) || all(value[1] >= value[-1]) && search$status == "converged") break
+  }
+  best$model <- model
+  best
+}
+
 # A first look: what is new at its ends and between, all else as in the present model. It shows where the
-# mechanism is switched off, and where a search begins: list(model, silent, off, start, slopes).
+# mechanism is switched off, and where searches may begin, the most promising first: list(model, silent, off,
+# off_at, starts).
 look_at_mechanism <- function(model, present, off, context) {
   old <- names(present$parameters)
   new <- setdiff(names(model$parameters), old)
@@ -65,16 +82,15 @@ look_at_mechanism <- function(model, present, off, context) {
   slopes <- matrix(0, nrow(model$runs$outputs), length(model$parameters),
                    dimnames = list(NULL, names(model$parameters)))
   slopes[, kept] <- present$present$slopes[, match(kept, old)]
+  off_at <- NULL
   if (!is.null(off) && setequal(kept, old)) {
-    first <- ncol(present$runs$outputs)
     model <- inherit_runs(model, present, off)
-    fine <- fine + first
-    fine <- c(present$present$at, fine)
+    off_at <- present$present$at
+    fine <- c(off_at, fine + ncol(present$runs$outputs))
   }
-  starts <- lapply(fine, function(at) slopes_in(model, at, fine, new, slopes))
-  value <- mapply(profile_value, fine, starts, MoreArgs = list(model = model, present = present, context = context))
-  best <- which.max(value)
-  list(model = model, silent = FALSE, off = off, start = fine[best], slopes = starts[[best]])
+  starts <- lapply(fine, function(at) list(at = at, slopes = slopes_in(model, at, fine, new, slopes)))
+  value <- vapply(starts, profile_value, 0, model, present, context)
+  list(model = model, silent = FALSE, off = off, off_at = off_at, starts = starts[order(-value)])
 }
 
 # Values of n new parameters for the first look: all at their lower ends, all at their upper ends, and
@@ -106,7 +122,9 @@ slopes_in <- function(model, at, looked, new, slopes) {
 }
 
 # What a search from here may reach: the value at the optimum of the tangent.
-profile_value <- function(at, slopes, model, present, context) {
+profile_value <- function(start, model, present, context) {
+  at <- start$at
+  slopes <- start$slopes
   history <- present$present$history
   tangent <- tangent_at(model, at, slopes, history, context)
   z <- within_limits(tangent$mean, solve(tangent$covariance), model$limit)
@@ -134,11 +152,6 @@ is_clear <- function(model, present, bar) {
   is_confirmed(model) || upper_bound(model, present) < bar || lower_bound(model, present) > bar
 }
 
-is_confirmed <- function(model) {
-  check <- model$fit$check
-  isTRUE(check$passed) && isTRUE(check$effective >= rules$effective_trial)
-}
-
 log10_factor <- function(model, present) {
   (model$fit$log_evidence - present$fit$log_evidence) / log(10)
 }
@@ -155,13 +168,6 @@ lower_bound <- function(model, present) 2 * log10_factor(model, present) - upper
 needed_factor <- function(trials, present, context) {
   seen <- Filter(function(model) !is.null(model$fit) && !raises_simulation(model, present), trials)
   max(context$control$decisive, vapply(seen, lower_bound, 0, present))
-}
-
-# How far the evidence may be off beyond its standard error.
-trial_margin <- function(model) {
-  if (is_verified(model)) 0
-  else if (is_confirmed(model)) rules$trial_margin
-  else rules$trial_doubt * (1 + (model$fit$check$ratio %||% 1))
 }
 
 # The next trial to verify, or NULL: the one of highest bound, if it may be adopted and may lead.
@@ -185,6 +191,44 @@ verify_trial <- function(model, context) {
   verify_model(model, context, first = if (is_confirmed(model)) rules$least_rounds else 1)
 }
 
+# A trial searched again from runs over all priors, far from where it ended: an extension may have a better mode
+# there, with another part of the model in the place that its mechanism takes. As it was if none is found.
+widened_trial <- function(trial, present, bar, context) {
+  model <- trial
+  p <- length(model$parameters)
+  unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
+  model <- with_runs(model, from_unit(unit, model$flat), context)$model
+  own <- list(at = trial$tangent$at, slopes = trial$tangent$slopes)
+  own[c("mean", "covariance", "history")] <- tangent_at(model, own$at, own$slopes, NULL, context)
+  modes <- list(own)
+  for (start in start_runs(model, own$at)[-1]) {
+    if (is_spent(context)) break
+    search <- begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
+    search <- run_search(search, context)
+    model <- search$model
+    modes <- c(modes, list(search))
+  }
+  found <- ranked_modes(model, modes, context)
+  best <- found$modes[[1]]
+  trial$runs <- found$model$runs
+  if (best$at == own$at) return(trial)
+  trial <- with_mode(trial, best, region_of_modes(trial, list(best), context$seed))
+  trial$draws <- NULL
+  tried_model(trial, present, bar, context)
+}
+
+# If a step ends without a winner, though much of the error is left: all trials searched again, and the race.
+second_look <- function(present, trials, context) {
+  for (name in names(trials)) {
+    if (is_spent(context) || !trials[[name]]$level %in% c("tried", "verified")) next
+    bar <- needed_factor(trials, present, context)
+    before <- trials[[name]]
+    trials[[name]] <- staged(paste(name, "again"), widened_trial(before, present, bar, context))
+    if (trials[[name]]$tangent$at != before$tangent$at) report_trial(trials[[name]], present, context)
+  }
+  race(present, trials, context)
+}
+
 # All trials on the present model and those in front verified: list(trials, present).
 race <- function(present, trials, context) {
   repeat {
@@ -194,4 +238,24 @@ race <- function(present, trials, context) {
     report_trial(trials[[name]], present, context)
   }
   trials
+}
+
+report_trial <- function(trial, present, context) {
+  what <- switch(trial$level, silent = "changes nothing", failed = "could not be computed",
+                 untried = "could not be tried: its runs failed",
+                 sprintf("log10 Bayes factor %.1f%s", log10_factor(trial, present),
+                         if (trial$level == "verified") ", verified by runs" else ""))
+  context$say("  {trial$mechanism}: {what}")
+  if (trial$level == "silent") warn_no_response(trial$mechanism)
+  if (trial$level == "failed") {
+    warn_result(c("Mechanism {.val {trial$mechanism}} could not be tried.", x = "{trial$reason}"),
+                class = "amiss_warning_trial")
+  }
+}
+
+warn_no_response <- function(mechanism) {
+  warn_input(c(
+    "Mechanism {.val {mechanism}} changes nothing: every run with it is that of the model without it.",
+    i = paste("Does this record hold what it acts on, and does the simulator use its parameters? See",
+              "{.code vignette(\"mechanisms\")}, Inside a simulator.")))
 }

@@ -6,9 +6,9 @@ search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4
                    importance_draws = 300, ess_drop = 0.3)
 
 # A search from run `at` of a model. `slopes` are right at that run to within what they change over
-# `stale` standard deviations of the prior. `renews`: whether slopes are taken by differences where steps fail.
-begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, renews = TRUE) {
-  search <- list(model = model, at = at, steps = steps, renews = renews, step = 0, damping = 0, failed = 0, small = 0,
+# `stale` standard deviations of the prior.
+begin_search <- function(model, at, slopes, stale, steps = rules$search_steps) {
+  search <- list(model = model, at = at, steps = steps, leaps = rules$leaps, left = integer(), step = 0, damping = 0, failed = 0, small = 0,
                  reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale),
                  status = "going")
   search$slopes <- secant_slopes(model, at, search$reference)
@@ -22,12 +22,12 @@ run_search <- function(search, context) {
     made <- with_runs(search$model, rbind(search$proposal), context)
     search$model <- made$model
     search <- accept(search, made$at, context)
-    if (search$renews && search$failed == rules$renew_after && !finished(search)) {
+    if (search$failed == rules$renew_after && !finished(search)) {
       search <- renew_slopes(search, context)
     }
   }
   if (is.null(search$history)) search <- look(search, context)
-  search
+  return_to_best(search, context)
 }
 
 finished <- function(search) search$status != "going"
@@ -51,10 +51,11 @@ propose <- function(search, context) {
   damped <- precision + diag(search$damping, length(z))
   target <- solve(damped, precision %*% search$mean + search$damping * z)[, 1]
   search$proposal <- within_limits(target, damped, search$model$limit)
-  move <- search$proposal - z
-  search$predicted <- sum(move * (precision %*% move)) / 2
+  gain_of <- function(to) sum((to - z) * (precision %*% (to - z))) / 2
+  search$predicted <- gain_of(search$proposal)
+  search$promised <- gain_of(within_limits(search$mean, precision, search$model$limit))
   if (search$step >= search$steps) search$status <- "steps"
-  if (search$predicted < rules$search_gain / 5) search$status <- "converged"
+  if (search$promised < rules$search_gain / 5) search$status <- "converged"
   search
 }
 
@@ -68,7 +69,8 @@ accept <- function(search, made, context) {
   value <- values_at(search$model, c(search$at, made), search$history, search$slopes, context)
   gain <- value[2] - value[1]
   better <- isTRUE(gain > 0)
-  near <- search$predicted < rules$search_gain && (!better || gain < rules$search_gain)
+  if (search$leaps > 0 && is_ridge(search, gain)) return(leap(search, made))
+  near <- search$promised < rules$search_gain && (!better || gain < rules$search_gain)
   search$small <- if (near) search$small + 1 else 0
   if (better) {
     search$at <- made
@@ -84,6 +86,38 @@ accept <- function(search, made, context) {
   if (search$small >= 2) search$status <- "converged"
   if (search$failed >= rules$stalled_after) search$status <- "stalled"
   search
+}
+
+# Along a curved ridge only short steps are better, or none, though the tangent sees far. Then the search goes
+# on from the optimum of the tangent: from there the next ones lead back to the ridge, farther along it.
+is_ridge <- function(search, gain) {
+  p <- length(search$proposal)
+  search$promised > p && search$damping <= rules$ridge_damping && !isTRUE(gain > search$promised / 10)
+}
+
+leap <- function(search, made) {
+  fine <- succeeded(search$model)[made]
+  if (!fine) return(utils::modifyList(search, list(leaps = 0, damping = max(1, 10 * search$damping))))
+  search$left <- c(search$left, search$at)
+  search$at <- made
+  search$leaps <- search$leaps - 1
+  search$damping <- 0
+  search$failed <- search$small <- 0
+  search["history"] <- list(NULL)
+  search$slopes <- secant_slopes(search$model, made, search$reference)
+  search
+}
+
+# The best of where a search ended and of the places that it leapt from.
+return_to_best <- function(search, context) {
+  if (!length(search$left)) return(search)
+  ends <- c(search$at, search$left)
+  value <- values_at(search$model, ends, search$history, search$slopes, context)
+  if (which.max(value) == 1) return(search)
+  search$at <- ends[which.max(value)]
+  search$slopes <- secant_slopes(search$model, search$at, search$reference)
+  search["history"] <- list(NULL)
+  look(search, context)
 }
 
 renew_slopes <- function(search, context) {
@@ -173,15 +207,23 @@ tangent_at <- function(model, at, slopes, history, context) {
     steep <- unname(slopes[model$rows[[k]], own, drop = FALSE])
     data <- c(record$data, list(moves = steep))
     if (!is.null(history)) {
-      return(call_engine(tangent_given_(data, record$priors, history[[k]], z[own], run, steep, engine)))
+      return(call_engine(tangent_given_(data, searched_priors(model, record), history[[k]], z[own], run, steep, engine)))
     }
     ais <- fill_ais_control(utils::modifyList(record$control$ais, search_ais))
-    call_engine(tangent_posterior_(data, record$priors, z[own], run, steep, rules$search_draws, ais,
+    call_engine(tangent_posterior_(data, searched_priors(model, record), z[own], run, steep, rules$search_draws, ais,
                                    engine))
   })
   joint <- joint_tangent(each, model$own, length(z))
   list(mean = joint$mean, covariance = joint$covariance,
        history = history %||% lapply(each, `[`, c("setting", "variance", "t")))
+}
+
+# The priors of a search. One by the simulator alone keeps the discrepancy out of what the parameters do, so that
+# it cannot do their work.
+searched_priors <- function(model, record) {
+  priors <- record$priors
+  if (isTRUE(model$alone)) priors$reach <- min(priors$reach)
+  priors
 }
 
 # log posterior density of runs, averaged over draws of error and discrepancy.
@@ -202,7 +244,7 @@ values_of <- function(model, outputs, z, history, slopes, context) {
                    t = history[[k]]$t[repeated, , drop = FALSE])
     data <- c(model$records[[k]]$data,
               list(moves = unname(slopes[rows, model$own[[k]], drop = FALSE])))
-    log_l <- call_engine(run_likelihood_(data, model$records[[k]]$priors, points,
+    log_l <- call_engine(run_likelihood_(data, searched_priors(model, model$records[[k]]), points,
                                          outputs[rows, rep(fine, each = draws), drop = FALSE],
                                          engine_context(context$seed, context$threads)))
     apply(matrix(log_l, draws), 2, log_mean_exp)

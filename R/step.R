@@ -18,6 +18,10 @@ next_step <- function(state, context) {
   trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
   trials <- race(state$present, trials, context)
   table <- trial_table(trials, state$present, left)
+  if (!may_be_adopted(best_trial(table), context$control) && asks_again(state, context)) {
+    trials <- second_look(state$present, trials, context)
+    table <- trial_table(trials, state$present, left)
+  }
   state$candidates <- rbind(state$candidates, table)
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
   best <- best_trial(table)
@@ -30,6 +34,12 @@ next_step <- function(state, context) {
   report_model(measured, context)
   state$models <- c(state$models, list(measured))
   state
+}
+
+# Whether so much of the error is left that a mechanism of the catalogue may have been missed.
+asks_again <- function(state, context) {
+  can_be_run <- state$present$level != "given"
+  can_be_run && remaining_error(last_model(state$models), state$started$measurements)$large
 }
 
 # Mechanisms that were not adopted and can be applied on top of what was.
@@ -138,26 +148,6 @@ report_model <- function(model, context) {
     if (nrow(first)) paste("responds most to {.field {first$boundary}}",
                            "(log10 Bayes factor {round(first$log10_bf_dropped, 1)})")
     else "shows no response to a boundary condition"))
-}
-
-report_trial <- function(trial, present, context) {
-  what <- switch(trial$level, silent = "changes nothing", failed = "could not be computed",
-                 untried = "could not be tried: its runs failed",
-                 sprintf("log10 Bayes factor %.1f%s", log10_factor(trial, present),
-                         if (trial$level == "verified") ", verified by runs" else ""))
-  context$say("  {trial$mechanism}: {what}")
-  if (trial$level == "silent") warn_no_response(trial$mechanism)
-  if (trial$level == "failed") {
-    warn_result(c("Mechanism {.val {trial$mechanism}} could not be tried.", x = "{trial$reason}"),
-                class = "amiss_warning_trial")
-  }
-}
-
-warn_no_response <- function(mechanism) {
-  warn_input(c(
-    "Mechanism {.val {mechanism}} changes nothing: every run with it is that of the model without it.",
-    i = paste("Does this record hold what it acts on, and does the simulator use its parameters? See",
-              "{.code vignette(\"mechanisms\")}, Inside a simulator.")))
 }
 
 # Why no mechanism was adopted: list(id, words).

@@ -43,6 +43,18 @@ as_tried <- function(row, trial) {
   row
 }
 
+# How far the evidence may be off beyond its standard error.
+trial_margin <- function(model) {
+  if (is_verified(model)) 0
+  else if (is_confirmed(model)) rules$trial_margin
+  else rules$trial_doubt * (1 + (model$fit$check$ratio %||% 1))
+}
+
+is_confirmed <- function(model) {
+  check <- model$fit$check
+  isTRUE(check$passed) && isTRUE(check$effective >= rules$effective_trial)
+}
+
 # The simulation's own error in calibration over that of the fit `current`.
 error_ratio <- function(fit, current) {
   sqrt(mean(left_by_simulation(fit)^2) / mean(left_by_simulation(current)^2))

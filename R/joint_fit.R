@@ -1,0 +1,58 @@
+# Calibrations of several records that share parameters, as one.
+
+# A parameter that records share has one prior.
+check_one_prior <- function(each, call = rlang::caller_env()) {
+  all <- do.call(c, unname(each))
+  for (name in unique(names(all)[duplicated(names(all))])) {
+    priors <- vapply(all[names(all) == name], function(p) format(p$prior), "")
+    if (length(unique(priors)) > 1) {
+      abort_input(c("The parameter {.val {name}} has different priors: {.val {unique(unname(priors))}}.",
+                    i = "Parameters of one name are one parameter: give it one prior, or two names."), call = call)
+    }
+  }
+}
+
+# The parameters of records that share those of the same name.
+joint_parameters <- function(fits) {
+  all <- do.call(c, lapply(unname(fits), function(fit) fit$emulator$parameters))
+  all[!duplicated(names(all))]
+}
+
+# `fits`: calibrations with the same draws.
+new_joint <- function(fits) {
+  parameters <- joint_parameters(fits)
+  values <- do.call(cbind, unname(lapply(fits, `[[`, "values")))[, names(parameters), drop = FALSE]
+  first <- fits[[1]]
+  untrusted <- Filter(function(name) !fits[[name]]$trust$trusted, names(fits))
+  verdict <- if (!length(untrusted)) first$trust$verdict else {
+    paste(vapply(untrusted, function(name) paste0(name, ": ", fits[[name]]$trust$verdict), ""), collapse = "; ")
+  }
+  posterior <- first$posterior[setdiff(names(first$posterior), c("setting", "variance", "t"))]
+  units <- do.call(cbind, unname(lapply(fits, posterior_unit)))
+  named <- unlist(lapply(fits, function(fit) names(fit$emulator$parameters)))
+  posterior$unit <- unname(units[, match(names(parameters), named), drop = FALSE])
+  structure(list(format_version = format_version, records = lapply(fits, as_part), parameters = parameters,
+                 values = values, weights = first$weights, posterior = posterior, log_evidence = first$log_evidence,
+                 standard_error = first$standard_error, interval = first$interval, check = joint_check(fits),
+                 trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
+                 runs_made = first$runs_made, seed = first$seed), class = "amiss_joint")
+}
+
+# What the checks say of all records: passed where each has, with the largest error in units of the noise.
+joint_check <- function(fits) {
+  checks <- Filter(Negate(is.null), lapply(fits, `[[`, "check"))
+  if (!length(checks)) return(NULL)
+  list(ratio = max(vapply(checks, `[[`, 0, "ratio")), effective = checks[[1]]$effective,
+       border = max(vapply(checks, `[[`, 0, "border")), passed = all(vapply(checks, `[[`, NA, "passed")),
+       verdict = paste0(names(checks), ": ", vapply(checks, `[[`, "", "verdict"), collapse = "; "))
+}
+
+# Of one record its calibration, of several all of them together.
+joined_fit <- function(fits) if (length(fits) == 1) fits[[1]] else new_joint(fits)
+
+# What the simulation leaves of all records, of several each in units of its noise.
+left_by_simulation <- function(fit) {
+  fits <- record_fits(fit)
+  if (length(fits) == 1) return(stats::residuals(fits[[1]]))
+  unlist(lapply(unname(fits), function(one) stats::residuals(one) / one$measurements$noise_sd))
+}
