@@ -58,9 +58,10 @@ print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   say_parts(parts)
 })
 
-# The first step's trials, best first.
+# The first step's trials that have a number, best first.
 first_trials <- function(upgrade) {
   table <- upgrade$candidates[upgrade$candidates$from == upgrade$models[[1]]$name, ]
+  table <- table[!is.na(table$log10_bf), ]
   table[order(-table$log10_bf), ]
 }
 
@@ -162,6 +163,7 @@ evidence_sentence <- function(row) {
 sure_sentences <- function(upgrade) {
   if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
   trials <- first_trials(upgrade)
+  if (!nrow(trials)) return(c(missing_sentence(upgrade), "No mechanism could be computed."))
   adopted <- adopted_models(upgrade)
   best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
   needed <-

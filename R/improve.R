@@ -78,7 +78,29 @@ joint_unit <- function(model, fits) {
 fits_in_region <- function(model, context, ais) {
   model <- with_centre(model)
   sets <- lapply(seq_along(model$records), function(k) record_setting(model, k, context, ais))
-  calibrate_sets(sets, context$threads)$fits
+  without_failing(model, calibrate_sets(sets, context$threads)$fits)
+}
+
+# The posterior ends where the simulator fails: draws whose nearest run failed are impossible.
+without_failing <- function(model, fits) {
+  failed <- !succeeded(model)
+  near <- straight_distance(model) <= 2
+  if (!any(failed & near)) return(fits)
+  straight <- straightened(model$region)
+  scaled <- function(z) forwardsolve(model$region$root, (t(z) - straight$z) / straight$slope)
+  draws <- scaled(from_unit(joint_unit(model, fits), model$flat))
+  runs <- scaled(model$runs$z[near, , drop = FALSE])
+  nearest <- apply(draws, 2, function(draw) which.min(colSums((runs - draw)^2)))
+  possible <- !failed[near][nearest]
+  weights <- fits[[1]]$weights * possible
+  if (sum(weights) < 1e-6) return(fits)
+  lapply(fits, function(fit) {
+    fit$log_evidence <- fit$log_evidence + log(sum(weights))
+    fit$interval <- fit$interval + log(sum(weights))
+    fit$weights <- fit$posterior$weights <- weights / sum(weights)
+    fit$failing <- 1 - sum(weights)
+    fit
+  })
 }
 
 # The tangent at the centre of the region, by differences: what the discrepancy keeps out of hangs on it
@@ -204,7 +226,6 @@ check_by_runs <- function(model, fits, n, context) {
   model <- made$model
   draws <- draws[seq_along(made$at)]
   fine <- succeeded(model)[made$at]
-  model$failed_share <- mean(!fine)
   model$checked <- list(draws = draws[fine], at = made$at[fine],
                         times = tabulate(match(drawn, draws))[seq_along(draws)][fine])
   if (!any(fine)) return(list(model = model, fits = fits))
@@ -246,6 +267,7 @@ verify_model <- function(model, context, first = 1) {
   }
   best <- best %||% found
   best$model$runs <- model$runs
+  if (!is.null(model$modes)) best$model$modes <- confirmed_modes(best$model, model$modes)
   with_fit(best$model, best$fits, "verified", round, context)
 }
 
@@ -276,6 +298,7 @@ with_fit <- function(model, fits, level, rounds, context) {
     fit$rounds <- rounds
     fit$runs_made <- runs_spent(context)
     fit$modes <- model$modes
+    if (isFALSE(fit$modes$agree)) fit$trust <- not_agreed(fit$trust, fit$modes)
     fit
   })
   model$fit <- joined_fit(stats::setNames(fits, names(model$simulators)))
@@ -283,11 +306,27 @@ with_fit <- function(model, fits, level, rounds, context) {
   model
 }
 
+# Of searches from several starts no two led to one mode: there may be a better one.
+not_agreed <- function(trust, modes) {
+  why <- if (modes$searches < 2) "the budget allowed a single search, so that no other confirms its mode"
+         else sprintf("no two of %d searches led to one mode", modes$searches)
+  list(trusted = FALSE, verdict = paste0(c(if (!trust$trusted) trust$verdict, paste("not trusted:", why)),
+                                         collapse = "; "))
+}
+
+# Whether a second search ended in the region of the posterior, as seen in the end.
+confirmed_modes <- function(model, modes) {
+  inside <- sum(straight_distance(model)[modes$ends] <= 1)
+  modes$agree <- modes$agree || inside > 1
+  modes
+}
+
 # The base model from its first run to its verified posterior.
 calibrate_model <- function(model, context) {
   found <- find_modes(model, context)
   region <- region_of_modes(found$model, found$modes, context$seed)
   model <- with_mode(found$model, found$modes[[1]], region)
-  model$modes <- list(agree = found$agree, searches = length(found$modes))
+  model$modes <- list(agree = found$agree, searches = length(found$modes),
+                      ends = vapply(found$modes, `[[`, 0, "at"))
   verify_model(model, context)
 }

@@ -43,7 +43,8 @@ parameter_table <- function(fit) {
 #' @param ... Not used: an argument that is not known is an error.
 #' @return `coef()`: the posterior medians. `confint()`: a matrix of the ends of credible intervals. `vcov()`: the
 #'   covariance of the posterior. `tidy()`: a data frame with one row for each parameter: `term`, `label`, `unit`,
-#'   `estimate` (the median), `std.error` (the posterior's standard deviation), `conf.low`, `conf.high`.
+#'   `estimate` (the median), `std.error` (the posterior's standard deviation), `conf.low`, `conf.high`, and how many
+#'   `modes` the posterior has: over several, median and interval describe none.
 #' @seealso [as_draws][as.data.frame.amiss_fit] for the draws themselves.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
@@ -111,7 +112,8 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
   data.frame(term = rownames(ends), label = vapply(declared, `[[`, "", "label"),
              unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
              std.error = unname(sqrt(diag(stats::vcov(x)))),
-             conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]), row.names = NULL)
+             conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]),
+             modes = vapply(rownames(ends), function(name) length(parameter_modes(x, name)), 0L), row.names = NULL)
 }
 
 #' Posterior draws as other packages take them
@@ -200,11 +202,43 @@ edge_of_prior <- function(fit) {
 
 posterior_centre <- function(fit) colSums(fit$weights * to_normal(posterior_unit(fit)))
 
-# The first parameters of a fit, and how many there are besides.
+# The first parameters of a fit, and how many there are besides; and those whose posterior has several modes.
 say_parameters <- function(fit, most) {
   table <- parameter_table(fit)
   say_table(utils::head(table, most))
   if (nrow(table) > most) cli::cli_text("{nrow(table) - most} more parameter{?s}: see {.fun tidy}")
+  told <- mode_words(fit)
+  if (length(told)) cli::cli_bullets(stats::setNames(told, rep("!", length(told))))
+}
+
+# Modes of a parameter: parts of its draws that a gap keeps apart, list(lower95, upper95, share) each. A gap counts if it
+# is a quarter of the 95 % interval or more, with a twentieth of the posterior on either side.
+parameter_modes <- function(fit, name) {
+  x <- fit$values[, name]
+  keep <- fit$weights > 0
+  order <- order(x[keep])
+  x <- x[keep][order]
+  w <- fit$weights[keep][order] / sum(fit$weights[keep])
+  width <- diff(weighted_quantile(x, w, c(0.025, 0.975)))
+  below <- cumsum(w)[-length(w)]
+  gap <- which(diff(x) > 0.25 * width & below > 0.05 & below < 0.95)
+  part <- findInterval(seq_along(x), gap + 1)
+  lapply(unname(split(seq_along(x), part)), function(own) {
+    ends <- weighted_quantile(x[own], w[own], c(0.025, 0.975))
+    list(lower95 = ends[1], upper95 = ends[2], share = sum(w[own]))
+  })
+}
+
+# A sentence for each parameter of several modes: its median and interval hold over none of them.
+mode_words <- function(fit) {
+  unlist(lapply(names(drawn_parameters(fit)), function(name) {
+    modes <- parameter_modes(fit, name)
+    if (length(modes) < 2) return(NULL)
+    ends <- vapply(modes, function(mode) {
+      sprintf("%s (%s)", interval_words(mode$lower95, mode$upper95), percent(mode$share))
+    }, "")
+    sprintf("%s has %d modes: %s. Its median and interval describe none of them.", name, length(modes), listed(ends))
+  }))
 }
 
 posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, cor = TRUE)$cor

@@ -170,7 +170,8 @@ needed_factor <- function(trials, present, context) {
   max(context$control$decisive, vapply(seen, lower_bound, 0, present))
 }
 
-# The next trial to verify, or NULL: the one of highest bound, if it may be adopted and may lead.
+# The next trial to verify, or NULL: of those that may be adopted and may lead the one of highest evidence, so that
+# what the others must reach is known early.
 next_to_verify <- function(trials, present, context) {
   open <- Filter(function(model) model$level == "tried" && !raises_simulation(model, present), trials)
   if (!length(open)) return(NULL)
@@ -178,8 +179,8 @@ next_to_verify <- function(trials, present, context) {
   needed <- context$control$decisive
   verified <- Filter(function(model) is_verified(model) && !raises_simulation(model, present), trials)
   if (length(verified)) needed <- max(needed, vapply(verified, log10_factor, 0, present))
-  best <- which.max(bound)
-  if (bound[best] >= needed) open[[best]]$mechanism
+  open <- open[bound >= needed]
+  if (length(open)) open[[which.max(vapply(open, log10_factor, 0, present))]]$mechanism
 }
 
 raises_simulation <- function(model, present) {

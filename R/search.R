@@ -133,8 +133,10 @@ renew_slopes <- function(search, context) {
 
 # Slopes by differences, on the same side wherever the priors allow it; where a small one shows nothing, by larger
 # ones on both sides: list(model, slopes), no slopes if the budget ends.
-difference_slopes <- function(model, at, context, which = seq_along(model$parameters)) {
+difference_slopes <- function(model, at, context) {
   z <- model$runs$z[at, ]
+  known <- given_slopes(model, z)
+  if (!is.null(known)) return(list(model = model, slopes = known))
   seen <- function(model, step) {
     points <- matrix(z, length(step), length(z), byrow = TRUE)
     points[cbind(seq_along(step), match(names(step), names(z)))] <- z[names(step)] + step
@@ -145,8 +147,8 @@ difference_slopes <- function(model, at, context, which = seq_along(model$parame
     slopes[, colSums(!is.finite(slopes)) > 0] <- 0
     list(model = made$model, slopes = slopes)
   }
-  asked <- names(z)[which]
-  side <- difference_side(z[asked])
+  asked <- names(z)
+  side <- difference_side(z)
   found <- seen(model, rules$search_difference * side)
   flat <- asked[colSums(found$slopes^2) == 0]
   if (!length(flat)) return(found)
@@ -155,6 +157,24 @@ difference_slopes <- function(model, at, context, which = seq_along(model$parame
   if (is.null(up$slopes) || is.null(down$slopes)) return(list(model = down$model))
   found$slopes[, match(flat, asked)] <- (up$slopes + down$slopes) / 2
   list(model = down$model, slopes = found$slopes)
+}
+
+# Those that the simulators give themselves, for a unit of z; NULL unless all do.
+given_slopes <- function(model, z) {
+  unit <- to_unit(rbind(z), model$flat)
+  by <- 1e-4
+  ends <- lapply(c(-by, by), function(step) to_unit(rbind(z + step), model$flat))
+  slopes <- matrix(0, length(model$target), length(z), dimnames = list(NULL, names(z)))
+  for (k in seq_along(model$simulators)) {
+    own <- model$own[[k]]
+    parameters <- model$parameters[own]
+    value <- function(unit) unit_to_values(unit[, own, drop = FALSE], parameters)
+    seen <- measured_slopes(model$simulators[[k]], value(unit), model$records[[k]]$measurements)
+    if (is.null(seen)) return(NULL)
+    per_z <- as.numeric(value(ends[[2]]) - value(ends[[1]])) / (2 * by)
+    slopes[model$rows[[k]], own] <- sweep(seen, 2, per_z, "*")
+  }
+  slopes
 }
 
 difference_side <- function(z) ifelse(z > 1, -1, 1)
