@@ -75,8 +75,10 @@ ranked_modes <- function(model, modes, context) {
   list(model = model, modes = modes, agree = FALSE)
 }
 
-# Near each other as both see it, or without a valley between them: a ridge is one mode. list(model, yes).
+# Of one height, near each other as both see it, or without a valley between them: a ridge is one mode, and the region
+# holds all modes of one height. list(model, yes).
 is_same_mode <- function(model, one, other, context) {
+  if (one$value - other$value < rules$resample_gain) return(list(model = model, yes = TRUE))
   apart <- model$runs$z[other$at, ] - model$runs$z[one$at, ]
   distance <- function(covariance) sum(apart * solve(covariance, apart))
   if (max(distance(one$covariance), distance(other$covariance)) < 2 * length(apart)) {

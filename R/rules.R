@@ -37,6 +37,8 @@ rule_table <- list(
                            "small beside the prior, far above rounding", "bench/starts.R"),
   wide_difference = rule(0.5, "prior sd", "difference if a smaller one shows nothing",
                          "a simulator with thresholds is flat over small ones", "bench/starts.R"),
+  pace = rule(5, "steps", "steps that together must gain a nat for a search to go on",
+              "what creeps along a ridge is left to the runs in its region", "bench/starts.R"),
   renew_after = rule(3, "steps", "failed steps after which slopes are taken by differences",
                      "each failed step has corrected the slopes along one direction", "bench/starts.R"),
   stalled_after = rule(7, "steps", "failed steps after which a search ends",

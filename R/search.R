@@ -83,7 +83,9 @@ accept <- function(search, made, context) {
     search$damping <- max(1, 10 * search$damping)
   }
   search$slopes <- secant_slopes(search$model, search$at, search$reference)
+  search$gains <- c(search$gains, max(0, gain, na.rm = TRUE))
   if (search$small >= 2) search$status <- "converged"
+  if (sum(utils::tail(search$gains, rules$pace)) < 1 && length(search$gains) >= rules$pace) search$status <- "slow"
   if (search$failed >= rules$stalled_after) search$status <- "stalled"
   search
 }
@@ -101,6 +103,7 @@ leap <- function(search, made) {
   search$left <- c(search$left, search$at)
   search$at <- made
   search$leaps <- search$leaps - 1
+  search["gains"] <- list(NULL)
   search$damping <- 0
   search$failed <- search$small <- 0
   search["history"] <- list(NULL)
@@ -127,6 +130,7 @@ renew_slopes <- function(search, context) {
   search$reference <- list(z = search$model$runs$z[search$at, ], slopes = found$slopes, stale = 0)
   search$slopes <- found$slopes
   search["history"] <- list(NULL)
+  search["gains"] <- list(NULL)
   search$damping <- 0
   search
 }
