@@ -173,6 +173,7 @@ sure_sentences <- function(upgrade) {
   if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
     if (raises_error(best)) needed <- raised_sentence(best)
+    else if (is_unverified(best, upgrade)) needed <- "It was not adopted, because no runs were left to verify it."
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
              trust_sentence(upgrade, best)))
   }

@@ -255,9 +255,16 @@ nearest_trial <- function(upgrade) {
   best[best$probability >= rival_probability & best$log10_bf > told_evidence, ]
 }
 
+# A trial that would have been verified, had the budget not ended.
+is_unverified <- function(row, upgrade) row$judged_by == "trial" && row$log10_bf >= upgrade$control$decisive
+
 nearest_inspection <- function(upgrade) {
   best <- nearest_trial(upgrade)
   if (!NROW(best) || unjudged(upgrade) || best$upper95 - best$lower95 > too_rough) return(NULL)
+  if (is_unverified(best, upgrade)) {
+    return(c(nearest = sprintf(paste("Not verified is %s (odds of %s): a larger budget (control$runs_total) would",
+                                     "decide it."), best$mechanism, odds(best$log10_bf))))
+  }
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf("Not decided is %s (odds of %s%s): a longer record%s would decide it%s.",

@@ -36,10 +36,11 @@ next_step <- function(state, context) {
   state
 }
 
-# Whether so much of the error is left that a mechanism of the catalogue may have been missed.
+# Whether nothing was found yet, though so much of the error is left that a mechanism of the catalogue may have been
+# missed.
 asks_again <- function(state, context) {
-  can_be_run <- state$present$level != "given"
-  can_be_run && remaining_error(last_model(state$models), state$started$measurements)$large
+  none_yet <- length(state$models) == 1 && state$present$level != "given"
+  none_yet && remaining_error(last_model(state$models), state$started$measurements)$large
 }
 
 # Mechanisms that were not adopted and can be applied on top of what was.

@@ -11,7 +11,7 @@ chosen <- strsplit(option("catchments", "L0123002,L0123001", "L0123002"), ",")[[
 from <- as.integer(option("from", 2001))
 seed <- as.numeric(option("seed", 1))
 runs <- as.integer(option("runs", 150, 40))
-quick <- if (smoke) list(max_steps = 1, rounds = 0, calibration = list(ais = list(pilot_chains = 48, groups = 4)),
+quick <- if (smoke) list(max_steps = 1, rounds = 1, calibration = list(ais = list(pilot_chains = 48, groups = 4)),
                          attribution = list(surrogates = 19))
 
 years <- c(warmup = 1, calibrate = 3, validate = 2)
@@ -103,7 +103,7 @@ river_mechanisms <- function() {
 score_catchment <- function(code) {
   record <- draw_catchment(code)
   started <- proc.time()[["elapsed"]]
-  upgrade <- upgrade_model(record$base, record$measurements, record$catalogue, runs = runs, control = quick,
+  upgrade <- upgrade_model(record$base, record$measurements, record$catalogue, control = quick,
                            seed = seed, quiet = TRUE)
   listed <- function(x) if (length(x)) paste(x, collapse = ", ") else "nothing"
   answers <- upgrade$models[[1]]$attribution$table

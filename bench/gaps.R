@@ -34,7 +34,7 @@ catalogue <- if (smoke) study$catalogue["south solar aperture"] else study$catal
 class(catalogue) <- class(study$catalogue)
 
 upgrades <- lapply(records, function(lost) {
-  suppressMessages(upgrade_model(study$model, measured(lost), catalogue, runs = if (smoke) 40 else study$runs,
+  suppressMessages(upgrade_model(study$model, measured(lost), catalogue, runs = study$runs,
                                  control = c(list(max_steps = 1), quick), seed = seed, threads = threads,
                                  quiet = TRUE))
 })

@@ -11,7 +11,7 @@ threads <- as.integer(option("threads", 1))
 runs <- as.integer(option("runs", 150, 60))
 control <- list(max_steps = 2)
 if (smoke) {
-  control <- list(max_steps = 1, rounds = 0, calibration = list(ais = list(pilot_chains = 48, groups = 4)),
+  control <- list(max_steps = 1, rounds = 1, calibration = list(ais = list(pilot_chains = 48, groups = 4)),
                   attribution = list(surrogates = 19))
 }
 

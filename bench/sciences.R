@@ -21,7 +21,7 @@ quick <- if (smoke) list(max_steps = 1, calibration = list(ais = list(pilot_chai
 score_record <- function(name) {
   record <- get(paste0("draw_", name))(seed)
   started <- proc.time()[["elapsed"]]
-  upgrade <- upgrade_model(record$base, record$measurements, record$catalogue, runs = runs, control = quick,
+  upgrade <- upgrade_model(record$base, record$measurements, record$catalogue, control = quick,
                            seed = seed, quiet = TRUE)
   listed <- function(x) if (length(x)) paste(x, collapse = ", ") else "nothing"
   adopted <- upgrade$models[-1]

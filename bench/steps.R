@@ -66,9 +66,9 @@ one_world <- function(seed, common, smoke) {
               function(rain, factor) rain * factor),
     drifting_sensor(0.3, "mm/d"))
   off <- level(true, reaching, sun, 1, parts) - clean
-  control <- if (smoke) list(max_steps = 1, rounds = 0, attribution = list(surrogates = 19),
+  control <- if (smoke) list(max_steps = 1, rounds = 1, attribution = list(surrogates = 19),
                              calibration = list(ais = list(pilot_chains = 48, groups = 4)))
-  upgrade <- upgrade_model(base, record, mechanisms, runs = 100, control = control, seed = seed, quiet = TRUE)
+  upgrade <- upgrade_model(base, record, mechanisms, control = control, seed = seed, quiet = TRUE)
   adopted <- upgrade$models[-1]
   doubts <- lapply(adopted, `[[`, "doubts")
   verdicts <- vapply(adopted, `[[`, "", "verdict")
