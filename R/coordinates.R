@@ -29,54 +29,66 @@ to_unit <- function(z, flat) {
   pmin(pmax(unit, 0), 1)
 }
 
-# Of normal coordinates x.
-from_normal <- function(x, flat) {
-  z <- x
-  z[, flat] <- 2 * flat_limit * (stats::pnorm(x[, flat]) - 0.5)
-  z
-}
-
-# The most probable point of N(mean, precision^-1) between -limit and limit: one coordinate after
-# the other, each at its best given the others.
+# The most probable point of N(mean, precision^-1) between -limit and limit, by an active set: of the coordinates held at
+# an end that one is let go from which the density rises fastest inwards; the others go to their best, or to the first
+# end in their way.
 within_limits <- function(mean, precision, limit) {
   z <- pmin(pmax(mean, -limit), limit)
-  for (sweep in 1:200) {
-    before <- z
-    for (j in seq_along(z)) {
-      step <- sum(precision[j, ] * (z - mean)) / precision[j, j]
-      z[j] <- min(max(z[j] - step, -limit[j]), limit[j])
+  held <- abs(z) >= limit
+  for (try in seq_len(20 * length(z))) {
+    if (any(!held)) {
+      pull <- -as.numeric(precision[!held, , drop = FALSE] %*% (z - mean))
+      step <- solve(precision[!held, !held, drop = FALSE], pull)
+      room <- ifelse(step == 0, Inf, (sign(step) * limit[!held] - z[!held]) / step)
+      z[!held] <- z[!held] + min(1, room) * step
+      if (min(room) < 1) {
+        held[which(!held)[which.min(room)]] <- TRUE
+        next
+      }
     }
-    if (max(abs(z - before)) < 1e-6) break
+    inwards <- ifelse(held, as.numeric(precision %*% (z - mean)) * sign(z), 0)
+    if (max(inwards) < 1e-9) break
+    held[which.max(inwards)] <- FALSE
   }
-  z
+  pmin(pmax(z, -limit), limit)
 }
 
-# n draws of the same distribution, by Gibbs sampling from its most probable point.
+# n draws of the same distribution, by hit and run: from the most probable point along random directions, equal in all
+# of them once the covariance is taken out, so that a narrow ridge does not slow it.
 draws_within <- function(mean, covariance, limit, n, seed) {
-  precision <- solve(covariance)
-  sd <- 1 / sqrt(diag(precision))
   p <- length(mean)
-  burn <- 50
-  uniform <- with_seed(seed, matrix(stats::runif((n + burn) * p), n + burn))
-  z <- within_limits(mean, precision, limit)
-  draws <- matrix(0, n + burn, p)
-  for (i in seq_len(n + burn)) {
-    for (j in seq_len(p)) {
-      centre <- z[j] - sum(precision[j, ] * (z - mean)) / precision[j, j]
-      z[j] <- truncated_quantile(uniform[i, j], centre, sd[j], limit[j])
-    }
-    draws[i, ] <- z
+  root <- t(chol(covariance))
+  z <- within_limits(mean, solve(covariance), limit)
+  white <- forwardsolve(root, z - mean)
+  moves <- (n + burn_in) * p
+  random <- with_seed(seed, list(direction = matrix(stats::rnorm(moves * p), p), u = stats::runif(moves)))
+  draws <- matrix(0, n + burn_in, p)
+  for (i in seq_len(moves)) {
+    direction <- random$direction[, i] / sqrt(sum(random$direction[, i]^2))
+    way <- as.numeric(root %*% direction)
+    ends <- rbind((-limit - z) / way, (limit - z) / way)
+    lower <- max(pmin(ends[1, ], ends[2, ]), -Inf, na.rm = TRUE)
+    upper <- min(pmax(ends[1, ], ends[2, ]), Inf, na.rm = TRUE)
+    step <- truncated_quantile(random$u[i], -sum(white * direction), 1, min(lower, 0), max(upper, 0))
+    z <- pmin(pmax(z + step * way, -limit), limit)
+    white <- white + step * direction
+    if (i %% p == 0) draws[i / p, ] <- z
   }
-  draws[-seq_len(burn), , drop = FALSE]
+  draws[-seq_len(burn_in), , drop = FALSE]
 }
 
-# Quantile of N(centre, sd^2) between -limit and limit. Far outside, where the normal distribution
-# function is lost to rounding, the density falls exponentially from the nearer end.
-truncated_quantile <- function(u, centre, sd, limit) {
-  ends <- stats::pnorm(c(-limit, limit), centre, sd)
+burn_in <- 50  # draws that the first point is forgotten in
+
+# Quantile of N(centre, sd^2) between two ends. Far outside, where the normal distribution function is lost to rounding,
+# the density falls exponentially from the nearer end.
+truncated_quantile <- function(u, centre, sd, lower, upper) {
+  ends <- stats::pnorm(c(lower, upper), centre, sd)
   if (diff(ends) > 1e-10) {
-    return(min(max(stats::qnorm(ends[1] + u * diff(ends), centre, sd), -limit), limit))
+    return(min(max(stats::qnorm(ends[1] + u * diff(ends), centre, sd), lower), upper))
   }
-  beyond <- abs(centre) - limit
-  sign(centre) * max(limit + log1p(-u * (1 - exp(-2 * limit * beyond / sd^2))) * sd^2 / beyond, -limit)
+  above <- centre > upper
+  beyond <- if (above) centre - upper else lower - centre
+  if (above) u <- 1 - u
+  inwards <- -log1p(-u * (1 - exp(-(upper - lower) * beyond / sd^2))) * sd^2 / beyond
+  if (above) max(upper - inwards, lower) else min(lower + inwards, upper)
 }

@@ -48,6 +48,7 @@ scores_table <- function(upgrade) {
 candidates_words <- function(upgrade) {
   if (is.null(upgrade$candidates)) return(NULL)
   table <- candidate_table(upgrade)
+  if (!nrow(table)) return(NULL)
   table <- table[order(table$step, -table$log10_bf), ]
   drives <- vapply(table$mechanism, function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,

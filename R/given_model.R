@@ -21,7 +21,8 @@ given_model <- function(ensembles, measurements, name, context, parent = NULL, m
   }, unname(ensembles), unname(measurements))
   fits <- calibrate_sets(sets, context$threads)$fits
   fits <- lapply(fits, function(fit) {
-    fit$rounds <- fit$runs_made <- 0
+    fit$rounds <- 0
+    fit$runs_made <- runs_spent(context)
     fit
   })
   list(name = name, parent = parent, mechanism = mechanism, simulators = ensembles,

@@ -267,7 +267,7 @@ verify_model <- function(model, context, first = 1) {
   }
   best <- best %||% found
   best$model$runs <- model$runs
-  if (!is.null(model$modes)) best$model$modes <- confirmed_modes(best$model, model$modes)
+  if (!is.null(model$modes)) best$model$modes <- confirmed_modes(best$model, model$modes, best$fits)
   with_fit(best$model, best$fits, "verified", round, context)
 }
 
@@ -298,7 +298,7 @@ with_fit <- function(model, fits, level, rounds, context) {
     fit$rounds <- rounds
     fit$runs_made <- runs_spent(context)
     fit$modes <- model$modes
-    if (isFALSE(fit$modes$agree)) fit$trust <- not_agreed(fit$trust, fit$modes)
+    if (isFALSE(fit$modes$agree) || isTRUE(fit$modes$lost > 0)) fit$trust <- not_agreed(fit$trust, fit$modes)
     fit
   })
   model$fit <- joined_fit(stats::setNames(fits, names(model$simulators)))
@@ -308,17 +308,32 @@ with_fit <- function(model, fits, level, rounds, context) {
 
 # Of searches from several starts no two led to one mode: there may be a better one.
 not_agreed <- function(trust, modes) {
-  why <- if (modes$searches < 2) "the budget allowed a single search, so that no other confirms its mode"
+  why <- if (isTRUE(modes$lost > 0)) sprintf("no draws lie at %d of the modes that searches found", modes$lost)
+         else if (modes$searches < 2) "the budget allowed a single search, so that no other confirms its mode"
          else sprintf("no two of %d searches led to one mode", modes$searches)
   list(trusted = FALSE, verdict = paste0(c(if (!trust$trusted) trust$verdict, paste("not trusted:", why)),
                                          collapse = "; "))
 }
 
-# Whether a second search ended in the region of the posterior, as seen in the end.
-confirmed_modes <- function(model, modes) {
+# Whether a second search ended in the region of the posterior, as seen in the end, and whether draws lie at each mode.
+confirmed_modes <- function(model, modes, fits) {
   inside <- sum(straight_distance(model)[modes$ends] <= 1)
   modes$agree <- modes$agree || inside > 1
+  z <- from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$flat)
+  seen <- vapply(modes$found, function(mode) {
+    apart <- forwardsolve(t(chol(mode$covariance)), t(z) - mode$z)
+    any(colSums(apart^2) < 4 * (ncol(z) + 4))
+  }, NA)
+  modes$lost <- sum(!seen)
+  modes$found <- NULL
   modes
+}
+
+modes_that_count <- function(model, modes) {
+  value <- vapply(modes, function(mode) mode$value %||% 0, 0)
+  lapply(modes[value > max(value) - rules$resample_gain], function(mode) {
+    list(z = model$runs$z[mode$at, ], covariance = mode$covariance)
+  })
 }
 
 # The base model from its first run to its verified posterior.
@@ -327,6 +342,6 @@ calibrate_model <- function(model, context) {
   region <- region_of_modes(found$model, found$modes, context$seed)
   model <- with_mode(found$model, found$modes[[1]], region)
   model$modes <- list(agree = found$agree, searches = length(found$modes),
-                      ends = vapply(found$modes, `[[`, 0, "at"))
+                      ends = vapply(found$modes, `[[`, 0, "at"), found = modes_that_count(found$model, found$modes))
   verify_model(model, context)
 }

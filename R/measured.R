@@ -13,7 +13,7 @@ measured_model <- function(model, context) {
 predicted_record <- function(model, context) {
   fits <- record_fits(model$fit)
   each <- lapply(seq_along(fits), function(k) {
-    prediction <- if (length(model$checked$at)) prediction_by_runs(model, fits[[k]], k)
+    prediction <- if (model$level != "given") prediction_by_runs(model, fits[[k]], k)
                   else stats::predict(fits[[k]], use = predictable(fits[[k]]), seed = context$seed,
                                       threads = context$threads)
     list(prediction = prediction, scores = prediction_scores(prediction))
@@ -29,9 +29,16 @@ predicted_record <- function(model, context) {
   list(prediction = together, scores = prediction_scores(together), records = each)
 }
 
+# The runs at draws of the posterior; if the budget left none, those in the middle of its region.
+predicting_runs <- function(model) {
+  if (length(model$checked$at)) return(rep(model$checked$at, model$checked$times))
+  distance <- ifelse(succeeded(model), straight_distance(model), Inf)
+  utils::head(order(distance), max(5, sum(distance <= 0.5)))
+}
+
 prediction_by_runs <- function(model, fit, k) {
   record <- model$records[[k]]
-  at <- rep(model$checked$at, model$checked$times)
+  at <- predicting_runs(model)
   runs <- matrix(0, length(record$calibrates), length(at))
   runs[record$calibrates, ] <- model$runs$outputs[model$rows[[k]], at]
   runs[!record$calibrates, ] <- model$runs$held[model$held_rows[[k]], at]

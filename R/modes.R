@@ -7,8 +7,7 @@ find_modes <- function(model, context) {
   modes <- list()
   for (start in start_runs(model)) {
     if (is_spent(context) && length(modes)) break
-    search <- begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
-    search <- run_search(search, context)
+    search <- run_search(begun_from(model, start, length(modes) > 0, context), context)
     model <- search$model
     modes <- c(modes, list(search))
     if (length(modes) > 1) {
@@ -19,6 +18,17 @@ find_modes <- function(model, context) {
     }
   }
   list(model = model, modes = modes, agree = length(modes) > 1 && ranked$agree)
+}
+
+# The first search begins with slopes by regression on the runs over the priors. The next ones are there to find other
+# modes: slopes over the priors would lead them back, so that theirs are taken where they begin.
+begun_from <- function(model, start, locally, context) {
+  if (locally) {
+    found <- difference_slopes(model, start, context)
+    model <- found$model
+    if (!is.null(found$slopes)) return(begin_search(model, start, found$slopes, 0))
+  }
+  begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
 }
 
 # Runs over the priors, as many as it takes to begin; those that are known count.

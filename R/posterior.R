@@ -211,8 +211,8 @@ say_parameters <- function(fit, most) {
   if (length(told)) cli::cli_bullets(stats::setNames(told, rep("!", length(told))))
 }
 
-# Modes of a parameter: parts of its draws that a gap keeps apart, list(lower95, upper95, share) each. A gap counts if it
-# is a quarter of the 95 % interval or more, with a twentieth of the posterior on either side.
+# Modes of a parameter: parts of its draws that a gap keeps apart, list(lower95, upper95, share) each. A gap counts if
+# it is a quarter of the 95 % interval or more, with a twentieth of the posterior on either side.
 parameter_modes <- function(fit, name) {
   x <- fit$values[, name]
   keep <- fit$weights > 0

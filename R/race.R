@@ -24,8 +24,11 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
   before <- runs_spent(context)
   looked <- look_at_mechanism(model, present, off, context)
   model <- looked$model
+  model$own_runs <- runs_spent(context) - before
   if (looked$silent) return(utils::modifyList(model, list(level = "silent")))
-  if (!length(looked$starts)) return(utils::modifyList(model, list(level = "untried")))
+  if (!length(looked$starts)) {
+    return(utils::modifyList(model, list(level = if (is_spent(context)) "missed" else "untried")))
+  }
   search <- search_trial(looked, context)
   model <- with_mode(search$model, search, region_of_modes(search$model, list(search), context$seed))
   model$off <- looked$off
@@ -41,13 +44,13 @@ search_trial <- function(looked, context) {
   model <- looked$model
   best <- NULL
   for (start in utils::head(looked$starts, rules$trial_starts)) {
-    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps)
+    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps, looked$off_at)
     search <- run_search(search, context)
     model <- search$model
     others <- c(best$at, looked$off_at)
     value <- values_at(model, c(search$at, others), search$history, search$slopes, context)
     if (is.null(best) || value[1] > value[2]) best <- search
-    if (is_spent(context) || all(value[1] >= value[-1]) && search$status == "converged") break
+    if (is_spent(context) || all(value[1] >= value[-1]) && search$status %in% c("converged", "futile")) break
   }
   best$model <- model
   best
@@ -243,11 +246,16 @@ race <- function(present, trials, context) {
 
 report_trial <- function(trial, present, context) {
   what <- switch(trial$level, silent = "changes nothing", failed = "could not be computed",
-                 untried = "could not be tried: its runs failed",
+                 untried = "could not be tried: its runs failed", missed = "the budget ended",
                  sprintf("log10 Bayes factor %.1f%s", log10_factor(trial, present),
                          if (trial$level == "verified") ", verified by runs" else ""))
   context$say("  {trial$mechanism}: {what}")
   if (trial$level == "silent") warn_no_response(trial$mechanism)
+  if (trial$level == "untried") {
+    warn_result(c("Mechanism {.val {trial$mechanism}} could not be tried: every run of its first look failed.",
+                  i = "Run its simulator at a point of its priors, and see what it returns."),
+                class = "amiss_warning_trial")
+  }
   if (trial$level == "failed") {
     warn_result(c("Mechanism {.val {trial$mechanism}} could not be tried.", x = "{trial$reason}"),
                 class = "amiss_warning_trial")

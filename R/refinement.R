@@ -15,7 +15,8 @@
 #' @param ensemble An ensemble: [simulate_design()] (twice as many runs as parameters, and two, are enough),
 #'   [refine_ensemble()], or [ensemble()], which can be checked, but not refined.
 #' @param rounds Most checks before the result is left as not trusted; 0 calibrates the ensemble as it is.
-#' @param runs Runs in the region of the mode, by default 30 or, if more, two for each parameter.
+#' @param runs Runs in the region of the mode, by default 25 or, if more, two for each
+#'   parameter.
 #' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and [calibrate()] take
 #'   them.
 #' @inheritParams calibrate

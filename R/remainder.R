@@ -84,13 +84,6 @@ drift_rivals <- function(models, control, threads) {
   bayes_factor(models[[length(models)]]$fit, base)$log10_bf < drift + control$decisive
 }
 
-# What is told of a mechanism that a drift rivals: one that moves the simulation as a drift does is not contradicted by
-# it, but by all else that is slow.
-drift_doubt <- function(parent, model, threads) {
-  if (acts_as_drift(parent$fit, model$fit, threads)) "anything that changes slowly would explain the error as well"
-  else "a drifting sensor would explain the error as well"
-}
-
 # Whether a parabola in time holds nearly all that an extension of a model changes, at the centre of its posterior.
 acts_as_drift <- function(parent, fit, threads) {
   slow <- mapply(function(before, after) {

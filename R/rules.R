@@ -31,6 +31,8 @@ rule_table <- list(
                "the longest ridge took three", "bench/starts.R"),
   ridge_damping = rule(10, "times", "damping of a step up to which a search may leap",
                        "a heavily damped step sees no farther than the ridge bends", "bench/starts.R"),
+  futile_gain = rule(2.3, "nats", "gain over the present model below which the search of a trial ends",
+                     "a decade before what is new has paid for its prior: two could not be reached", "bench/runs.R"),
   resample_gain = rule(2, "nats", "gain after which error and discrepancy are sampled anew",
                        "a smaller gain leaves their posterior nearly where it was", "bench/starts.R"),
   search_difference = rule(0.05, "prior sd", "difference by which slopes are taken",
@@ -54,7 +56,7 @@ rule_table <- list(
                          "a slope for each, and the bend along it", "bench/seeds.R"),
   more_runs = rule(20, "runs", "further runs in a region if the check fails",
                    "two thirds of what it had", "bench/seeds.R"),
-  check_runs = rule(20, "runs", "runs at posterior draws that check an emulator",
+  check_runs = rule(16, "runs", "runs at posterior draws that check an emulator",
                     "their mean square is known to a third", "bench/seeds.R"),
   first_check = rule(10, "runs", "the same in the first round, before the region is final",
                      "they train the second", "bench/seeds.R"),
@@ -82,7 +84,7 @@ rule_table <- list(
                    "below it the evidence is that of a few runs", "bench/evidence.R"),
   effective_intervals = rule(1 / 3, "share", "the same for intervals of parameters",
                              "tails need more than the mean does", "bench/parameter_coverage.R"),
-  effective_good = rule(0.85, "share", "effective share that ends verification in its first rounds",
+  effective_good = rule(0.8, "share", "effective share that ends verification in its first rounds",
                         "evidences then agree over seeds to a tenth of a decade", "bench/seeds.R"),
   least_rounds = rule(2, "rounds", "fewest checks of a verified model",
                       "after one, evidences of a model differ by up to a decade over seeds",
@@ -104,9 +106,7 @@ rule_table <- list(
   trial_doubt = rule(2, "decades", "the same of one that is not confirmed, and as much again for an error of the noise",
                      "its runs have not reached its mode yet", "bench/runs.R"),
   decisive = rule(2, "decades", "log10 Bayes factor that a mechanism must earn",
-                  "a hundred to one (Jeffreys)", "bench/hidden_effects.R"),
-  least_budget = rule(100, "runs", "smallest budget from which a verdict is given",
-                      "the base model takes about as many", "bench/budget.R"))
+                  "a hundred to one (Jeffreys)", "bench/hidden_effects.R"))
 
 rules <- lapply(rule_table, `[[`, "value")
 

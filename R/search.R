@@ -6,9 +6,11 @@ search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4
                    importance_draws = 300, ess_drop = 0.3)
 
 # A search from run `at` of a model. `slopes` are right at that run to within what they change over
-# `stale` standard deviations of the prior.
-begin_search <- function(model, at, slopes, stale, steps = rules$search_steps) {
-  search <- list(model = model, at = at, steps = steps, leaps = rules$leaps, left = integer(), step = 0, damping = 0, failed = 0, small = 0,
+# `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is switched off; the search
+# ends if all that it promises beyond that could not make evidence.
+begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL) {
+  search <- list(model = model, at = at, steps = steps, off = off, leaps = rules$leaps, left = integer(), step = 0,
+                 damping = 0, failed = 0, small = 0,
                  reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale),
                  status = "going")
   search$slopes <- secant_slopes(model, at, search$reference)
@@ -54,9 +56,16 @@ propose <- function(search, context) {
   gain_of <- function(to) sum((to - z) * (precision %*% (to - z))) / 2
   search$predicted <- gain_of(search$proposal)
   search$promised <- gain_of(within_limits(search$mean, precision, search$model$limit))
+  if (is_futile(search, context)) search$status <- "futile"
   if (search$step >= search$steps) search$status <- "steps"
   if (search$promised < rules$search_gain / 5) search$status <- "converged"
   search
+}
+
+is_futile <- function(search, context) {
+  if (is.null(search$off)) return(FALSE)
+  value <- values_at(search$model, c(search$at, search$off), search$history, search$slopes, context)
+  isTRUE(value[1] + search$promised - value[2] < rules$futile_gain)
 }
 
 # The step is taken if the run is more probable, by the draws of error and discrepancy from before it.
@@ -154,6 +163,7 @@ difference_slopes <- function(model, at, context) {
   asked <- names(z)
   side <- difference_side(z)
   found <- seen(model, rules$search_difference * side)
+  if (is.null(found$slopes)) return(found)
   flat <- asked[colSums(found$slopes^2) == 0]
   if (!length(flat)) return(found)
   up <- seen(found$model, rules$wide_difference * side[flat])
@@ -231,7 +241,8 @@ tangent_at <- function(model, at, slopes, history, context) {
     steep <- unname(slopes[model$rows[[k]], own, drop = FALSE])
     data <- c(record$data, list(moves = steep))
     if (!is.null(history)) {
-      return(call_engine(tangent_given_(data, searched_priors(model, record), history[[k]], z[own], run, steep, engine)))
+      priors <- searched_priors(model, record)
+      return(call_engine(tangent_given_(data, priors, history[[k]], z[own], run, steep, engine)))
     }
     ais <- fill_ais_control(utils::modifyList(record$control$ais, search_ais))
     call_engine(tangent_posterior_(data, searched_priors(model, record), z[own], run, steep, rules$search_draws, ais,

@@ -11,8 +11,12 @@ first_state <- function(started, catalogue, runs, context) {
 }
 
 next_step <- function(state, context) {
-  left <- mechanisms_left(state)
-  stopped <- reason_to_stop(state, left, context)
+  stopped <- reason_to_stop(state, context)
+  left <- if (is.null(stopped)) mechanisms_left(state)
+  if (is.null(stopped) && !length(left)) {
+    stopped <- list(id = "none_applies",
+                    words = "no mechanism that is left can be applied on top of what was adopted")
+  }
   if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
   state$present <- as_present(state$present, context)
   trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
@@ -52,15 +56,12 @@ mechanisms_left <- function(state) {
 }
 
 # list(id, words), or NULL.
-reason_to_stop <- function(state, left, context) {
+reason_to_stop <- function(state, context) {
   stop_for <- function(id, words) list(id = id, words = words)
   control <- context$control
   if (!length(state$catalogue)) return(stop_for("empty", "the catalogue is empty"))
   if (length(state$models) > length(state$catalogue)) {
     return(stop_for("all", "every mechanism of the catalogue has been adopted"))
-  }
-  if (!length(left)) {
-    return(stop_for("none_applies", "no mechanism that is left can be applied on top of what was adopted"))
   }
   if (is_spent(context)) return(stop_for("budget", budget_words(context)))
   if (length(state$models) > control$max_steps) {
@@ -83,7 +84,8 @@ try_all <- function(state, left, context) {
   for (name in ordered) {
     if (is_spent(context)) break
     simulators <- extended_simulators(state$catalogue[[name]], state)
-    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, needed_factor(trials, state$present, context), context))
+    bar <- needed_factor(trials, state$present, context)
+    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, context))
     report_trial(trials[[name]], state$present, context)
   }
   trials

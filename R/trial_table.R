@@ -16,7 +16,7 @@ trial_table <- function(trials, present, left) {
 }
 
 trial_row <- function(trial, present) {
-  if (is.null(trial$fit)) return(empty_row(trial$mechanism, present, trial$level))
+  if (is.null(trial$fit)) return(empty_row(trial$mechanism, present, trial$level, trial$own_runs))
   factor <- bayes_factor(trial$fit, present$fit)
   if (!is_verified(trial)) factor <- as_tried(factor, trial)
   row <- data.frame(from = present$name, mechanism = trial$mechanism, factor,
@@ -26,10 +26,10 @@ trial_row <- function(trial, present) {
   row
 }
 
-empty_row <- function(mechanism, present, why) {
+empty_row <- function(mechanism, present, why, runs = NULL) {
   row <- data.frame(from = present$name, mechanism = mechanism, log10_bf = NA_real_, lower95 = NA_real_,
                     upper95 = NA_real_, word = NA_character_, error_ratio = NA_real_, trusted = FALSE,
-                    judged_by = if (why == "silent") "silent" else "none", runs = 0)
+                    judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
   row$parameters <- list(added_parameters(present$fit, present$fit))
   row
 }

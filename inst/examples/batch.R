@@ -1,7 +1,7 @@
 # A batch job: the studies of both Twin Houses side by side, each in a session of its own, by the package future.
 # Usage: Rscript batch.R OUT [--quick]
 #   OUT: folder for the results: found.csv and, without --quick, OUT/N2 and OUT/O5 (report.html, figures, result.json)
-#   --quick: a coarse sampler, few runs and one mechanism, to try the job; its numbers are worth nothing
+#   --quick: a fast sampler, one check and one mechanism, to try the job; its numbers are worth nothing
 library(amiss)
 
 arguments <- commandArgs(trailingOnly = TRUE)
@@ -9,16 +9,16 @@ quick <- "--quick" %in% arguments
 out <- setdiff(arguments, "--quick")
 if (length(out) != 1) stop("usage: Rscript batch.R OUT [--quick]")
 
-coarse <- function(study) {
+quickly <- function(study) {
   one <- do.call(catalogue, unname(study$catalogue[1]))
-  upgrade_model(study$model, study$measurements, one, runs = 40, seed = 1, quiet = TRUE,
-                control = list(max_steps = 1, rounds = 0, attribution = list(surrogates = 19),
+  upgrade_model(study$model, study$measurements, one, seed = 1, quiet = TRUE,
+                control = list(max_steps = 1, rounds = 1, attribution = list(surrogates = 19),
                                calibration = list(ais = list(pilot_chains = 48, groups = 4))))
 }
 
 one_house <- function(house) {
   file <- system.file("studies", paste0("twinhouse_", house, ".yml"), package = "amiss")
-  upgrade <- if (quick) coarse(read_study(file)) else run_study(file, out = file.path(out, house), quiet = TRUE)
+  upgrade <- if (quick) quickly(read_study(file)) else run_study(file, out = file.path(out, house), quiet = TRUE)
   data.frame(house = house, verdict = summary(upgrade)$tag, models = length(upgrade$models))
 }
 

@@ -1,5 +1,5 @@
-# An R session: data, model, calibration, cause, report. Runs in seconds: `runs` and `quick` are small. For real work
-# leave both out. Usage: Rscript session.R [FILE.html], or line by line.
+# An R session: data, model, calibration, cause, report. Runs in seconds: `quick` is for speed. For real work leave it
+# out. Usage: Rscript session.R [FILE.html], or line by line.
 library(amiss)
 
 # 1. What was measured: ten days, hourly. Here they are made; read your own table instead.
@@ -15,9 +15,9 @@ room <- measurements(record, time = "hour", target = "Ti", boundary = ~ Te + Gv,
 model <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
                             free("offset", uniform(10, 20), "K"), free("gain", uniform(0, 2)), boundary = "Te")
 
-# 3. Calibrate it, and see what its error answers to.
+# 3. Calibrate it, and see what its error responds to. Six runs are enough to begin: the calibration makes more.
 quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 39))
-fit <- calibrate_refined(simulate_design(model, room, runs = 30, seed = 1), room, seed = 1,
+fit <- calibrate_refined(simulate_design(model, room, runs = 6, seed = 1), room, seed = 1,
                          control = quick["calibration"])
 print(fit)
 print(attribute_discrepancy(fit, quick$attribution, seed = 1))
@@ -32,7 +32,7 @@ drift <- mechanism("drift", boundary = character(), sentence = "The sensor drift
     base(values) + values[["drift"]] * info$step_h * seq_len(nrow(drivers)) / 24
   })
 })
-upgrade <- upgrade_model(model, room, catalogue(sun, drift), runs = 30, control = quick, seed = 1, quiet = TRUE)
+upgrade <- upgrade_model(model, room, catalogue(sun, drift), control = quick, seed = 1, quiet = TRUE)
 print(summary(upgrade))
 print(tidy(upgrade))
 

@@ -1,9 +1,12 @@
-# A small upgrade, made once for a session: the target follows a lagged Te and, unknown to the base model, the sun.
+# A small upgrade, made once for a session: the target follows a lagged Te and, unknown to the base
+# model, the sun.
 
 upgrade_cache <- new.env()
 
-lagged <- function(x, hours) as.numeric(stats::filter(x * (1 - exp(-1 / hours)), exp(-1 / hours), method = "recursive",
-                                                      init = x[1]))
+lagged <- function(x, hours) {
+  kept <- exp(-1 / hours)
+  as.numeric(stats::filter(x * (1 - kept), kept, method = "recursive", init = x[1]))
+}
 
 small_record <- function(n = 240) {
   withr::with_seed(1, {
@@ -20,40 +23,42 @@ small_record <- function(n = 240) {
 
 small_upgrade <- function() {
   if (is.null(upgrade_cache$upgrade)) {
-    m <- measurements(small_record(), time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05, unit = "K",
-                      name = "small room",
+    m <- measurements(small_record(), time = "time", target = "Ti", boundary = ~ Te + Gv,
+                      noise_sd = 0.05, unit = "K", name = "small room",
                       calibrate = seq_len(240) <= 168, validate = seq_len(240) > 168, warmup = 12)
     base <- function_simulator(function(values, drivers) values[["offset"]] +
                                values[["gain"]] * lagged(drivers[, "Te"], 6),
-                               free("offset", uniform(10, 20), "K", "offset"), free("gain", uniform(0, 2), "", "gain"),
+                               free("offset", uniform(10, 20), "K", "offset"),
+                               free("gain", uniform(0, 2), "", "gain"),
                                boundary = "Te")
-    sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters through a window <that> the model *leaves* out.",
+    sun <- mechanism("sun", boundary = "Gv",
+                     sentence = "Sun enters through a window <that> the model *leaves* out.",
                      edit = function(model) {
-      function_simulator(function(values, drivers) model$f(values, drivers) +
-                         values[["sun_gain"]] * lagged(drivers[, "Gv"], 3),
-                         model$parameters$offset, model$parameters$gain,
-                         free("sun_gain", uniform(0, 0.02), "Km2/W", "gain of the sun"),
-                         boundary = c("Te", "Gv"))
+      with_parameters(model, free("sun_gain", uniform(0, 0.02), "Km2/W", "gain of the sun"),
+                      boundary = "Gv", f = function(values, drivers, base) {
+        base(values) + values[["sun_gain"]] * lagged(drivers[, "Gv"], 3)
+      })
     })
-    nothing <- mechanism("drift", boundary = "Te", sentence = "The target drifts.", edit = function(model) {
-      function_simulator(function(values, drivers) model$f(values, drivers) +
-                         values[["drift"]] * seq_len(nrow(drivers)) / 100,
-                         model$parameters$offset, model$parameters$gain, free("drift", uniform(-1, 1), "K", "drift"),
-                         boundary = "Te")
+    nothing <- mechanism("drift", boundary = "Te", sentence = "The target drifts.",
+                         edit = function(model) {
+      with_parameters(model, free("drift", uniform(-1, 1), "K", "drift"), boundary = "Te",
+                      f = function(values, drivers, base) {
+        base(values) + values[["drift"]] * seq_len(nrow(drivers)) / 100
+      })
     })
-    upgrade_cache$upgrade <- upgrade_model(base, m, catalogue(sun, nothing), runs = 30, seed = 1, quiet = TRUE,
-      control = list(max_steps = 1,
-                     calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 8, importance_draws = 200)),
-                     attribution = list(surrogates = 39,
-                                        ais = list(pilot_chains = 24, groups = 4, importance_draws = 200))))
+    coarse <- list(pilot_chains = 24, groups = 4, importance_draws = 200)
+    control <- list(max_steps = 1, calibration = list(ais = c(coarse, chains = 8)),
+                    attribution = list(surrogates = 39, ais = coarse))
+    upgrade_cache$upgrade <- upgrade_model(base, m, catalogue(sun, nothing), runs = 30, seed = 1,
+                                           quiet = TRUE, control = control)
   }
   upgrade_cache$upgrade
 }
 
 # The upgrade with its mechanisms judged anew, after a change by hand.
 rejudged <- function(upgrade) {
-  upgrade$models <- judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue, upgrade$measurements,
-                                 upgrade$control, threads = 1)
+  upgrade$models <- judge_models(upgrade$models, upgrade$candidates, upgrade$catalogue,
+                                 upgrade$measurements, upgrade$control, threads = 1)
   upgrade
 }
 

@@ -78,7 +78,7 @@ rows_by_kind <- function() c(
   rows_of("triangular", lower = "limit", mode = "number", upper = "limit"),
   rows_of("uniform", lower = "limit", upper = "limit"),
   rows_of("upgrade_model", simulator = "object", measurements = "object", catalogue = "object",
-          runs = c("positive_count", "huge"),
+          runs = c("count", "huge"),
           control = "control", seed = "seed", threads = "threads", quiet = "flag"),
   rows_of("with_parameters", model = "object", boundary = "columns", name = "string"),
   rows_of("with_template", simulator = "object", boundary = "columns"),
@@ -126,7 +126,7 @@ rows_of_controls <- function() {
     rows_of_control("attribute_discrepancy", attribution_control, wrong = every),
     rows_of_control("attribute_discrepancy", ais_defaults_(), "ais"),
     rows_of_control("simulate_zone", zone_control, wrong = every),
-    loop("upgrade_model", upgrade_control), rows_of_control("upgrade_model", ais_defaults_(), "screening"),
+    loop("upgrade_model", upgrade_control),
     loop("compare_models", comparison_control), rows_of_control("compare_models", attribution_control, "attribution"),
     rows_of_control("calibrate_refined", emulator_control, "emulator"),
     rows_of_control("calibrate_refined", calibration_control, "calibration"))
@@ -157,7 +157,8 @@ rows_of_their_own <- function() {
     bad("calibrate", "control", list(reach = c(1, 1)), "reach = c\\(1, 1\\)"),
     bad("calibrate", "measurements", linear_measurements(o$record, calibrate = 1:60 > 15), "other rows"),
     bad("calibrate_paper", "control", list(fictitious_seed = 1.5), "fictitious_seed = 1.5"),
-    bad("calibrate_refined", "rounds", 200, "rounds = 200 would take"), bad("calibrate_refined", "runs", 0),
+    bad("calibrate_refined", "rounds", 2000, "rounds = 2000 would take"),
+    bad("calibrate_refined", "runs", 0),
     bad("catalogue", 1, "sun", "number 1 is \"sun\""),
     bad("change_component", "name", "attic", "attic"),
     bad("compare_models", "models", list(o$simulator)),
@@ -262,7 +263,10 @@ rows_of_their_own <- function() {
     bad("triangular", "mode", 3, "mode"), bad("uniform", "upper", 0, "lower < upper"),
     bad("uniform", "lower", -Inf, "finite limits"),
     bad("triangular", "upper", 1e309, "finite limits"), bad("upgrade_model", "checkpoint", ""),
-    bad("upgrade_model", "runs", 6, "Of the 6 runs"),
+    bad("upgrade_model", "runs", 0),
+    bad("upgrade_model", "control", list(rounds = 0), "rounds = 0"),
+    bad("upgrade_model", "control", list(screening = list()), "unknown option.*screening"),
+    bad("upgrade_model", "control", list(runs_total = 0), "runs_total = 0"),
     bad("upgrade_model", "control", list(rounds = 1e9), "control\\$rounds = 1e\\+09 would take"),
     bad("with_parameters", "f", "base"), bad("with_parameters", "f", function(values, drivers, wind) 1, "wind"),
     bad("with_parameters", 2, free("gain", uniform(0, 3)), "in the model already"),
@@ -313,7 +317,7 @@ rows_of_study <- function() {
     study_rows("calibrate", "hour <", "system('ls')", 1, TRUE, "humidity > 3"),
     study_rows("validate", "hour > 1e9", "stop()", list("a")),
     study_rows("warmup_h", -1, "day", pattern = "warmup"),
-    study_rows("runs", 0, -1, 1.5, "many", 1e9, 3, list(1, 2), TRUE),
+    study_rows("runs", 0, -1, 1.5, "many", 1e9, list(1, 2), TRUE),
     study_rows("seed", -1, 1.5, "one", 3e9, list(1, 2), TRUE), study_rows("model", NULL, "data.csv", "nowhere.R", 1),
     study_rows("catalogue", NULL, "nowhere.R", 1, "model.R"), study_rows("colour", "red"),
     study_rows("method", "paper"), study_rows("truth", "model.R"),
@@ -327,7 +331,7 @@ rows_of_study <- function() {
     study_rows("control", list(calibration = list(ais = list(groups = 1))),
                pattern = "control\\$calibration\\$ais\\$groups = 1"),
     study_rows("control", list(calibration = 5), list(attribution = "no"), list(attribution = list(level = 5)),
-               list(screening = list(chains = -1))))
+               list(rounds = 0)))
 }
 
 expect_refused <- function(rows) {
@@ -388,7 +392,8 @@ test_that("a study nested without end is refused at once", {
 
 # Arguments that take anything, or nothing.
 takes_all <- list(circular = "x", program_simulator = "version", glance = "x", tidy = "x", augment = "x",
-                  autoplot = "object")
+                  autoplot = "object",
+                  slopes = c("simulator", "values", "drivers", "step_h", "hold"))  # gives none to any
 
 test_that("every argument of every exported function is in the table", {
   rows <- c(rows_by_kind(), rows_of_controls(), rows_of_their_own())

@@ -148,16 +148,73 @@ test_that("an edited model does not go on with the old one's work", {
   expect_length(dir(folder), 2)
 })
 
-test_that("a model that is settled at the end is kept beside its fit, not in its place", {
-  stand_in(all_settled = function(...) FALSE, model_of = function(fit) fit$model,
-           fit_runs = function(...) list(fit = list(model = "as it was", tails = "reached")),
-           attribute_discrepancy = function(...) "answers to the sun",
-           predicted_record = function(...) list(scores = "close"))
-  settings <- list(keep = checkpoint_keeper(withr::local_tempdir(), list()))
-  started <- list(model = "as it was")
-  for (time in c("made", "read again")) {
-    model <- settled_model(list(name = "base", fit = started, full = list(fit = started)), settings)
-    expect_identical(model$fit$tails, "reached")
-    expect_identical(model$attribution, "answers to the sun")
+# Of an environment of their own: what a function captures is part of the key.
+counted_world <- local({
+  run <- function(values, drivers) {
+    cat(".", file = getOption("amiss_test_runs"), append = TRUE)
+    if (file.size(getOption("amiss_test_runs")) > getOption("amiss_test_alive")) rlang::interrupt()
+    values[["offset"]] + values[["gain"]] * drivers[, "Te"]
   }
+  sunny <- function(values, drivers, base) base(values) + values[["s"]] * drivers[, "Gv"]
+  shine <- function(model) amiss::with_parameters(model, amiss::free("s", amiss::uniform(0, 0.02)),
+                                                  boundary = "Gv", f = sunny)
+  environment()
+}, envir = new.env(parent = globalenv()))
+
+# A loop each of whose runs leaves a byte in `file`; `alive`: runs after which it is interrupted.
+counted_upgrade <- function(file, folder, alive = Inf, control = list()) {
+  table <- linear_data(60)
+  table$Ti <- table$Ti + 0.01 * table$Gv
+  m <- linear_measurements(table, calibrate = table$hour <= 42, validate = table$hour > 42)
+  base <- function_simulator(counted_world$run, free("offset", uniform(10, 30)),
+                             free("gain", uniform(0, 1)), boundary = "Te")
+  sun <- mechanism("sun", counted_world$shine, "Gv", "Sun enters.")
+  control <- utils::modifyList(list(max_steps = 1, calibration = quick_ais,
+                                    attribution = list(surrogates = 19)), control)
+  withr::with_options(list(amiss_test_runs = file, amiss_test_alive = alive), {
+    upgrade_model(base, m, catalogue(sun), seed = 1, quiet = TRUE, checkpoint = folder,
+                  control = control)
+  })
+}
+
+runs_made <- function(file) sum(file.size(file), na.rm = TRUE)
+
+test_that("a loop that is done is read again: no run is made, and the result is the same", {
+  folder <- withr::local_tempdir()
+  first <- counted_upgrade(made <- withr::local_tempfile(), folder)
+  again <- counted_upgrade(repeated <- withr::local_tempfile(), folder)
+  # The simulator is called once where it is checked, and an effect of its steps is looked for.
+  expect_lte(abs(runs_made(made) - first$runs_total), 3)
+  expect_lte(runs_made(repeated), 3)
+  for (part in c("candidates", "gain", "named_cause", "runs_total", "stopped_id")) {
+    expect_identical(again[[part]], first[[part]])
+  }
+  expect_identical(coef(again), coef(first))
+})
+
+test_that("a loop that was interrupted makes the runs that are missing, and none twice", {
+  whole <- counted_upgrade(withr::local_tempfile(), withr::local_tempdir())
+  folder <- withr::local_tempdir()
+  dead <- withr::local_tempfile()
+  stopped <- tryCatch(counted_upgrade(dead, folder, alive = 40),
+                      interrupt = function(e) "interrupted")
+  expect_identical(stopped, "interrupted")
+  rest <- withr::local_tempfile()
+  resumed <- counted_upgrade(rest, folder)
+  expect_identical(resumed$candidates, whole$candidates)
+  expect_identical(resumed$runs_total, whole$runs_total)
+  # The set of runs in which it died is made again: at most twenty-five in the region of a mode.
+  expect_lte(runs_made(dead) + runs_made(rest) - whole$runs_total, 25 + 3)
+  expect_gt(runs_made(rest), 0)
+})
+
+test_that("kept runs count towards the budget as when they were made", {
+  folder <- withr::local_tempdir()
+  budget <- list(runs_total = 70)
+  first <- counted_upgrade(withr::local_tempfile(), folder, control = budget)
+  again <- counted_upgrade(withr::local_tempfile(), folder, control = budget)
+  expect_lte(first$runs_total, 70)
+  expect_gt(first$runs_total, 60)
+  expect_identical(again$runs_total, first$runs_total)
+  expect_identical(again$stopped_because, first$stopped_because)
 })

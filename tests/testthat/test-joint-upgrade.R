@@ -63,7 +63,7 @@ test_that("what both records lack is named, with one parameter for both", {
   expect_named(coef(upgrade), c("gain", "base a", "sun", "base b"))
   expect_s3_class(model$fit, "amiss_joint")
   expect_equal(upgrade$candidates$log10_bf[1], bayes_factor(model$fit, upgrade$models[[1]]$fit)$log10_bf)
-  expect_identical(upgrade$candidates$judged_by, c("calibration", "screening", "screening"))
+  expect_identical(upgrade$candidates$judged_by, c("runs", "trial", "trial"))
   expect_gt(upgrade$runs_total, 0)
 })
 
@@ -115,9 +115,12 @@ test_that("an edit of two arguments gets the record's name, also of a single rec
     shining(model)
   }, "Gv", "Sun enters.")
   measured <- two_rooms()
-  settings <- list(measurements = amiss:::new_records(measured))
-  extended <- amiss:::extended_model(telling, rooms, settings)
-  amiss:::extended_model(telling, rooms$a, list(measurements = measured$a, record = "room a"))
+  state <- function(simulators, record) {
+    list(present = list(simulators = simulators, parameters = list()), base = character(),
+         started = list(record = record))
+  }
+  extended <- amiss:::extended_simulators(telling, state(rooms, names(rooms)))
+  amiss:::extended_simulators(telling, state(list(rooms$a), "room a"))
   expect_identical(seen, c("a", "b", "room a"))
   expect_named(amiss:::free_parameters(extended$b), c("gain", "base b", "sun"))
   expect_error(mechanism("sun", function(model, record, more) model, "Gv", "Sun enters."), "edit",
@@ -204,7 +207,7 @@ test_that("what does not fit together is refused before anything runs", {
   given["simulator"] <- list(NULL)
   refused("simulators of all records", simulators = list(a = given, b = rooms$b))
   refused("one set of runs", simulators = rooms, of = measured, mechanism("runs", given, "Gv", "It acts."))
-  refused("too few", runs = 4)
+  refused("runs", runs = 0)
 })
 
 test_that("given runs of several records are looped over too", {

@@ -137,14 +137,19 @@ test_that("a search runs no record again for a parameter that it does not have",
     values[["base"]] + values[["offset"]] + values[["gain"]] * drivers[, "Te"]
   }, free("gain", uniform(0, 1)), free("base", uniform(15, 25)), free("offset", uniform(-1, 1)), boundary = "Te")
   simulators <- list(Ti = counted("Ti", room), flux = counted("flux", flux_only))
-  sets <- unname(Map(function(ensemble, m) {
-    amiss:::calibration_setting(train_emulator(ensemble, m), m, quick_ais, 1)
-  }, simulate_jointly(simulators, both, 12, seed = 1), both))
-  calls[] <- 0
-  found <- amiss:::search_mode(amiss:::searched_records(sets, 1), c(0, 0, 0))
-  expect_equal(found$runs, sum(calls))
-  expect_lt(calls[["flux"]], calls[["Ti"]])
-  estimate <- amiss:::unit_to_values(matrix(pnorm(found$centre), 1), amiss:::joint_parameters(sets))
+  records <- lapply(both, amiss:::loop_record, quick_ais)
+  context <- amiss:::new_context(1, 1, list())
+  found <- amiss:::find_modes(amiss:::new_model(simulators, records), context)
+  expect_equal(amiss:::runs_spent(context), sum(calls))
+  expect_equal(calls[["Ti"]], ncol(found$model$runs$outputs))
+  # Differences along base and offset are one run to the flux, which knows neither.
+  before <- calls
+  sloped <- amiss:::difference_slopes(found$model, found$modes[[1]]$at, context)
+  expect_equal(calls - before, c(Ti = 3, flux = 2))
+  expect_true(all(sloped$slopes[sloped$model$rows[[2]], c(2, 3)] == 0))
+  z <- found$model$runs$z[found$modes[[1]]$at, , drop = FALSE]
+  estimate <- amiss:::unit_to_values(amiss:::to_unit(z, found$model$flat), found$model$parameters)
+  # Base and offset are one to the record; what their priors say of them leaves the sum where it is.
   expect_equal(c(estimate[1, "gain"], sum(estimate[1, c("base", "offset")])), c(gain = 0.4, 20), tolerance = 0.01,
                ignore_attr = TRUE)
 })

@@ -29,12 +29,24 @@ test_that("median and covariance are those of the weighted draws", {
 
 test_that("the tidy table carries labels, units and what the other methods say", {
   table <- tidy(fit, conf.level = 0.9)
-  expect_named(table, c("term", "label", "unit", "estimate", "std.error", "conf.low", "conf.high"))
+  expect_named(table, c("term", "label", "unit", "estimate", "std.error", "conf.low", "conf.high",
+                        "modes"))
+  expect_identical(table$modes, c(1L, 1L))
   expect_identical(table$unit, c("K", ""))
   expect_identical(table$label, c("offset", "gain"))
   expect_identical(table$estimate, unname(coef(fit)))
   expect_equal(table$std.error^2, unname(diag(vcov(fit))))
   expect_identical(table$conf.high, unname(confint(fit, level = 0.9)[, 2]))
+})
+
+test_that("a posterior of two modes says so, in the table and in words", {
+  parted <- fit
+  upper <- seq_len(nrow(fit$values)) %% 2 == 0
+  parted$values[, "gain"] <- parted$values[, "gain"] + 0.5 * upper
+  expect_identical(tidy(parted)$modes, c(1L, 2L))
+  expect_match(printed(parted), "gain has 2 modes: 0.*describe none of them")
+  modes <- amiss:::parameter_modes(parted, "gain")
+  expect_equal(vapply(modes, `[[`, 0, "share"), c(sum(w[!upper]), sum(w[upper])))
 })
 
 test_that("equal draws have the moments of the weighted ones, in an order that says nothing", {

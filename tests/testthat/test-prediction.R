@@ -54,6 +54,20 @@ test_that("how the simulator moves at other rows is told by the same runs", {
   expect_lt(max(abs(stats::lm.fit(cbind(1, linear_data(480)$Te), both)$residuals)), 1e-8 * max(abs(both)))
 })
 
+test_that("so it is of an emulator of a region, whose mean is the simulator's tangent", {
+  data <- linear_data(120)
+  data$Ti <- bent_run(c(a = 0.6, b = 0.8), as.matrix(data[c("Te", "Gv")]))
+  m <- linear_measurements(data, noise_sd = 0.05, calibrate = data$hour <= 80,
+                           validate = data$hour > 80)
+  runs <- simulate_design(bent_simulator(), m, runs = 8, seed = 1)
+  fit <- calibrate_refined(runs, m, control = list(calibration = quick_ais), seed = 1, quiet = TRUE)
+  moves <- fit$emulator$moves$root
+  # Slopes by differences of 0.05 standard deviations lose a few digits to rounding.
+  expect_equal(amiss:::moves_at(fit, "calibrate", 1), moves, tolerance = 1e-6)
+  both <- amiss:::moves_at(fit, c("calibrate", "validate"), 1)
+  expect_equal(both[1:80, ], moves, tolerance = 1e-6)
+})
+
 test_that("runs that fail at other rows are left out of its moves there", {
   fit <- lacking()
   fragile <- fit
@@ -67,7 +81,7 @@ test_that("runs that fail at other rows are left out of its moves there", {
   never$emulator$simulator <- function_simulator(function(values, drivers) NaN * drivers[, 1],
                                                  free("offset", uniform(10, 30), "K"),
                                                  free("gain", uniform(0, 1)), boundary = "Te")
-  expect_error(amiss:::moves_at(never, "validate", 1), "failed at 30 of the ensemble's 30 runs",
+  expect_error(amiss:::moves_at(never, "validate", 1), "failed at 30 of 30 runs of the emulator",
                class = "amiss_error_numerical")
 })
 

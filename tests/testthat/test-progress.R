@@ -113,16 +113,18 @@ test_that("the loop says where it is, and is silent if asked", {
                     f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
   })
   coarse <- list(pilot_chains = 24, groups = 2, max_groups = 2, importance_draws = 0)
-  control <- list(max_steps = 1, rounds = 1, screening = coarse, calibration = list(ais = coarse),
+  control <- list(max_steps = 1, rounds = 1, calibration = list(ais = coarse),
                   attribution = list(surrogates = 19, ais = coarse))
   run <- function(quiet) {
-    upgrade_model(base, m, catalogue(sun), runs = 20, control = control, seed = 1, quiet = quiet)
+    upgrade_model(base, m, catalogue(sun), control = control, seed = 1, quiet = quiet)
   }
   loudly()
   lines <- said(run(FALSE))
   for (part in c("^Calibrating the base model", "^base: training the emulator of [0-9]+ runs",
                  "^base: sampling the posterior", "^base: attributing the discrepancy",
-                 "^step 1: mechanism 1 of 1 \\(sun\\): check: runs of the simulator, 1 of [0-9]+", "^Stopped: ")) {
+                 "^step 1: mechanism 1 of 1 \\(sun\\): runs of the simulator, 1 of [0-9]+",
+                 "^step 1: mechanism 1 of 1 \\(sun\\): training the emulator of [0-9]+ runs",
+                 "^ *sun: log10 Bayes factor -?[0-9.]+$", "^Stopped: ")) {
     expect_match(lines, part, all = FALSE)
   }
   expect_silent(run(TRUE))
@@ -169,9 +171,10 @@ test_that("an interrupt leaves the session as it was and keeps what is finished"
 test_that("a response of the error is told of only where one is significant", {
   model <- small_upgrade()$models[[1]]
   said <- function(model) {
-    amiss:::report_model(model, function(text, .envir = parent.frame()) cli::format_inline(text, .envir = .envir))
+    say <- function(text, .envir = parent.frame()) cli::format_inline(text, .envir = .envir)
+    amiss:::report_model(model, amiss:::new_context(1, 1, list(), say = say))
   }
-  expect_match(said(model), "discrepancy answers most to .?Gv")
+  expect_match(said(model), "discrepancy responds most to .?Gv")
   model$attribution$table$significant <- FALSE
   expect_match(said(model), "discrepancy shows no response to a boundary condition")
 })

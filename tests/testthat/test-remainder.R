@@ -122,20 +122,21 @@ test_that("the evidence for a drift is that of a full calibration with such a dr
     base(values) + as.numeric(whole[rows, ] %*% c(values[["slope"]], values[["bend"]]))
   })
   full <- bayes_factor(world$fit(drifting)$fit, base)
-  seen <- amiss:::responses_factor(base, threads = 1, scales = 1)(size * parabola)
+  seen <- amiss:::responses_factor(base, size * parabola, threads = 1, scales = 1)
   # Within what the two samplers state.
   expect_lt(abs(seen$log10_bf - full$log10_bf), (seen$upper95 - seen$log10_bf) + (full$upper95 - full$log10_bf) + 0.1)
   expect_gt(full$log10_bf, 2)
 })
 
-test_that("of a mechanism that is a drift itself, what else is slow is told", {
+test_that("a mechanism that moves the simulation as a drift does is known from one that does not", {
   world <- drift_world(by = 3, sun = 0.01)
-  drifting <- with_parameters(linear_simulator(), free("slope", normal(0, 0.1)), f = function(values, drivers, base) {
+  drifting <- with_parameters(linear_simulator(), free("slope", normal(0, 0.1)),
+                              f = function(values, drivers, base) {
     base(values) + values[["slope"]] * seq_len(nrow(drivers)) / 24
   })
-  doubt <- function(model) amiss:::drift_doubt(world$base, model, threads = 1)
-  expect_match(doubt(world$fit(drifting)), "anything that changes slowly")
-  expect_match(doubt(world$sunny), "a drifting sensor")
+  acts <- function(model) amiss:::acts_as_drift(world$base$fit, model$fit, threads = 1)
+  expect_true(acts(world$fit(drifting)))
+  expect_false(acts(world$sunny))
 })
 
 test_that("a cause that a drift rivals is only likely", {

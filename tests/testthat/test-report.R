@@ -192,19 +192,35 @@ test_that("a report is one file that names the cause and needs nothing from outs
   expect_gte(sum(grepl("src=\"data:image/png", links)), length(figure_names))
 })
 
-test_that("an estimate by responses is shown without an interval or a word", {
+test_that("a candidate is shown by how it was judged, and one without a number not at all", {
   upgrade <- small_upgrade()
-  last <- nrow(upgrade$candidates)
-  upgrade$candidates$judged_by[last] <- "response"
-  upgrade$candidates$error_ratio[last] <- NA
-  told <- amiss:::candidates_words(upgrade)
-  by_response <- told$estimate == "by responses"
-  expect_equal(told$mechanism[by_response], upgrade$candidates$mechanism[last])
-  expect_true(all(told[by_response, c("95 % interval", "evidence", "error in calibration")] == ""))
-  expect_true(all(nzchar(told[!by_response, "95 % interval"])))
+  at <- function(mechanism) which(upgrade$candidates$mechanism == mechanism)
+  estimate <- function(...) {
+    upgrade$candidates[at("drift"), c("judged_by", "trusted")] <- list(...)
+    told <- amiss:::candidates_words(upgrade)
+    told$estimate[told$mechanism == "drift"]
+  }
+  expect_equal(estimate("runs", TRUE), "verified")
+  expect_equal(estimate("trial", TRUE), "trial")
+  expect_equal(estimate("trial", FALSE), "rough")
+  upgrade$candidates[at("drift"), c("judged_by", "trusted")] <- list("trial", FALSE)
   shown <- plot(upgrade, "candidates")
-  expect_match(levels(shown$data$state)[as.integer(shown$data$state[last])], "by a few runs")
-  expect_equal(nrow(ggplot2::layer_data(shown, 3)), last - 1)  # lines of the others
+  drift <- shown$data$mechanism == "drift"
+  expect_equal(as.character(shown$data$state[drift]), "tried, estimate rough")
+  expect_equal(nrow(ggplot2::layer_data(shown, 3)), 2)  # a line each
+  upgrade$candidates[at("drift"), c("log10_bf", "lower95", "upper95", "error_ratio")] <- NA_real_
+  for (why in c("silent", "none")) {
+    upgrade$candidates$judged_by[at("drift")] <- why
+    expect_equal(amiss:::candidates_words(upgrade)$mechanism, "sun")
+    expect_equal(plot(upgrade, "candidates")$data$mechanism, "sun")
+    expect_no_error(summary(upgrade))
+    expect_no_error(summary(base_only(upgrade)))
+  }
+  none <- base_only(upgrade)
+  none$candidates[c("log10_bf", "lower95", "upper95", "error_ratio")] <- NA_real_
+  none$candidates$judged_by <- "none"
+  expect_match(summary(none)$sure, "No mechanism could be computed", all = FALSE)
+  expect_match(plot(none, "candidates")$labels$title, "No mechanism was tried")
 })
 
 test_that("a report says what result.json says", {
@@ -231,11 +247,11 @@ test_that("a report says what result.json says", {
     row <- trials[trials[, 2] == trial$mechanism, ]
     expect_identical(row[c(4, 5, 7, 8, 9)],
                      c(signed(trial$log10_bf),
-                       if (trial$judged_by == "response") ""
-                       else paste(signed(unlist(trial$interval)), collapse = " to "),
+                       paste(signed(unlist(trial$interval)), collapse = " to "),
                        percent(trial$probability),
                        if (is.null(trial$error_ratio)) "" else paste(short(trial$error_ratio), "times"),
-                       if (trial$judged_by == "response") "by responses" else if (trial$trusted) "sound" else "rough"))
+                       if (trial$judged_by == "runs") "verified"
+                       else if (trial$trusted) "trial" else "rough"))
     expect_identical(row[10] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
   }
 

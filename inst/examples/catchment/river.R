@@ -3,9 +3,9 @@
 # Usage: Rscript river.R
 source(system.file("examples", "catchment", "model.R", package = "amiss"), local = TRUE)
 
-# ---- Few runs, and a coarse sampler.
+# ---- Few checks, and a fast sampler.
 quick <- list(max_steps = 1, rounds = 3, attribution = list(surrogates = 19),
-              calibration = list(check = 15, ais = list(pilot_chains = 48, groups = 4)))
-upgrade <- upgrade_model(runoff, river, ideas, runs = 60, control = quick, seed = 1, quiet = TRUE)
+              calibration = list(ais = list(pilot_chains = 48, groups = 4)))
+upgrade <- upgrade_model(runoff, river, ideas, control = quick, seed = 1, quiet = TRUE)
 print(upgrade)
 print(tail(tidy(upgrade), 3))

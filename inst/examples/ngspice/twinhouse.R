@@ -39,10 +39,10 @@ ideas <- catalogue(
                   free("wind", uniform(0, 10), "W/K per m/s", "exchange by wind"), boundary = "Ws")
   }))
 
-# ---- Few runs, and a coarse sampler.
+# ---- Few checks, and a fast sampler.
 quick <- list(max_steps = 1, rounds = 3, attribution = list(surrogates = 19),
-              calibration = list(check = 15, ais = list(pilot_chains = 48, groups = 4)))
-upgrade <- upgrade_model(network, room, ideas, runs = 60, control = quick, seed = 1, quiet = TRUE)
+              calibration = list(ais = list(pilot_chains = 48, groups = 4)))
+upgrade <- upgrade_model(network, room, ideas, control = quick, seed = 1, quiet = TRUE)
 print(upgrade)
 estimates <- tidy(upgrade)
 print(estimates[estimates$term %in% c("south", "wind"), ])

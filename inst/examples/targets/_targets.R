@@ -1,4 +1,4 @@
-# A pipeline of the package targets: each stage is kept, and made again only when something that it hangs on changed.
+# A pipeline of the package targets: each stage is kept, and made again only when something that it depends on changed.
 # Usage: copy this folder, then targets::tar_make() in it; library(amiss); targets::tar_read(cause)
 # shows a result.
 # `runs`, `quick` and `surrogates` are small, for speed: for real work leave all three out.

@@ -42,23 +42,6 @@ test_that("each doubt makes a mechanism likely", {
       u
     })
   }
-  few <- function(u, lower95) {
-    emulator <- amiss:::emulator_over_priors(u$models[[2]]$fit$emulator)
-    emulator$unit <- emulator$unit[1:14, ]
-    u$models[[2]]$fit$emulator <- emulator
-    u$candidates$lower95 <- lower95
-    u
-  }
-  expect_doubt("runs over the priors are too few", few, lower95 = 4.9)
-  expect_identical(judged(function(u) few(u, 5.1))$verdict, "named")
-  expect_doubt("the evidence is not known", function(u) {
-    u$candidates$lower95 <- -290
-    u
-  })
-  expect_doubt("data held out speak for drift", function(u) {
-    u$models[[2]]$held_out_rivals <- "drift"
-    u
-  })
   expect_doubt("band holds only 70 % of the data held out", function(u) {
     u$models[[2]]$scores$validate[["coverage95"]] <- 0.7
     u
@@ -67,12 +50,16 @@ test_that("each doubt makes a mechanism likely", {
     u$models[[2]]$scores$calibrate[["rmse"]] <- 1.03 * u$models[[1]]$scores$calibrate[["rmse"]]
     u
   })
-  expect_doubt("the error still answers to what drives it", function(u) {
+  expect_doubt("the error still responds to what drives it", function(u) {
     u$models[[2]]$attribution <- u$models[[1]]$attribution
     u
   })
   expect_doubt("at the edge of what was thought possible", function(u) {
     u$models[[2]]$fit$posterior$unit[, 3] <- 1 - 0.001 * u$models[[2]]$fit$posterior$unit[, 3]
+    u
+  })
+  expect_doubt("it describes what is missing and does not explain it", function(u) {
+    u$catalogue$sun <- response_mechanism("Gv", u$measurements, name = "sun")
     u
   })
   # Both models as they were, plus an error that neither explains.
@@ -95,28 +82,6 @@ test_that("what was adopted later is no other cause", {
   upgrade <- rejudged(upgrade)
   expect_no_match(c("", upgrade$models[[2]]$doubts), "other causes")
   expect_false(any(grepl("tell sun from drift", upgrade_inspections(upgrade))))
-})
-
-test_that("a rival with which data held out are met better is found among those calibrated in full, and told", {
-  upgrade <- small_upgrade()
-  model <- upgrade$models[[2]]
-  worse <- model
-  held <- worse$prediction$use == "validate"
-  worse$prediction$mean[held] <- worse$prediction$mean[held] + 0.3
-  stand_in(predicted_record = function(fit, settings) model[c("prediction", "scores")])
-  trials <- function(judged_by = "calibration", probability = 0.1) {
-    list(fits = list(sun = worse$fit, drift = model$fit),
-         table = data.frame(mechanism = c("sun", "drift"), judged_by = c("calibration", judged_by),
-                            probability = c(0.8, probability), error_ratio = 0.5))
-  }
-  settings <- list(keep = function(name, value) value)
-  expect_identical(amiss:::held_out_rivals(worse, trials(), settings), "drift")
-  expect_length(amiss:::held_out_rivals(model, trials(), settings), 0)
-  expect_length(amiss:::held_out_rivals(worse, trials("screening"), settings), 0)
-  expect_length(amiss:::held_out_rivals(worse, trials(probability = 0.01), settings), 0)
-  upgrade$models[[2]]$held_out_rivals <- "drift"
-  expect_match(summary(rejudged(upgrade))$headline,
-               "^By the evidence: Sun .* But by the data held out: The target drifts")
 })
 
 test_that("where the base model's parameters could have come nearer by themselves, the gain says so", {
@@ -148,7 +113,7 @@ test_that("a mechanism by which data held out do not gain is a stand-in, whateve
     upgrade$models[[2]]$prediction$mean[held] <- upgrade$models[[1]]$prediction$mean[held]
     upgrade
   }
-  expect_doubt("data held out do not gain by it", worse, "stand-in")
+  expect_doubt("held-out data do not improve", worse, "stand-in")
   upgrade <- worse(small_upgrade())
   upgrade <- rejudged(upgrade)
   told <- summary(upgrade)
@@ -275,18 +240,6 @@ test_that("a stand-in is no named cause, and what is named goes before what is l
   expect_null(amiss:::named_cause(list(list(name = "base")), candidates, entries))
 })
 
-test_that("of what was adopted though its evidence is not known, diagnosis and figure say why; it is likely at best", {
-  upgrade <- small_upgrade()
-  sun <- upgrade$candidates$mechanism == "sun" & upgrade$candidates$from == "base"
-  upgrade$candidates[sun, c("lower95", "upper95")] <- list(-1, 12)
-  judged <- rejudged(upgrade)
-  expect_equal(judged$models[[2]]$verdict, "likely")
-  expect_true("the fall of the error speaks for it, the evidence is not known" %in% judged$models[[2]]$doubts)
-  expect_match(paste(summary(judged)$sure, collapse = " "), "too uncertain to decide.*own error in calibration falls")
-  expect_match(ggplot2::autoplot(judged, "candidates")$labels$title,
-               "^The fall of the error calls for sun, the evidence is too uncertain")
-})
-
 test_that("a mechanism with which the simulation's own error rises is not adopted, and why is told", {
   upgrade <- base_only(small_upgrade())
   expect_lt(upgrade$candidates$error_ratio[upgrade$candidates$mechanism == "sun"], 0.5)
@@ -298,19 +251,22 @@ test_that("a mechanism with which the simulation's own error rises is not adopte
   expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title, "the best raises the error")
 })
 
-test_that("the best of what was not adopted is the one of highest evidence, also where the error rises with it", {
-  upgrade <- small_upgrade()
-  table <- data.frame(mechanism = c("sun", "lag"), log10_bf = c(1.2, 0.3), lower95 = 0, upper95 = 2,
-                      judged_by = "screening", error_ratio = c(1.4, 1))
-  reason <- amiss:::stop_reason(table, upgrade$models[[2]]$attribution, 2)
-  expect_match(reason, "best: sun, log10 Bayes factor 1.2, though the error rises with it;")
-  table$error_ratio <- 1
-  expect_match(amiss:::stop_reason(table, upgrade$models[[2]]$attribution, 2), "best: sun, log10 Bayes factor 1.2;")
-  # Numbers that say nothing are not given.
-  table$log10_bf <- c(3913, -2)
-  table$lower95 <- -3e7
-  table$upper95 <- 3e7
-  expect_match(amiss:::stop_reason(table, upgrade$models[[2]]$attribution, 2), "too uncertain \\(best: sun\\)")
+test_that("why nothing was adopted names the best, also where the error rises with it", {
+  present <- list(attribution = small_upgrade()$models[[2]]$attribution)
+  context <- amiss:::new_context(1, 1, list(decisive = 2))
+  table <- data.frame(mechanism = c("sun", "lag"), log10_bf = c(1.2, 0.3), lower95 = c(0.1, -1), upper95 = 2,
+                      judged_by = "runs", error_ratio = c(1.4, 1))
+  told <- function(...) amiss:::no_winner(utils::modifyList(table, list(...)), present, context)
+  expect_identical(told()$id, "not_decisive")
+  expect_match(told()$words, "no mechanism is decisive \\(best: sun, log10 Bayes factor 1.2; 2 or more")
+  risen <- told(log10_bf = c(3, 0.3))
+  expect_identical(risen$id, "raises_error")
+  expect_match(risen$words, "lowers the error decisively \\(sun has a log10 Bayes factor of 3.0, but raises it")
+  expect_identical(told(log10_bf = c(3, 4), lower95 = c(1, -1))$id, "uncertain")
+  expect_match(told(log10_bf = c(3, 4), lower95 = c(1, -1))$words, "too uncertain \\(best: lag")
+  expect_identical(told(log10_bf = c(NA_real_, NA_real_))$id, "none_computed")
+  # Rounded it would look like enough.
+  expect_match(told(log10_bf = c(1.96, 0.3))$words, "log10 Bayes factor 1.96;")
 })
 
 test_that("where the base model's emulator is refuted, no mechanism is judged and no odds are given", {
