@@ -25,7 +25,7 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' @param method `"paper"`: [calibrate_paper()] with its variance index; `"history"`: [calibrate()] and
 #'   [attribute_discrepancy()].
 #' @param runs Runs of the first design of each model. On top come those for predictions and the least-squares search
-#'   and, of `"history"`, of the check and of up to eight rounds of refinement where it fails ([calibrate_refined()]).
+#'   and, of `"history"`, where the runs are not used, of searches, regions and checks ([calibrate_refined()]).
 #'   `"paper"` is neither checked by runs nor refined.
 #' @param control List of lists: `emulator`, `calibration` and `attribution` (of `"history"` only), as the stages take
 #'   them.

@@ -29,9 +29,9 @@ to_unit <- function(z, flat) {
   pmin(pmax(unit, 0), 1)
 }
 
-# The most probable point of N(mean, precision^-1) between -limit and limit, by an active set: of the coordinates held at
-# an end that one is let go from which the density rises fastest inwards; the others go to their best, or to the first
-# end in their way.
+# The most probable point of N(mean, precision^-1) between -limit and limit, by an active set: of the coordinates held
+# at an end that one is let go from which the density rises fastest inwards; the others go to their best, or to the
+# first end in their way.
 within_limits <- function(mean, precision, limit) {
   z <- pmin(pmax(mean, -limit), limit)
   held <- abs(z) >= limit

@@ -301,15 +301,11 @@ uncovered_statement <- function(ensemble) {
   paste("the runs cover only", paste(spans, collapse = ", "))
 }
 
-check_enough_runs <- function(runs, parameters, of = runs, call = rlang::caller_env()) {
+check_enough_runs <- function(runs, parameters, call = rlang::caller_env()) {
   if (runs < max(5, parameters + 2)) {
     abort_input(c(
       "{runs} run{?s} {?is/are} too few for {parameters} parameter{?s}; at least {max(5, parameters + 2)} are needed.",
-                  i = "Ten times the number of parameters is a good start.",
-                  if (of != runs)
-                    c(i = paste("Of the {of} runs asked for, {runs} fill the space of the parameters; the others lie",
-                                "where the posterior does ({.code control$refine})."))),
-                    call = call)
+      i = "Ten times the number of parameters is a good start."), call = call)
   }
 }
 

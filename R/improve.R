@@ -266,6 +266,9 @@ verify_model <- function(model, context, first = 1) {
     least <- inside + length(model$checked$at) + if (passed) 0 else rules$more_runs
   }
   best <- best %||% found
+  if (is.null(best$fits[[1]]$check)) {  # the budget ended before the check
+    return(with_fit(best$model, best$fits, best$model$level, 0, context))
+  }
   best$model$runs <- model$runs
   if (!is.null(model$modes)) best$model$modes <- confirmed_modes(best$model, model$modes, best$fits)
   with_fit(best$model, best$fits, "verified", round, context)
@@ -295,6 +298,7 @@ check_score <- function(fits) {
 with_fit <- function(model, fits, level, rounds, context) {
   fits <- lapply(fits, function(fit) {
     fit$trust <- fit_trust(fit)
+    if (is.null(fit$check)) fit$trust <- not_checked()
     fit$rounds <- rounds
     fit$runs_made <- runs_spent(context)
     fit$modes <- model$modes
@@ -304,6 +308,10 @@ with_fit <- function(model, fits, level, rounds, context) {
   model$fit <- joined_fit(stats::setNames(fits, names(model$simulators)))
   model$level <- level
   model
+}
+
+not_checked <- function() {
+  list(trusted = FALSE, verdict = "not trusted: the budget left no runs to check the emulator")
 }
 
 # Of searches from several starts no two led to one mode: there may be a better one.

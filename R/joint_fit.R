@@ -35,7 +35,7 @@ new_joint <- function(fits) {
                  values = values, weights = first$weights, posterior = posterior, log_evidence = first$log_evidence,
                  standard_error = first$standard_error, interval = first$interval, check = joint_check(fits),
                  trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
-                 runs_made = first$runs_made, seed = first$seed), class = "amiss_joint")
+                 runs_made = first$runs_made, modes = first$modes, seed = first$seed), class = "amiss_joint")
 }
 
 # What the checks say of all records: passed where each has, with the largest error in units of the noise.

@@ -105,7 +105,7 @@ is_same_mode <- function(model, one, other, context) {
 
 region_draws <- 600
 
-# Of modes that count beside the best, in shares of their values.
+# Of modes that count beside the best, equally many draws of each.
 region_of_modes <- function(model, modes, seed) {
   value <- vapply(modes, function(mode) mode$value %||% 0, 0)
   modes <- modes[value > max(value) - rules$mode_depth]

@@ -168,27 +168,29 @@ slopes_at <- function(fit, use, threads, record) {
   step <- rules$search_difference * difference_side(z)
   around <- rbind(z, matrix(z, length(z), length(z), byrow = TRUE) + diag(step, length(z)))
   runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, flat), parameters), use, threads, record)
+  if (!all(is.finite(runs))) {
+    abort_numerical("The simulator failed beside the centre of the posterior at these rows.")
+  }
   sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, step, "/")
 }
 
-# The vectors of an emulator's basis at other rows: the same combinations of its runs.
+# The vectors of an emulator's basis at other rows: the same combinations of its runs, without those that fail there.
 vectors_at <- function(fit, emulator, use, threads, record) {
   w <- emulator$processes$coefficients
   last <- ncol(w)
   runs <- if (is.null(fit$emulator$simulator)) runs_given(fit, use)
           else runs_elsewhere(fit, unit_to_values(emulator$unit, emulator$parameters), use, threads, record)
-  coordinates <- w[, -last, drop = FALSE]
-  shifted <- sweep(runs, 2, w[, last])
+  made <- colSums(!is.finite(runs)) == 0
+  if (sum(made) < last) {
+    abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
+  }
+  coordinates <- w[made, -last, drop = FALSE]
+  shifted <- sweep(runs[, made, drop = FALSE], 2, w[made, last])
   cbind(shifted %*% coordinates %*% solve(crossprod(coordinates) + diag(1e-12, last - 1)), 1)
 }
 
 runs_elsewhere <- function(fit, values, use, threads, record) {
-  runs <- suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
-  failed <- sum(colSums(!is.finite(runs)) > 0)
-  if (failed) {
-    abort_numerical("The simulator failed at {failed} of {ncol(runs)} runs of the emulator, made at these rows.")
-  }
-  runs
+  suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
 }
 
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy

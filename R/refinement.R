@@ -69,7 +69,11 @@ calibrate_ensembles <- function(ensembles, measurements, rounds, runs, control, 
   simulators <- lapply(ensembles, `[[`, "simulator")
   model <- new_model(simulators, lapply(measurements, loop_record, control$calibration))
   model$local <- runs
-  calibrate_model(with_known_runs(model, ensembles), context)$fit
+  fit <- calibrate_model(with_known_runs(model, ensembles), context)$fit
+  for (one in record_fits(fit)) {
+    warn_coarse_basis(one$emulator, "control$emulator$max_vectors", if (length(ensembles) > 1) one$measurements$name)
+  }
+  fit
 }
 
 can_be_run <- function(ensemble) !is.null(ensemble$simulator)

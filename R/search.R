@@ -185,7 +185,8 @@ given_slopes <- function(model, z) {
     value <- function(unit) unit_to_values(unit[, own, drop = FALSE], parameters)
     seen <- measured_slopes(model$simulators[[k]], value(unit), model$records[[k]]$measurements)
     if (is.null(seen)) return(NULL)
-    per_z <- as.numeric(value(ends[[2]]) - value(ends[[1]])) / (2 * by)
+    way <- from_unit(ends[[2]], model$flat) - from_unit(ends[[1]], model$flat)
+    per_z <- as.numeric(value(ends[[2]]) - value(ends[[1]])) / way[, own]
     slopes[model$rows[[k]], own] <- sweep(seen, 2, per_z, "*")
   }
   slopes
@@ -241,24 +242,15 @@ tangent_at <- function(model, at, slopes, history, context) {
     steep <- unname(slopes[model$rows[[k]], own, drop = FALSE])
     data <- c(record$data, list(moves = steep))
     if (!is.null(history)) {
-      priors <- searched_priors(model, record)
-      return(call_engine(tangent_given_(data, priors, history[[k]], z[own], run, steep, engine)))
+      return(call_engine(tangent_given_(data, record$priors, history[[k]], z[own], run, steep, engine)))
     }
     ais <- fill_ais_control(utils::modifyList(record$control$ais, search_ais))
-    call_engine(tangent_posterior_(data, searched_priors(model, record), z[own], run, steep, rules$search_draws, ais,
+    call_engine(tangent_posterior_(data, record$priors, z[own], run, steep, rules$search_draws, ais,
                                    engine))
   })
   joint <- joint_tangent(each, model$own, length(z))
   list(mean = joint$mean, covariance = joint$covariance,
        history = history %||% lapply(each, `[`, c("setting", "variance", "t")))
-}
-
-# The priors of a search. One by the simulator alone keeps the discrepancy out of what the parameters do, so that
-# it cannot do their work.
-searched_priors <- function(model, record) {
-  priors <- record$priors
-  if (isTRUE(model$alone)) priors$reach <- min(priors$reach)
-  priors
 }
 
 # log posterior density of runs, averaged over draws of error and discrepancy.
@@ -279,7 +271,7 @@ values_of <- function(model, outputs, z, history, slopes, context) {
                    t = history[[k]]$t[repeated, , drop = FALSE])
     data <- c(model$records[[k]]$data,
               list(moves = unname(slopes[rows, model$own[[k]], drop = FALSE])))
-    log_l <- call_engine(run_likelihood_(data, searched_priors(model, model$records[[k]]), points,
+    log_l <- call_engine(run_likelihood_(data, model$records[[k]]$priors, points,
                                          outputs[rows, rep(fine, each = draws), drop = FALSE],
                                          engine_context(context$seed, context$threads)))
     apply(matrix(log_l, draws), 2, log_mean_exp)

@@ -4,7 +4,7 @@
 first_state <- function(started, catalogue, runs, context) {
   context$say("Calibrating the base model")
   base <- staged("base", base_model(started, runs, context))
-  measured <- measured_model(base, context)
+  measured <- staged("base", measured_model(base, context))
   report_model(measured, context)
   list(present = base, models = list(measured), started = started, catalogue = catalogue,
        candidates = NULL, off = list(), base = names(base$parameters))
@@ -144,6 +144,11 @@ can_extend <- function(mechanism, state, brought) {
 # ---- what is said on the way
 
 report_model <- function(model, context) {
+  fits <- record_fits(model$fit)
+  for (k in seq_along(fits)) {
+    warn_coarse_basis(fits[[k]]$emulator, "control$emulator$max_vectors",
+                      paste(c(model$name, names(fits)[k]), collapse = ", "))
+  }
   first <- utils::head(model$attribution$table[model$attribution$table$significant, ], 1)
   context$say(paste(
     "{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",

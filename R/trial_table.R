@@ -47,7 +47,7 @@ as_tried <- function(row, trial) {
 trial_margin <- function(model) {
   if (is_verified(model)) 0
   else if (is_confirmed(model)) rules$trial_margin
-  else rules$trial_doubt * (1 + (model$fit$check$ratio %||% 1))
+  else rules$trial_doubt * (1 + min(rules$worst_ratio, model$fit$check$ratio %||% 1))
 }
 
 is_confirmed <- function(model) {

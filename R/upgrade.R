@@ -37,8 +37,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   parameter. More are seldom needed. The budget of all runs is `control$runs_total`.
 #' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism must earn;
 #'   2), `runs_total` (budget of runs of the simulator; a verdict asks for about 100; `NULL`: none), `rounds`
-#'   (checks of a model before it is left as not trusted; 8), and lists `emulator`, `calibration` and
-#'   `attribution` for the stages.
+#'   (checks of a model before it is left as not trusted; 8), and lists `emulator`, `calibration` (without its
+#'   `check` and `exact`, which the loop sets itself) and `attribution` for the stages.
 #' @param quiet No progress messages.
 #' @param checkpoint A folder in which all runs are kept (and the seed, if none is given), so that an
 #'   interrupted loop, called again with the same arguments, goes on where it stopped; `NULL` keeps nothing.
@@ -53,7 +53,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks against it; or
 #'   `"stand-in"`, if held-out data do not improve (`held_out_gain`, with its standard error). `inert` names
 #'   parameters of the base model that the last model no longer uses. `steps` has, for each record, what shorter
-#'   steps of the simulator change: the RMS (`error`, in the target's unit) of what the parameters cannot take up, and by how many of its standard deviations each would move (`moved`); `NULL` if that is not
+#'   steps of the simulator change: the RMS (`error`, in the target's unit) of what the parameters cannot take up, and
+#'   by how many of its standard deviations each would move (`moved`); `NULL` if that is not
 #'   known ([function_simulator()]). `confounded_with` names parameters that are correlated beyond 0.4 with those
 #'   that it brought. For several records `fit` is what [calibrate_jointly()] gives, and `records` of a model
 #'   has `prediction`, `scores` and `held_out_gain` of each in its own unit.
@@ -174,6 +175,7 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive",
               call = call)
   check_input(checkmate::check_count(control$rounds, positive = TRUE), "control$rounds", call = call)
+  check_training_size(rules$more_runs * control$rounds, "control$rounds", control$rounds, call)
   check_input(checkmate::check_count(control$runs_total, positive = TRUE, null.ok = TRUE),
               "control$runs_total", call = call)
   check_stage_controls(control, measurements, call = call)

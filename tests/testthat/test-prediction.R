@@ -81,7 +81,7 @@ test_that("runs that fail at other rows are left out of its moves there", {
   never$emulator$simulator <- function_simulator(function(values, drivers) NaN * drivers[, 1],
                                                  free("offset", uniform(10, 30), "K"),
                                                  free("gain", uniform(0, 1)), boundary = "Te")
-  expect_error(amiss:::moves_at(never, "validate", 1), "failed at 30 of 30 runs of the emulator",
+  expect_error(amiss:::moves_at(never, "validate", 1), "failed at 30 of the ensemble's 30 runs",
                class = "amiss_error_numerical")
 })
 
