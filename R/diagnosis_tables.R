@@ -8,7 +8,7 @@ parameter_labels <- function(fit, names) {
 # Parameters that shorter steps would move beyond their uncertainty.
 step_moved <- function(model) {
   moved <- step_moves(model)
-  parameter_labels(model$fit, unique(names(moved)[abs(moved) > largest_move]))
+  parameter_labels(model$fit, unique(names(moved)[abs(moved) > rules$largest_move]))
 }
 
 step_moved_words <- function(model) {

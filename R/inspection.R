@@ -123,7 +123,7 @@ uncovered_conditions <- function(measurements, fit) {
 mechanism_inspections <- function(upgrade, model) {
   trials <- upgrade$candidates[upgrade$candidates$from == model$parent, ]
   adopted <- vapply(adopted_models(upgrade), `[[`, "", "mechanism")
-  rivals <- trials[!trials$mechanism %in% adopted & trials$probability >= rival_probability, ]
+  rivals <- trials[!trials$mechanism %in% adopted & trials$probability >= rules$rival_probability, ]
   told <- c(vapply(rivals$mechanism, function(rival) separating_words(upgrade, trials, model$mechanism, rival), ""),
             confounded_inspection(upgrade, model))
   c(stats::setNames(told, rep("rival", length(told))),
@@ -244,15 +244,13 @@ last_trials <- function(upgrade) {
   upgrade$candidates[upgrade$candidates$from == upgrade$models[[length(upgrade$models)]]$name, ]
 }
 
-told_evidence <- 0.2  # decades, odds of 1.6 to 1, from which a mechanism that is not decided is told
-
 # The best of the mechanisms left, where there is evidence for it that is not decisive: a row of its trial, or none.
 nearest_trial <- function(upgrade) {
   trials <- last_trials(upgrade)
   if (!NROW(trials)) return(NULL)
   open <- trials[!is.na(trials$log10_bf) & !raises_error(trials), ]
   best <- open[which.max(open$log10_bf), ]
-  best[best$probability >= rival_probability & best$log10_bf > told_evidence, ]
+  best[best$probability >= rules$rival_probability & best$log10_bf > rules$told_evidence, ]
 }
 
 # A trial that would have been verified, had the budget not ended.
@@ -260,7 +258,7 @@ is_unverified <- function(row, upgrade) row$judged_by == "trial" && row$log10_bf
 
 nearest_inspection <- function(upgrade) {
   best <- nearest_trial(upgrade)
-  if (!NROW(best) || unjudged(upgrade) || best$upper95 - best$lower95 > too_rough) return(NULL)
+  if (!NROW(best) || unjudged(upgrade) || best$upper95 - best$lower95 > rules$too_rough) return(NULL)
   if (is_unverified(best, upgrade)) {
     return(c(nearest = sprintf(paste("Not verified is %s (odds of %s): a larger budget (control$runs_total) would",
                                      "decide it."), best$mechanism, odds(best$log10_bf))))
@@ -269,14 +267,12 @@ nearest_inspection <- function(upgrade) {
   new <- best$parameters[[1]]
   c(nearest = sprintf("Not decided is %s (odds of %s%s): a longer record%s would decide it%s.",
                       best$mechanism, odds(best$log10_bf),
-                      if (isTRUE(best$error_ratio < clearly_fallen))
+                      if (isTRUE(best$error_ratio < rules$clearly_fallen))
                         sprintf("; with it the error falls to %s", percent(best$error_ratio)) else "",
                       if (!length(drivers)) "" else sprintf(" in which %s strongly",
                         paste(listed(drivers), if (length(drivers) > 1) "change" else "changes")),
                       if (NROW(new)) sprintf(", or a look for %s on site", called_for(new)) else ""))
 }
-
-clearly_fallen <- 0.8  # times the simulation's error before: from there down a fall is told, whatever the evidence
 
 # Mechanisms of which the numbers are too rough to rule them out.
 undecided_inspections <- function(upgrade) {
@@ -284,7 +280,7 @@ undecided_inspections <- function(upgrade) {
   if (!NROW(open)) return(NULL)
   said <- vapply(seq_len(nrow(open)), function(k) {
     ends <- c(open$lower95[k], open$upper95[k])
-    if (diff(ends) > too_rough) return("its numbers are too rough for odds")
+    if (diff(ends) > rules$too_rough) return("its numbers are too rough for odds")
     sprintf("odds of %s%s, by numbers that are not trusted", odds(open$log10_bf[k]), odds_interval(ends))
   }, "")
   told <- sprintf(paste("Not ruled out is %s: %s. A larger budget (control$runs_total), or narrower priors, would",
@@ -311,7 +307,7 @@ answer_inspections <- function(upgrade, last) {
   open <- c(nearest_trial(upgrade)$mechanism, open_trials(upgrade)$mechanism)
   trials <- last_trials(upgrade)
   falls <- trials[trials$trusted & !trials$mechanism %in% open &
-                    !is.na(trials$error_ratio) & trials$error_ratio < clearly_fallen, ]
+                    !is.na(trials$error_ratio) & trials$error_ratio < rules$clearly_fallen, ]
   undecided <- character()  # of each condition the mechanisms that may be why
   told <- character()
   for (name in answers) {

@@ -2,10 +2,6 @@
 # hold. What speaks against a mechanism is a doubt: an id, a test that gives its sentence or nothing, and the reason
 # why it counts.
 
-risen_error <- 1.02   # times the simulation's error in calibration before: from there it counts as risen
-rival_probability <- 0.05  # of a mechanism not adopted, below which it is no rival and not worth a measurement
-least_inside <- 0.8  # share of the data held out in the 95 % band of the last model, below which it is wrong there
-
 doubt <- function(says, reason) list(says = says, reason = reason)
 
 # Tests of a case: the mechanism's model and its parent, its row and those of its rivals, and what judge_models()
@@ -15,7 +11,7 @@ doubts <- list(
     if (describes(case$entry)) "it describes what is missing and does not explain it"
   }, "a response is no cause"),
   rivals = doubt(function(case) {
-    if (case$others > rival_probability) "other causes are possible"
+    if (case$others > rules$rival_probability) "other causes are possible"
   }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
   untrusted = doubt(function(case) {
     if (!case$parent$fit$trust$trusted || !case$model$fit$trust$trusted) "the numbers behind it are not trusted"
@@ -40,7 +36,7 @@ doubts <- list(
     if (case$remains) "a good part of the error remains"
   }, "the mechanism that made the error leaves nothing"),
   coverage = doubt(function(case) {
-    if (isTRUE(case$inside < least_inside)) {
+    if (isTRUE(case$inside < rules$least_inside)) {
       sprintf("its 95 %% band holds only %s of the data held out", percent(case$inside))
     }
   }, "a band that misses a fifth of new data is wrong"),
@@ -104,7 +100,7 @@ judged_model <- function(case) {
 # Where the simulation's error in calibration rose, in words: over all, or in some of several records.
 risen_words <- function(parent, model) {
   rises <- function(parent, model) {
-    model$scores$calibrate[["rmse"]] > risen_error * parent$scores$calibrate[["rmse"]]
+    model$scores$calibrate[["rmse"]] > rules$risen_error * parent$scores$calibrate[["rmse"]]
   }
   if (rises(parent, model)) return("the error in calibration rose with it")
   where <- Filter(function(name) rises(parent$records[[name]], model$records[[name]]), names(model$records))

@@ -187,7 +187,7 @@ next_to_verify <- function(trials, present, context) {
 }
 
 raises_simulation <- function(model, present) {
-  is_verified(model) && error_ratio(model$fit, present$fit) > risen_error
+  is_verified(model) && error_ratio(model$fit, present$fit) > rules$risen_error
 }
 
 # A trial that its runs confirm has had its first round.

@@ -1,16 +1,14 @@
 # What a model leaves of the calibration record, beside the stated noise, and whether the calendar shows in it: a
 # pattern that no boundary condition carries is of the clock (something at fixed hours) or of time itself (a drift).
 
-large_remainder <- 1.5  # times the stated noise: autocorrelated noise of the stated size stays below it
-
 remaining_error <- function(model, measurements) {
   p <- model$prediction[model$prediction$use == "calibrate", ]
   r <- p$observed - p$mean
   # As in error_sd(): fitted parameters do not count as agreement.
   q <- length(drawn_parameters(model$fit))
   ratio <- sqrt(sum(r^2) / max(1, length(r) - q)) / measurements$noise_sd
-  list(ratio = ratio, large = ratio > large_remainder,
-       pattern = if (ratio > large_remainder) {
+  list(ratio = ratio, large = ratio > rules$large_remainder,
+       pattern = if (ratio > rules$large_remainder) {
          if (is_several(measurements)) worst_pattern(model, measurements)
          else remainder_pattern(r, model$fit$rows, measurements, significant_conditions(model$attribution$table))
        })

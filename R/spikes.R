@@ -1,8 +1,6 @@
 # Readings that stand apart from those before and after them: errors of a sensor, or events of a single step. Errors
 # count as normal, so that a few such readings weigh like many good ones.
 
-spike_size <- 4  # times the usual step from one error to the next, on both sides: of 10^7 normal errors one
-
 # Rows of the errors r that stand apart, beside rows of the same unbroken part.
 spikes <- function(r, hours, step_h) {
   change <- ifelse(diff(hours) < 1.5 * step_h, diff(r), NA)
@@ -10,7 +8,7 @@ spikes <- function(r, hours, step_h) {
   before <- c(NA, change)
   after <- c(-change, NA)
   if (is.na(usual) || usual == 0) return(integer())
-  which(before * after > 0 & pmin(abs(before), abs(after)) > spike_size * usual)
+  which(before * after > 0 & pmin(abs(before), abs(after)) > rules$spike_size * usual)
 }
 
 spike_inspection <- function(model, measurements) {

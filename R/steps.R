@@ -1,10 +1,6 @@
 # What a simulator's own steps err by: its output at the posterior's centre where every row of the drivers is given as
 # several shorter ones, against that of the rows as they are.
 
-largest_step_share <- 1 / 3  # of what a mechanism mends: from there its cause may be the steps
-negligible_step <- 0.1  # of the noise
-largest_move <- 1  # of a parameter, in standard deviations: beyond it its interval is not to be believed
-
 # What steps a quarter as long change in calibration: list(error, moved), the RMS in the target's unit of what the
 # parameters cannot take up, and by how many of its standard deviations each would move. NULL where that is not known:
 # of runs that are given, of a simulator whose steps are not those of its rows, or one whose output does not settle as
@@ -31,7 +27,7 @@ step_change <- function(fit, threads) {
     half <- change(2, amounts)
     quarter <- change(4, amounts)
     settles <- rms(quarter - half) <= 0.75 * rms(half)  # a half in a scheme of first order
-    if (isTRUE(settles || rms(quarter) < negligible_step * m$noise_sd)) quarter
+    if (isTRUE(settles || rms(quarter) < rules$negligible_step * m$noise_sd)) quarter
   }
   settled(character()) %||% settled(likely_amounts(driver_names(simulator), function(amounts) rms(change(2, amounts))))
 }
@@ -130,13 +126,13 @@ step_doubt <- function(parent, model, new, log10_bf, measurements) {
   }
   error <- sqrt(sum(step_error(parent)^2, na.rm = TRUE))
   mended <- sqrt(max(0, sum((squares(parent) - squares(model))[known])))
-  if (any(known) && error >= largest_step_share * mended)
+  if (any(known) && error >= rules$largest_step_share * mended)
     return(sprintf("shorter steps of the simulator change %s of the noise where it mends %s", short(error),
                    short(mended)))
   moved <- step_moves(model)
   move <- max(0, abs(moved[names(moved) %in% new]))
   away <- sqrt(2 * log(10) * max(0, log10_bf))
-  if (move > 0 && move >= largest_step_share * away)
+  if (move > 0 && move >= rules$largest_step_share * away)
     sprintf("shorter steps of the simulator move its values by %s standard deviations, where %s make its evidence",
             short(move), short(away))
 }

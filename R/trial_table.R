@@ -60,15 +60,13 @@ error_ratio <- function(fit, current) {
   sqrt(mean(left_by_simulation(fit)^2) / mean(left_by_simulation(current)^2))
 }
 
-raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > risen_error
+raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > rules$risen_error
 
 # Estimates of the parameters that a mechanism brought with it.
 added_parameters <- function(fit, parent) {
   table <- parameter_table(fit)
   table[!table$name %in% names(drawn_parameters(parent)), ]
 }
-
-too_rough <- 10  # decades between the ends of an interval from which odds say nothing
 
 # The row of highest evidence among the mechanisms that may be adopted: they were verified, and the
 # simulation's own error does not rise with them. No row if there is none.

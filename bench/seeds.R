@@ -47,7 +47,7 @@ one_seed <- function(case, seed) {
   row
 }
 
-tasks <- expand.grid(seed = first + seq_len(worlds) - 1L, family = families, stringsAsFactors = FALSE)
+tasks <- expand.grid(seed = first + seq_len(worlds) - 1L, family = families, stringsAsFactors = FALSE)  # 0: none
 cases <- c(unlist(lapply(houses, house_models), recursive = FALSE),
            unlist(unname(Map(world_models, tasks$family, tasks$seed)), recursive = FALSE))
 table <- do.call(rbind, unlist(lapply(cases, function(case) lapply(seeds, function(s) one_seed(case, s))),
