@@ -62,18 +62,21 @@ check_refining <- function(measurements, rounds, runs, control, call = rlang::ca
 # One calibration of all ensembles: by a search if they know their simulators and rounds are asked for.
 calibrate_ensembles <- function(ensembles, measurements, rounds, runs, control, seed, threads) {
   context <- new_context(seed, threads, c(control, list(rounds = rounds)))
-  if (rounds == 0 || !all(vapply(ensembles, can_be_run, NA))) {
-    return(given_model(ensembles, measurements, "the model", context)$fit)
-  }
-  for (k in seq_along(ensembles)) check_ensemble_rows(ensembles[[k]], measurements[[k]])
-  simulators <- lapply(ensembles, `[[`, "simulator")
-  model <- new_model(simulators, lapply(measurements, loop_record, control$calibration))
-  model$local <- runs
-  fit <- calibrate_model(with_known_runs(model, ensembles), context)$fit
+  searched <- rounds > 0 && all(vapply(ensembles, can_be_run, NA))
+  fit <- if (searched) searched_fit(ensembles, measurements, runs, control, context)
+         else given_model(ensembles, measurements, "the model", context)$fit
   for (one in record_fits(fit)) {
     warn_coarse_basis(one$emulator, "control$emulator$max_vectors", if (length(ensembles) > 1) one$measurements$name)
   }
   fit
+}
+
+searched_fit <- function(ensembles, measurements, runs, control, context) {
+  for (k in seq_along(ensembles)) check_ensemble_rows(ensembles[[k]], measurements[[k]])
+  simulators <- lapply(ensembles, `[[`, "simulator")
+  model <- new_model(simulators, lapply(measurements, loop_record, control$calibration))
+  model$local <- runs
+  calibrate_model(with_known_runs(model, ensembles), context)$fit
 }
 
 can_be_run <- function(ensemble) !is.null(ensemble$simulator)
