@@ -17,12 +17,12 @@ came_out_right <- function(row) {
 }
 
 # The design promises so many runs of the simulator in the median over worlds. A single world may take
-# more, where several mechanisms are close or a check fails: half as many again.
+# more: one that ends unexplained is searched again from all priors. No more than three times as many.
 expect_runs <- function(rows, promised) {
   runs <- vapply(rows, function(r) as.numeric(r$runs_total), 0)
   worst <- rows[[which.max(runs)]]
   expect_lte(stats::median(runs), promised, label = "median number of runs")
-  expect_lte(max(runs), 1.5 * promised,
+  expect_lte(max(runs), 3 * promised,
              label = sprintf("runs of the worst world (%s, seed %d)", worst$kind, worst$seed))
 }
 

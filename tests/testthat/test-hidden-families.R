@@ -211,14 +211,15 @@ family_worlds <- function(scope) {
 }
 
 # The design promises so many runs of the simulator in the median over the worlds of a family. A single
-# world may take more, where several mechanisms are close or a check fails: half as many again.
+# world may take more: one that ends unexplained is searched again from all priors, a base on a curved ridge
+# asks for several rounds. No more than three times as many.
 promised_runs <- c(network = 600, runoff = 500, wrong = 600)
 
 expect_runs <- function(rows, promised) {
   runs <- vapply(rows, function(r) as.numeric(r$runs_total), 0)
   worst <- rows[[which.max(runs)]]
   expect_lte(stats::median(runs), promised, label = paste("median number of runs,", worst$family))
-  expect_lte(max(runs), 1.5 * promised,
+  expect_lte(max(runs), 3 * promised,
              label = sprintf("runs of the worst world (%s, %s, seed %d)", worst$family, worst$kind,
                              worst$seed))
 }
