@@ -161,8 +161,15 @@ log10_factor <- function(model, present) {
 
 # What the log10 Bayes factor of a model may be at most, by its level.
 upper_bound <- function(model, present) {
+  if (is_promising(model, present)) return(Inf)
   error <- sqrt(model$fit$standard_error^2 + present$fit$standard_error^2) / log(10)
-  log10_factor(model, present) + 3 * error + trial_margin(model)
+  log10_factor(model, present) + 3 * min(error, rules$worst_error) + trial_margin(model)
+}
+
+# A trial whose emulator runs refute, so that its evidence says little, though the simulation's own error falls.
+is_promising <- function(model, present) {
+  refuted <- !is_verified(model) && !isTRUE(model$fit$check$passed)
+  refuted && error_ratio(model$fit, present$fit) < rules$promising_error
 }
 
 lower_bound <- function(model, present) 2 * log10_factor(model, present) - upper_bound(model, present)

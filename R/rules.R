@@ -140,6 +140,10 @@ rule_table <- list(
   too_rough = rule(10, "decades",
     "width of an interval from which it gives no odds",
     "it says nothing", "bench/hidden_effects.R"),
+  promising_error = rule(0.9, "times", "simulation error over that before from which a refuted trial is verified",
+                         "a true mechanism of eight times the noise began with an evidence of -37", "bench/runs.R"),
+  worst_error = rule(2, "decades", "standard error of an evidence beyond which a trial's bound rises no further",
+                     "where a few runs refute an emulator wholly, their spread says nothing", "bench/runs.R"),
   decisive = rule(2, "decades", "log10 Bayes factor that a mechanism must earn",
                   "a hundred to one (Jeffreys)", "bench/hidden_effects.R"))
 

@@ -19,6 +19,7 @@ trial_row <- function(trial, present) {
   if (is.null(trial$fit)) return(empty_row(trial$mechanism, present, trial$level, trial$own_runs))
   factor <- bayes_factor(trial$fit, present$fit)
   if (!is_verified(trial)) factor <- as_tried(factor, trial)
+  factor <- readable(factor)
   row <- data.frame(from = present$name, mechanism = trial$mechanism, factor,
                     error_ratio = error_ratio(trial$fit, present$fit), trusted = trial$fit$trust$trusted,
                     judged_by = if (is_verified(trial)) "runs" else "trial", runs = trial$own_runs %||% 0)
@@ -31,6 +32,13 @@ empty_row <- function(mechanism, present, why, runs = NULL) {
                     upper95 = NA_real_, word = NA_character_, error_ratio = NA_real_, trusted = FALSE,
                     judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
   row$parameters <- list(added_parameters(present$fit, present$fit))
+  row
+}
+
+# An interval that is too rough for odds says so by its width, and no more than that.
+readable <- function(row) {
+  row$lower95 <- max(row$lower95, row$log10_bf - 2 * rules$too_rough)
+  row$upper95 <- min(row$upper95, row$log10_bf + 2 * rules$too_rough)
   row
 }
 

@@ -440,7 +440,8 @@ test_that("every number that decides has its unit, what it decides, its reason a
 
 test_that("every rule is read by the code, and the code reads no other", {
   package <- asNamespace("amiss")
-  functions <- Filter(is.function, mget(ls(package, all.names = TRUE), package))
+  functions <- c(Filter(is.function, mget(ls(package, all.names = TRUE), package)),
+                 lapply(amiss:::doubts, `[[`, "says"))
   text <- unlist(lapply(functions, deparse))
   text <- c(text, unlist(lapply(list(amiss:::upgrade_control), deparse)))
   read <- unlist(regmatches(text, gregexpr("rules[$][a-z_]+", text)))
