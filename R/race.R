@@ -168,7 +168,7 @@ upper_bound <- function(model, present) {
 
 # A trial whose emulator runs refute, so that its evidence says little, though the simulation's own error falls.
 is_promising <- function(model, present) {
-  refuted <- !is_verified(model) && !isTRUE(model$fit$check$passed)
+  refuted <- !is_verified(model) && isFALSE(model$fit$check$passed)
   refuted && error_ratio(model$fit, present$fit) < rules$promising_error
 }
 

@@ -335,6 +335,9 @@ test_that("a trial's evidence may be off by what its runs leave open, a verified
   expect_equal(bound(tried_by_hand(3, se = 0, effective = 0.5)), 3 + rules$trial_doubt * 1.1)
   refuted <- tried_by_hand(3, se = 0, passed = FALSE, ratio = 2)
   expect_equal(bound(refuted), 3 + rules$trial_doubt * 3)
+  # The simulation's error falls by half: what refutes the emulator cannot rule that out.
+  promising <- tried_by_hand(-40, se = 0, passed = FALSE, ratio = 2, error = 0.5)
+  expect_equal(bound(promising), Inf)
   unchecked <- tried_by_hand(3, se = 0)
   unchecked$fit$check <- NULL
   expect_equal(bound(unchecked), 3 + rules$trial_doubt * 2)
