@@ -301,8 +301,8 @@ Rcpp::List tangent_given_(const Rcpp::List& data, const Rcpp::List& priors, cons
                           const Eigen::VectorXd& x0, const Eigen::VectorXd& run,
                           const Eigen::MatrixXd& slopes, const Rcpp::List& context) {
   const TangentPosterior result =
-      tangent_given(make_history_data(data), make_history_priors(priors), make_points(points), x0, run, slopes,
-                    convert::context(context));
+      tangent_given(make_history_data(data), make_history_priors(priors), make_points(points), x0, run,
+                    slopes, convert::context(context));
   return Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
 }
 

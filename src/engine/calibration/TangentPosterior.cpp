@@ -85,7 +85,8 @@ TangentPosterior tangent_given(HistoryData data, const HistoryPriors& priors,
   const std::vector<Index> acting = acting_parameters(slopes);
   std::vector<int> settings;
   for (const HistoryParameters& point : history) settings.push_back(point.setting);
-  const HistoryModel model(along_tangent(std::move(data), acting, x0, run, slopes), priors, context, settings);
+  const HistoryModel model(along_tangent(std::move(data), acting, x0, run, slopes), priors, context,
+                           settings);
   return parameters_given(model, history, acting, x0.size());
 }
 

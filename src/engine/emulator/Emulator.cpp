@@ -29,7 +29,8 @@ Emulator::Emulator(const MatrixXd& inputs, const MatrixXd& coefficients, const M
     throw std::invalid_argument("emulator: inputs and coefficients differ in rows");
   if (inputs.cols() == 0) throw std::invalid_argument("emulator: at least one parameter is needed");
   if (trend.size() > 0 && (trend.rows() != coefficients.cols() || trend.cols() != inputs.cols() + 1))
-    throw std::invalid_argument("emulator: the trend needs a row for each coefficient, a column for each slope");
+    throw std::invalid_argument(
+        "emulator: the trend needs a row for each coefficient, a column for each slope");
   if (trend.size() > 0) bends_ -= trend_at(inputs);
   centre_ = bends_.colwise().mean();
   const MatrixXd centred = bends_.rowwise() - centre_;

@@ -41,7 +41,8 @@ class Emulator {
   /// Gamma(a', b' / (k_q'k_q)), a' = a + M (N - Q) / 2, b' = b + discarded_ss / 2. The variances of
   /// each process are widened to its leave-one-out errors, of hyper-parameters that have not seen the run
   /// left out (GaussianProcess::widen()).
-  /// @param trend  as in EmulatorState, or empty. A simulator's tangent is one: the processes are left with what
+  /// @param trend  as in EmulatorState, or empty. A simulator's tangent is one: the processes are left with
+  /// what
   ///   bends, so that a handful of runs do.
   static Emulator train(const Eigen::MatrixXd& inputs, const Basis& basis, const EmulatorOptions& options,
                         const Context& context, const Eigen::MatrixXd& trend = {});
