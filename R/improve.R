@@ -323,25 +323,32 @@ not_agreed <- function(trust, modes) {
                                          collapse = "; "))
 }
 
-# Whether a second search ended in the region of the posterior, as seen in the end, and whether draws lie at each mode.
+# Whether a second search ended in the region of the posterior, as seen in the end; and how many ended at a place as
+# probable as the draws of the posterior that were run, but without draws: a mode that was lost.
 confirmed_modes <- function(model, modes, fits) {
-  inside <- sum(straight_distance(model)[modes$ends] <= 1)
-  modes$agree <- modes$agree || inside > 1
-  z <- from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$flat)
-  seen <- vapply(modes$found, function(mode) {
-    apart <- forwardsolve(t(chol(mode$covariance)), t(z) - mode$z)
-    any(colSums(apart^2) < 4 * (ncol(z) + 4))
-  }, NA)
-  modes$lost <- sum(!seen)
-  modes$found <- NULL
+  modes$agree <- modes$agree || sum(straight_distance(model)[modes$ends] <= 1) > 1
+  z <- t(from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$flat))
+  empty <- !mapply(function(at, covariance) {
+    apart <- forwardsolve(t(chol(covariance)), z - model$runs$z[at, ])
+    any(colSums(apart^2) < 4 * (nrow(z) + 4))
+  }, modes$ends, modes$covariances)
+  value <- values_under(model, fits, c(model$checked$at, modes$ends[empty]))
+  drawn <- seq_along(model$checked$at)
+  typical <- stats::median(rep(value[drawn], model$checked$times))
+  modes$lost <- sum(value[-drawn] > typical - rules$same_height)
+  modes$covariances <- NULL
   modes
 }
 
-modes_that_count <- function(model, modes) {
-  value <- vapply(modes, function(mode) mode$value %||% 0, 0)
-  lapply(modes[value > max(value) - rules$resample_gain], function(mode) {
-    list(z = model$runs$z[mode$at, ], covariance = mode$covariance)
-  })
+# log posterior density of runs, by draws of error and discrepancy of calibrations.
+values_under <- function(model, fits, at) {
+  draws <- even_draws(fits[[1]], rules$search_draws)
+  each <- Map(function(fit, rows) {
+    log_l <- run_log_likelihood(fit, rep(draws, length(at)),
+                                model$runs$outputs[rows, rep(at, each = length(draws)), drop = FALSE], 1)
+    apply(matrix(log_l, length(draws)), 2, log_mean_exp)
+  }, fits, model$rows)
+  Reduce(`+`, each) - 0.5 * rowSums(model$runs$z[at, !model$flat, drop = FALSE]^2)
 }
 
 # The base model from its first run to its verified posterior.
@@ -350,6 +357,6 @@ calibrate_model <- function(model, context) {
   region <- region_of_modes(found$model, found$modes, context$seed)
   model <- with_mode(found$model, found$modes[[1]], region)
   model$modes <- list(agree = found$agree, searches = length(found$modes),
-                      ends = vapply(found$modes, `[[`, 0, "at"), found = modes_that_count(found$model, found$modes))
+                      ends = vapply(found$modes, `[[`, 0, "at"), covariances = lapply(found$modes, `[[`, "covariance"))
   verify_model(model, context)
 }

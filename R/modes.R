@@ -88,7 +88,7 @@ ranked_modes <- function(model, modes, context) {
 # Of one height, near each other as both see it, or without a valley between them: a ridge is one mode, and the region
 # holds all modes of one height. list(model, yes).
 is_same_mode <- function(model, one, other, context) {
-  if (one$value - other$value < rules$resample_gain) return(list(model = model, yes = TRUE))
+  if (one$value - other$value < rules$same_height) return(list(model = model, yes = TRUE))
   apart <- model$runs$z[other$at, ] - model$runs$z[one$at, ]
   distance <- function(covariance) sum(apart * solve(covariance, apart))
   if (max(distance(one$covariance), distance(other$covariance)) < 2 * length(apart)) {
@@ -98,7 +98,7 @@ is_same_mode <- function(model, one, other, context) {
   made <- with_runs(model, rbind(model$runs$z[one$at, ] + apart / 2), context)
   if (!length(made$at)) return(list(model = model, yes = FALSE))
   between <- values_at(made$model, made$at, one$history, one$slopes, context)
-  list(model = made$model, yes = between > other$value - rules$resample_gain)
+  list(model = made$model, yes = between > other$value - rules$same_height)
 }
 
 # ---- the region that holds them

@@ -166,11 +166,14 @@ upper_bound <- function(model, present) {
   log10_factor(model, present) + 3 * min(error, rules$worst_error) + trial_margin(model)
 }
 
-# A trial whose emulator runs refute, so that its evidence says little, though the simulation's own error falls.
+# A trial whose emulator runs refute, so that its evidence says little, though one of its runs is nearer to the record
+# than any of the present model.
 is_promising <- function(model, present) {
   refuted <- !is_verified(model) && isFALSE(model$fit$check$passed)
-  refuted && error_ratio(model$fit, present$fit) < rules$promising_error
+  refuted && least_error(model) < rules$promising_error * least_error(present)
 }
+
+least_error <- function(model) min(over_noise(model, model$runs$outputs - model$target), na.rm = TRUE)
 
 lower_bound <- function(model, present) 2 * log10_factor(model, present) - upper_bound(model, present)
 
@@ -223,9 +226,12 @@ widened_trial <- function(trial, present, bar, context) {
   best <- found$modes[[1]]
   trial$runs <- found$model$runs
   if (best$at == own$at) return(trial)
-  trial <- with_mode(trial, best, region_of_modes(trial, list(best), context$seed))
-  trial$draws <- NULL
-  tried_model(trial, present, bar, context)
+  again <- with_mode(trial, best, region_of_modes(trial, list(best), context$seed))
+  again$draws <- NULL
+  again <- tried_model(again, present, bar, context)
+  if (again$fit$log_evidence > trial$fit$log_evidence) return(again)
+  trial$runs <- again$runs
+  trial
 }
 
 # If a step ends without a winner, though much of the error is left: all trials searched again, and the race.

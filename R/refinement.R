@@ -24,8 +24,9 @@
 #' @return A calibration as [calibrate()] gives; its `rounds` says how many checks were made, `runs_made` how many
 #'   runs of the simulator were made here, `modes` how many searches there were (`searches`) and whether two of
 #'   them agreed (`agree`).
-#' @source `vignette("algorithm", "amiss")`, *The simulator first*. Broyden (1965), A class of methods for solving
-#'   nonlinear simultaneous equations, Mathematics of Computation 19, 577-593, for the slopes.
+#' @source `vignette("algorithm", "amiss")`, *The simulator first*. Powell (2004), Least Frobenius norm updating of
+#'   quadratic models that satisfy interpolation conditions, Mathematical Programming 100, 183-215, and Moré (1978),
+#'   The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630, 105-116, for the search.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)

@@ -1,20 +1,13 @@
-# Where the parameters lie, by the simulator itself. Each step goes to the posterior under the line
-# that touches the simulator there; each run corrects the slopes of that line (a secant condition, as
-# in Broyden 1965), so that a step costs one run.
-
-search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1,
-                   importance_draws = 300, ess_drop = 0.3)
+# Where the parameters lie, by the simulator itself: least squares in units of the noise, with the prior, by steps
+# within a trusted distance (Levenberg 1944; More 1978). About its best run a search knows the simulator by slopes, and
+# by the least curvature that the runs near it ask for. Each run corrects both, so that a step costs one run.
 
 # A search from run `at` of a model. `slopes` are right at that run to within what they change over
 # `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is switched off; the search
 # ends if all that it promises beyond that could not make evidence.
 begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL) {
-  search <- list(model = model, at = at, steps = steps, off = off, leaps = rules$leaps, left = integer(), step = 0,
-                 damping = 0, failed = 0, small = 0,
-                 reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale),
-                 status = "going")
-  search$slopes <- secant_slopes(model, at, search$reference)
-  search
+  list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0, small = 0,
+       reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes, status = "going")
 }
 
 run_search <- function(search, context) {
@@ -23,113 +16,132 @@ run_search <- function(search, context) {
     if (finished(search)) break
     made <- with_runs(search$model, rbind(search$proposal), context)
     search$model <- made$model
-    search <- accept(search, made$at, context)
+    search <- accept(search, made$at)
     if (search$failed == rules$renew_after && !finished(search)) {
       search <- renew_slopes(search, context)
     }
   }
-  if (is.null(search$history)) search <- look(search, context)
-  return_to_best(search, context)
+  search$slopes <- secant_slopes(search$model, search$at, search$reference)
+  look(search, context)
 }
 
 finished <- function(search) search$status != "going"
 
-# The posterior under the tangent, with error and discrepancy sampled anew if they may have changed.
+# The posterior under the tangent, with error and discrepancy sampled under it.
 look <- function(search, context) {
-  if (is.null(search$history)) {
-    search[c("mean", "covariance", "history")] <-
-      tangent_at(search$model, search$at, search$slopes, NULL, context)
-  } else {
-    search[c("mean", "covariance")] <-
-      tangent_at(search$model, search$at, search$slopes, search$history, context)[1:2]
-  }
+  search[c("mean", "covariance", "history")] <-
+    tangent_at(search$model, search$at, search$slopes, NULL, context)
   search
 }
 
+# The next run: the optimum of the bent line within the trusted distance, by Gauss-Newton steps on it.
 propose <- function(search, context) {
-  search <- look(search, context)
-  z <- search$model$runs$z[search$at, ]
-  precision <- solve(search$covariance)
-  damped <- precision + diag(search$damping, length(z))
-  target <- solve(damped, precision %*% search$mean + search$damping * z)[, 1]
-  search$proposal <- within_limits(target, damped, search$model$limit)
-  gain_of <- function(to) sum((to - z) * (precision %*% (to - z))) / 2
-  search$predicted <- gain_of(search$proposal)
-  search$promised <- gain_of(within_limits(search$mean, precision, search$model$limit))
+  model <- search$model
+  z <- model$runs$z[search$at, ]
+  bent <- bent_line(model, search$at, search$reference)
+  line <- along(bent, 0 * z)
+  search$slopes <- line$slopes
+  best <- squares_of_line(model, z, line)
+  search$promised <- best$promised
+  tried <- rbind(z)
+  outputs <- cbind(line$output)
+  for (inner in seq_len(rules$bent_steps)) {
+    to <- step_within(best, z, search$trusted, model$limit)
+    line <- along(bent, to - z)
+    moved <- max(abs(to - tried[nrow(tried), ]))
+    tried <- rbind(tried, to)
+    outputs <- cbind(outputs, line$output)
+    if (moved < rules$bent_moved) break
+    best <- squares_of_line(model, to, line)
+  }
+  misfit <- misfit_of(model, outputs, tried)
+  lowest <- which.min(misfit[-1]) + 1
+  search$proposal <- stats::setNames(tried[lowest, ], names(z))
+  search$predicted <- misfit[1] - misfit[lowest]
   if (is_futile(search, context)) search$status <- "futile"
   if (search$step >= search$steps) search$status <- "steps"
-  if (search$promised < rules$search_gain / 5) search$status <- "converged"
+  if (search$promised < rules$search_gain / 5 * nats_of(model, misfit[1])) search$status <- "converged"
   search
 }
 
-is_futile <- function(search, context) {
-  if (is.null(search$off)) return(FALSE)
-  value <- values_at(search$model, c(search$at, search$off), search$history, search$slopes, context)
-  isTRUE(value[1] + search$promised - value[2] < rules$futile_gain)
+# Half the sum of squares of runs in units of the noise, and of the distance from the middle of priors that are not
+# flat: minus the log posterior density if all of the error were white noise.
+misfit_of <- function(model, outputs, z) {
+  misfit <- 0.5 * colSums(((outputs - model$target) / model$noise)^2) +
+    0.5 * rowSums(z[, !model$flat, drop = FALSE]^2)
+  ifelse(is.finite(misfit), misfit, Inf)
 }
 
-# The step is taken if the run is more probable, by the draws of error and discrepancy from before it.
-accept <- function(search, made, context) {
+# A misfit of many times the noise is known no better than to the same share: what counts as a nat of it.
+nats_of <- function(model, misfit) max(1, 2 * misfit / length(model$target))
+
+# The least squares of a line through z: precision, optimum `mean`, and what it promises to gain.
+squares_of_line <- function(model, z, line) {
+  slopes <- line$slopes / model$noise
+  prior <- ifelse(model$flat, rules$flat_precision, 1)
+  precision <- crossprod(slopes) + diag(prior, length(z))
+  pull <- crossprod(slopes, (model$target - line$output) / model$noise)[, 1] - prior * z
+  mean <- z + solve(precision, pull)
+  way <- within_limits(mean, precision, model$limit) - z
+  list(mean = mean, precision = precision,
+       promised = sum(pull * way) - 0.5 * sum(way * (precision %*% way)))
+}
+
+# Its optimum no farther than `trusted` from z, by as much damping as that takes.
+step_within <- function(squares, z, trusted, limit) {
+  damped <- function(damping) {
+    precision <- squares$precision + diag(damping, length(z))
+    target <- solve(precision, squares$precision %*% squares$mean + damping * z)[, 1]
+    within_limits(target, precision, limit)
+  }
+  is_near <- function(to) sum((to - z)^2) <= trusted^2
+  to <- damped(0)
+  if (is_near(to)) return(to)
+  ends <- log10(max(diag(squares$precision))) + c(-12, 6)
+  for (half in 1:20) {
+    if (is_near(damped(10^mean(ends)))) ends[2] <- mean(ends) else ends[1] <- mean(ends)
+  }
+  damped(10^ends[2])
+}
+
+# Whether the evidence could not exceed that of the run without the mechanism by much, if all went as the tangent says.
+# It is asked where a search has moved.
+is_futile <- function(search, context) {
+  if (is.null(search$off) || search$failed > 0) return(FALSE)
+  search <- look(search, context)
+  precision <- solve(search$covariance)
+  way <- within_limits(search$mean, precision, search$model$limit) - search$model$runs$z[search$at, ]
+  value <- values_at(search$model, c(search$at, search$off), search$history, search$slopes, context)
+  isTRUE(value[1] + sum(way * (precision %*% way)) / 2 - value[2] < rules$futile_gain)
+}
+
+accept <- function(search, made) {
   if (!length(made)) {
     search$status <- "budget"
     return(search)
   }
   search$step <- search$step + 1
-  value <- values_at(search$model, c(search$at, made), search$history, search$slopes, context)
-  gain <- value[2] - value[1]
-  better <- isTRUE(gain > 0)
-  if (search$leaps > 0 && is_ridge(search, gain)) return(leap(search, made))
-  near <- search$promised < rules$search_gain && (!better || gain < rules$search_gain)
-  search$small <- if (near) search$small + 1 else 0
-  if (better) {
-    search$at <- made
-    search$failed <- 0
-    if (gain > search$predicted / 4) search$damping <- search$damping / 10
-    if (search$damping < 1) search$damping <- 0
-    if (gain > rules$resample_gain) search["history"] <- list(NULL)
-  } else {
-    search$failed <- search$failed + 1
-    search$damping <- max(1, 10 * search$damping)
+  both <- c(search$at, made)
+  runs <- search$model$runs
+  misfit <- misfit_of(search$model, runs$outputs[, both], runs$z[both, , drop = FALSE])
+  gain <- misfit[1] - misfit[2]
+  nats <- nats_of(search$model, min(misfit))
+  length <- sqrt(sum((runs$z[made, ] - runs$z[search$at, ])^2))
+  if (gain > search$predicted * rules$good_step) {
+    search$trusted <- max(search$trusted, rules$trust_changes * length)
+  } else if (!(gain > search$predicted * rules$poor_step)) {
+    search$trusted <- length / rules$trust_changes
   }
-  search$slopes <- secant_slopes(search$model, search$at, search$reference)
-  search$gains <- c(search$gains, max(0, gain, na.rm = TRUE))
+  is_small <- search$promised < rules$search_gain * nats && gain < rules$search_gain * nats
+  search$small <- if (is_small) search$small + 1 else 0
+  search$failed <- if (gain > 0) 0 else search$failed + 1
+  search$gains <- c(search$gains, max(0, gain))
+  if (gain > 0) search$at <- made
   if (search$small >= 2) search$status <- "converged"
-  if (sum(utils::tail(search$gains, rules$pace)) < 1 && length(search$gains) >= rules$pace) search$status <- "slow"
+  slow <- length(search$gains) >= rules$pace && sum(utils::tail(search$gains, rules$pace)) < nats
+  if (slow) search$status <- "slow"
   if (search$failed >= rules$stalled_after) search$status <- "stalled"
   search
-}
-
-# Along a curved ridge only short steps are better, or none, though the tangent sees far. Then the search goes
-# on from the optimum of the tangent: from there the next ones lead back to the ridge, farther along it.
-is_ridge <- function(search, gain) {
-  p <- length(search$proposal)
-  search$promised > p && search$damping <= rules$ridge_damping && !isTRUE(gain > search$promised / 10)
-}
-
-leap <- function(search, made) {
-  fine <- succeeded(search$model)[made]
-  if (!fine) return(utils::modifyList(search, list(leaps = 0, damping = max(1, 10 * search$damping))))
-  search$left <- c(search$left, search$at)
-  search$at <- made
-  search$leaps <- search$leaps - 1
-  search["gains"] <- list(NULL)
-  search$damping <- 0
-  search$failed <- search$small <- 0
-  search["history"] <- list(NULL)
-  search$slopes <- secant_slopes(search$model, made, search$reference)
-  search
-}
-
-# The best of where a search ended and of the places that it leapt from.
-return_to_best <- function(search, context) {
-  if (!length(search$left)) return(search)
-  ends <- c(search$at, search$left)
-  value <- values_at(search$model, ends, search$history, search$slopes, context)
-  if (which.max(value) == 1) return(search)
-  search$at <- ends[which.max(value)]
-  search$slopes <- secant_slopes(search$model, search$at, search$reference)
-  search["history"] <- list(NULL)
-  look(search, context)
 }
 
 renew_slopes <- function(search, context) {
@@ -137,10 +149,8 @@ renew_slopes <- function(search, context) {
   search$model <- found$model
   if (is.null(found$slopes)) return(search)
   search$reference <- list(z = search$model$runs$z[search$at, ], slopes = found$slopes, stale = 0)
-  search$slopes <- found$slopes
-  search["history"] <- list(NULL)
   search["gains"] <- list(NULL)
-  search$damping <- 0
+  search$trusted <- Inf
   search
 }
 
@@ -194,26 +204,39 @@ given_slopes <- function(model, z) {
 
 difference_side <- function(z) ifelse(z > 1, -1, 1)
 
-# Slopes at a run from reference slopes, corrected by the runs near it. With s_i the way to run i and
-# r_i what the reference misses of it,
-#     J = J0 + R W S (S'W S + I / d^2)^-1,   w_i = |s_i|^-4.
-# A simulator bends by c |s|^2 over a way s, so that run i knows its slope to within c |s_i|, and the
-# reference slopes are known to within c d, d the way from where they were right: c cancels.
-secant_slopes <- function(model, at, reference) {
+# The simulator about a run, from slopes known elsewhere and from the runs near it. With s the way from the run, J0 the
+# reference slopes and A fitted to the runs,
+#     f(z + s) = f(z) + J0 s + sum_i A_i k(s, s_i),   k(s, s') = 4 d^2 s's' + (s's')^2.
+# A simulator bends by c |s|^2 over a way s. So its slopes turn by 2 c d over the way d from where the reference held;
+# the bend itself has the second term for a prior, as in minimum-norm quadratic models (Powell 2004); and as the bend
+# turns over a way L, run i fits to within c |s_i|^3 / L. c cancels.
+bent_line <- function(model, at, reference) {
   z <- model$runs$z[at, ]
   ways <- sweep(model$runs$z, 2, z)
   squared <- rowSums(ways^2)
   near <- which(succeeded(model) & squared > 1e-8)
-  near <- utils::head(near[order(squared[near])], 3 * length(z))
-  d2 <- sum((z - reference$z)^2) + reference$stale^2
-  if (!length(near) || d2 == 0) return(reference$slopes)
-  ways <- ways[near, , drop = FALSE]
-  weights <- 1 / pmax(squared[near], 1e-4)^2
-  missed <- model$runs$outputs[, near, drop = FALSE] - model$runs$outputs[, at] -
-    tcrossprod(reference$slopes, ways)
-  reference$slopes +
-    missed %*% (weights * ways) %*%
-    solve(crossprod(ways * sqrt(weights)) + diag(1 / d2, length(z)))
+  near <- utils::head(near[order(squared[near])], rules$bent_runs * length(z))
+  bent <- list(output = model$runs$outputs[, at], slopes = reference$slopes,
+               d2 = 4 * (sum((z - reference$z)^2) + reference$stale^2), ways = ways[near, , drop = FALSE])
+  dot <- tcrossprod(bent$ways)
+  of_way <- squared[near]  # rows and columns in units of |s|^2: near and far runs have one size
+  covariance <- (bent$d2 * dot + dot^2) / outer(of_way, of_way)
+  diag(covariance) <- diag(covariance) * (1 + 1e-8) + of_way / rules$bend_length^2
+  missed <- model$runs$outputs[, near, drop = FALSE] - bent$output - tcrossprod(reference$slopes, bent$ways)
+  bent$weights <- missed
+  if (length(near)) bent$weights <- t(solve(covariance, t(missed) / of_way) / of_way)
+  bent
+}
+
+# Its output a way from the run, and its slopes there.
+along <- function(bent, way) {
+  dot <- (bent$ways %*% way)[, 1]
+  list(output = bent$output + (bent$slopes %*% way + bent$weights %*% (bent$d2 * dot + dot^2))[, 1],
+       slopes = bent$slopes + bent$weights %*% ((bent$d2 + 2 * dot) * bent$ways))
+}
+
+secant_slopes <- function(model, at, reference) {
+  along(bent_line(model, at, reference), numeric(length(reference$z)))$slopes
 }
 
 # Slopes about a run by regression on all runs over the priors, nearer ones weighing more.
@@ -228,7 +251,10 @@ regression_slopes <- function(model, at) {
   t(coefficients[-1, , drop = FALSE])
 }
 
-# ---- of all records together
+# ---- of all records together, with error and discrepancy
+
+search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1,
+                   importance_draws = 300, ess_drop = 0.3)
 
 # list(mean, covariance, history) of the parameters under the tangent of run `at`; `history`: draws of
 # error and discrepancy of each record, sampled if they are not given.

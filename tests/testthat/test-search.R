@@ -158,9 +158,10 @@ test_that("one run corrects slopes of which nothing else is known as Broyden's u
   broyden <- start + missed %*% way / sum(way^2)
   # The reference is trusted by 1 / stale^2 = 1e-6 beside 1 / |way|^2 = 3.
   expect_equal(own, broyden, tolerance = 1e-6, ignore_attr = TRUE)
-  # Slopes that were exact at that run count as much as the run: half of the correction.
-  half <- amiss:::secant_slopes(model, 2, list(z = model$runs$z[1, ], slopes = start, stale = 0))
-  expect_equal(half, start + (broyden - start) / 2, tolerance = 1e-8, ignore_attr = TRUE)
+  # Of slopes that were exact at that run, s away, they turn by 2 c |s| and the simulator bends by c |s|^2; a third
+  # order adds c |s|^3 / 3. So 4 parts of 5 + s^2 / 9 are the slopes'.
+  part <- amiss:::secant_slopes(model, 2, list(z = model$runs$z[1, ], slopes = start, stale = 0))
+  expect_equal(part, start + (broyden - start) * 4 / (5 + sum(way^2) / 9), tolerance = 1e-6, ignore_attr = TRUE)
 })
 
 test_that("the slopes of a linear simulator are exact once runs go along every coordinate", {
@@ -313,8 +314,8 @@ test_that("a simulator that bends over two decades is searched by the simulator 
   apart <- z - amiss:::from_unit(rbind(unit), found$model$flat)[1, ]
   # The truth is where the posterior may have it, and the mode within a nat of the optimum beside.
   expect_lt(sum(apart * solve(mode$covariance, apart)), stats::qchisq(0.9999, 3) + 2)
-  # As the rules have it at most: scouts, searches, and slopes by differences that they took.
-  expect_lte(runs_of(found$model), 8 + 2 * 25 + 2 * 3)
+  # Scouts, and two searches of at most twenty steps, with slopes by differences.
+  expect_lte(runs_of(found$model), 8 + 2 * 20 + 2 * 3)
 })
 
 test_that("a search takes no step to a run that fails, and says when it can go no further", {
@@ -330,7 +331,7 @@ test_that("a search takes no step to a run that fails, and says when it can go n
   expect_true(all(is.finite(search$model$runs$outputs[, search$at])))
   expect_lte(amiss:::unit_to_values(amiss:::to_unit(search$model$runs$z[search$at, , drop = FALSE],
                                                     model$flat), model$parameters)[, "gain"], 0.3)
-  expect_true(search$status %in% c("stalled", "steps", "converged"))
+  expect_true(search$status %in% c("stalled", "steps", "slow", "converged"))
 })
 
 test_that("a search that the budget ends keeps its best run", {

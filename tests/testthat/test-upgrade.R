@@ -313,7 +313,7 @@ test_that("mechanisms are tried in the order of what the error responds to", {
 
 # ---- what trials are worth, by models made by hand
 
-# `error`: the simulation's; `level`: what its runs have shown.
+# `error`: the simulation's, and that of its only run; `level`: what its runs have shown.
 model_by_hand <- function(log10_evidence, se = 0.05, level = "verified", passed = TRUE,
                           effective = 1, ratio = 0.1, error = 1, name = "a") {
   check <- list(mean = 1:3 - error, passed = passed, effective = effective, ratio = ratio)
@@ -322,7 +322,8 @@ model_by_hand <- function(log10_evidence, se = 0.05, level = "verified", passed 
                         posterior = list(annealed = c(log10_evidence * log(10), se * log(10)),
                                          second = c(log10_evidence * log(10), se * log(10)))),
                    class = c("amiss_calibration", "amiss_fit"))
-  list(name = paste("base +", name), mechanism = name, fit = fit, level = level)
+  list(name = paste("base +", name), mechanism = name, fit = fit, level = level, target = 1:3, noise = rep(1, 3),
+       runs = list(outputs = cbind(1:3 - error)))
 }
 
 tried_by_hand <- function(log10_evidence, ...) model_by_hand(log10_evidence, level = "tried", ...)
@@ -335,7 +336,7 @@ test_that("a trial's evidence may be off by what its runs leave open, a verified
   expect_equal(bound(tried_by_hand(3, se = 0, effective = 0.5)), 3 + rules$trial_doubt * 1.1)
   refuted <- tried_by_hand(3, se = 0, passed = FALSE, ratio = 2)
   expect_equal(bound(refuted), 3 + rules$trial_doubt * 3)
-  # The simulation's error falls by half: what refutes the emulator cannot rule that out.
+  # A run has half the error: what refutes the emulator cannot rule that out.
   promising <- tried_by_hand(-40, se = 0, passed = FALSE, ratio = 2, error = 0.5)
   expect_equal(bound(promising), Inf)
   unchecked <- tried_by_hand(3, se = 0)
