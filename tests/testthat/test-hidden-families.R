@@ -193,9 +193,10 @@ test_that("rates tell families, verdicts and checks apart, and do without what t
   expect_true(is.na(scope$check_passed(older)))
 })
 
-# Bounds on eight worlds a family. Networks and catchments: of the worlds whose effect the base model cannot imitate to
-# a fifth of the noise all but one have it among what is adopted, and at most one of the worlds has a mechanism named that is not there. Wrong bases: what is not there
-# is named in at most one of eight. Nowhere is anything named on an emulator that the simulator does not confirm.
+# Bounds on eight worlds a family. Networks and catchments: of the worlds whose effect the base model cannot imitate
+# to a fifth of the noise all but one have it among what is adopted, and at most one of the worlds has a mechanism named
+# that is not there. Wrong bases: what is not there is named in at most one of eight. Nowhere is anything named on an
+# emulator that the simulator does not confirm.
 family_worlds <- function(scope) {
   effects <- function(family) scope$families[[family]]$mechanisms
   network <- c(effects("network"), "solar gain on the air", "none", "none")
