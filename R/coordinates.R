@@ -53,18 +53,21 @@ within_limits <- function(mean, precision, limit) {
   pmin(pmax(z, -limit), limit)
 }
 
-# n draws of the same distribution, by hit and run: from the most probable point along random directions, equal in all
-# of them once the covariance is taken out, so that a narrow ridge does not slow it.
+# n draws of the same distribution, by hit and run from the most probable point: along the axes, so that it leaves a
+# corner of the limits, and along random directions, equal in all of them once the covariance is taken out, so that a
+# narrow ridge does not slow it.
 draws_within <- function(mean, covariance, limit, n, seed) {
   p <- length(mean)
   root <- t(chol(covariance))
   z <- within_limits(mean, solve(covariance), limit)
   white <- forwardsolve(root, z - mean)
-  moves <- (n + burn_in) * p
-  random <- with_seed(seed, list(direction = matrix(stats::rnorm(moves * p), p), u = stats::runif(moves)))
+  axes <- forwardsolve(root, diag(p))
+  moves <- (n + burn_in) * 2 * p
+  random <- with_seed(seed, list(direction = matrix(stats::rnorm(moves * p / 2), p), u = stats::runif(moves)))
   draws <- matrix(0, n + burn_in, p)
   for (i in seq_len(moves)) {
-    direction <- random$direction[, i] / sqrt(sum(random$direction[, i]^2))
+    direction <- if (i %% 2) axes[, (i %/% 2) %% p + 1] else random$direction[, i / 2]
+    direction <- direction / sqrt(sum(direction^2))
     way <- as.numeric(root %*% direction)
     ends <- rbind((-limit - z) / way, (limit - z) / way)
     lower <- max(pmin(ends[1, ], ends[2, ]), -Inf, na.rm = TRUE)
@@ -72,23 +75,27 @@ draws_within <- function(mean, covariance, limit, n, seed) {
     step <- truncated_quantile(random$u[i], -sum(white * direction), 1, min(lower, 0), max(upper, 0))
     z <- pmin(pmax(z + step * way, -limit), limit)
     white <- white + step * direction
-    if (i %% p == 0) draws[i / p, ] <- z
+    if (i %% (2 * p) == 0) draws[i / (2 * p), ] <- z
   }
   draws[-seq_len(burn_in), , drop = FALSE]
 }
 
 burn_in <- 50  # draws that the first point is forgotten in
 
-# Quantile of N(centre, sd^2) between two ends. Far outside, where the normal distribution function is lost to rounding,
-# the density falls exponentially from the nearer end.
+# Quantile of N(centre, sd^2) between two ends: by logarithms of probabilities outside them, and where R's quantile of
+# those is exact to few digits, by the exponential that the density there is.
 truncated_quantile <- function(u, centre, sd, lower, upper) {
   ends <- stats::pnorm(c(lower, upper), centre, sd)
   if (diff(ends) > 1e-10) {
     return(min(max(stats::qnorm(ends[1] + u * diff(ends), centre, sd), lower), upper))
   }
-  above <- centre > upper
-  beyond <- if (above) centre - upper else lower - centre
-  if (above) u <- 1 - u
-  inwards <- -log1p(-u * (1 - exp(-(upper - lower) * beyond / sd^2))) * sd^2 / beyond
-  if (above) max(upper - inwards, lower) else min(lower + inwards, upper)
+  if (centre < lower) return(-truncated_quantile(1 - u, -centre, sd, -upper, -lower))
+  beyond <- (centre - upper) / sd
+  if (beyond < 30) {
+    log_p <- stats::pnorm(c(lower, upper), centre, sd, log.p = TRUE)
+    within <- log_p[2] + log(u + (1 - u) * exp(log_p[1] - log_p[2]))
+    return(min(max(stats::qnorm(within, centre, sd, log.p = TRUE), lower), upper))
+  }
+  inwards <- -log1p(-(1 - u) * (1 - exp(-(upper - lower) * beyond / sd))) * sd / beyond
+  max(upper - inwards, lower)
 }

@@ -73,7 +73,7 @@ start_runs <- function(model, starts = NULL) {
 # another search ended at the mode of the best.
 ranked_modes <- function(model, modes, context) {
   at <- vapply(modes, `[[`, 0, "at")
-  each <- vapply(modes, function(mode) values_at(model, at, mode$history, mode$slopes, context), at)
+  each <- vapply(modes, function(mode) values_at(model, at, mode$history, mode$moves, context), at)
   value <- apply(each, 1, log_mean_exp)
   order <- order(-value)
   modes <- Map(function(mode, value) replace(mode, "value", value), modes[order], value[order])
@@ -97,7 +97,7 @@ is_same_mode <- function(model, one, other, context) {
   if (one$value - other$value > rules$mode_depth) return(list(model = model, yes = FALSE))
   made <- with_runs(model, rbind(model$runs$z[one$at, ] + apart / 2), context)
   if (!length(made$at)) return(list(model = model, yes = FALSE))
-  between <- values_at(made$model, made$at, one$history, one$slopes, context)
+  between <- values_at(made$model, made$at, one$history, one$moves, context)
   list(model = made$model, yes = between > other$value - rules$same_height)
 }
 

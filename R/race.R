@@ -13,7 +13,7 @@ as_present <- function(model, context) {
                     stale = rules$trial_stale)
   slopes <- secant_slopes(model, at, reference)
   model$present <- list(at = at, slopes = slopes,
-                        history = tangent_at(model, at, slopes, NULL, context)$history)
+                        history = tangent_at(model, at, slopes, context)$history)
   model
 }
 
@@ -44,11 +44,12 @@ search_trial <- function(looked, context) {
   model <- looked$model
   best <- NULL
   for (start in utils::head(looked$starts, rules$trial_starts)) {
-    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps, looked$off_at)
+    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps, looked$off_at,
+                           weighted = TRUE)
     search <- run_search(search, context)
     model <- search$model
     others <- c(best$at, looked$off_at)
-    value <- values_at(model, c(search$at, others), search$history, search$slopes, context)
+    value <- values_at(model, c(search$at, others), search$history, search$moves, context)
     if (is.null(best) || value[1] > value[2]) best <- search
     if (is_spent(context) || all(value[1] >= value[-1]) && search$status %in% c("converged", "futile")) break
   }
@@ -129,10 +130,11 @@ profile_value <- function(start, model, present, context) {
   at <- start$at
   slopes <- start$slopes
   history <- present$present$history
-  tangent <- tangent_at(model, at, slopes, history, context)
+  moves <- unname(slopes)
+  tangent <- tangent_given(model, model$runs$z[at, ], model$runs$outputs[, at], slopes, history, moves, context)
   z <- within_limits(tangent$mean, solve(tangent$covariance), model$limit)
   output <- model$runs$outputs[, at] + slopes %*% (z - model$runs$z[at, ])
-  values_of(model, output, rbind(z), history, slopes, context)
+  values_of(model, output, rbind(z), history, moves, context)
 }
 
 # The posterior of a trial, checked by a few runs that then train, until they confirm it or it cannot win.
@@ -202,7 +204,7 @@ raises_simulation <- function(model, present) {
 
 # A trial that its runs confirm has had its first round.
 verify_trial <- function(model, context) {
-  verify_model(model, context, first = if (is_confirmed(model)) rules$least_rounds else 1)
+  verify_model(model, context, before = if (is_confirmed(model)) model$fit$log_evidence)
 }
 
 # A trial searched again from runs over all priors, far from where it ended: an extension may have a better mode
@@ -213,7 +215,7 @@ widened_trial <- function(trial, present, bar, context) {
   unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
   model <- with_runs(model, from_unit(unit, model$flat), context)$model
   own <- list(at = trial$tangent$at, slopes = trial$tangent$slopes)
-  own[c("mean", "covariance", "history")] <- tangent_at(model, own$at, own$slopes, NULL, context)
+  own[c("mean", "covariance", "history", "moves")] <- tangent_at(model, own$at, own$slopes, context)
   modes <- list(own)
   for (start in start_runs(model, own$at)[-1]) {
     if (is_spent(context)) break
@@ -227,7 +229,7 @@ widened_trial <- function(trial, present, bar, context) {
   trial$runs <- found$model$runs
   if (best$at == own$at) return(trial)
   again <- with_mode(trial, best, region_of_modes(trial, list(best), context$seed))
-  again$draws <- NULL
+  again$draws <- again$last_draws <- NULL
   again <- tried_model(again, present, bar, context)
   if (again$fit$log_evidence > trial$fit$log_evidence) return(again)
   trial$runs <- again$runs

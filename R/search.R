@@ -1,37 +1,61 @@
-# Where the parameters lie, by the simulator itself: least squares in units of the noise, with the prior, by steps
-# within a trusted distance (Levenberg 1944; More 1978). About its best run a search knows the simulator by slopes, and
-# by the least curvature that the runs near it ask for. Each run corrects both, so that a step costs one run.
+# Where the parameters lie, by the simulator itself: least squares, first in units of the noise, then by the error and
+# the discrepancy that remain, with the prior, by steps within a trusted distance (Levenberg 1944; More 1978). About its
+# best run a search knows the simulator by slopes, and by the least curvature that the runs near it ask for. Each run
+# corrects both, so that a step costs one run.
 
 # A search from run `at` of a model. `slopes` are right at that run to within what they change over
 # `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is switched off; the search
-# ends if all that it promises beyond that could not make evidence.
-begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL) {
-  list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0, small = 0,
-       reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes, status = "going")
+# ends if all that it promises beyond that could not make evidence. `weighted`: whether it begins near enough to the
+# posterior to know error and discrepancy.
+begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL, weighted = FALSE) {
+  list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0,
+       weighted = weighted, reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes,
+       status = "going")
 }
 
 run_search <- function(search, context) {
+  if (!search$weighted) search <- descend(search, context)
+  search <- look(search, context)
+  for (round in seq_len(rules$weighted_rounds)) {
+    if (search$status %in% c("budget", "futile")) return(search)
+    if (promised_by(search) < rules$search_gain) return(replace(search, "status", "converged"))
+    again <- list(weighted = TRUE, status = "going", step = 0, trusted = Inf, failed = 0)
+    search <- utils::modifyList(search, again)
+    search["gains"] <- list(NULL)
+    search <- look(descend(search, context), context)
+  }
+  search
+}
+
+descend <- function(search, context) {
   while (!finished(search)) {
     search <- propose(search, context)
     if (finished(search)) break
     made <- with_runs(search$model, rbind(search$proposal), context)
     search$model <- made$model
-    search <- accept(search, made$at)
+    search <- accept(search, made$at, context)
     if (search$failed == rules$renew_after && !finished(search)) {
       search <- renew_slopes(search, context)
     }
   }
   search$slopes <- secant_slopes(search$model, search$at, search$reference)
-  look(search, context)
+  search
 }
 
 finished <- function(search) search$status != "going"
 
 # The posterior under the tangent, with error and discrepancy sampled under it.
 look <- function(search, context) {
-  search[c("mean", "covariance", "history")] <-
-    tangent_at(search$model, search$at, search$slopes, NULL, context)
+  search[c("mean", "covariance", "history", "moves")] <-
+    tangent_at(search$model, search$at, search$slopes, context)
   search
+}
+
+# What its optimum would gain.
+promised_by <- function(search) {
+  precision <- solve(search$covariance)
+  way <- within_limits(search$mean, precision, search$model$limit) - search$model$runs$z[search$at, ]
+  sum(way * (precision %*% way)) / 2
 }
 
 # The next run: the optimum of the bent line within the trusted distance, by Gauss-Newton steps on it.
@@ -41,7 +65,7 @@ propose <- function(search, context) {
   bent <- bent_line(model, search$at, search$reference)
   line <- along(bent, 0 * z)
   search$slopes <- line$slopes
-  best <- squares_of_line(model, z, line)
+  best <- squares_of_line(search, z, line, context)
   search$promised <- best$promised
   tried <- rbind(z)
   outputs <- cbind(line$output)
@@ -52,39 +76,52 @@ propose <- function(search, context) {
     tried <- rbind(tried, to)
     outputs <- cbind(outputs, line$output)
     if (moved < rules$bent_moved) break
-    best <- squares_of_line(model, to, line)
+    best <- squares_of_line(search, to, line, context)
   }
-  misfit <- misfit_of(model, outputs, tried)
+  misfit <- misfit_of(search, outputs, tried, context)
   lowest <- which.min(misfit[-1]) + 1
   search$proposal <- stats::setNames(tried[lowest, ], names(z))
   search$predicted <- misfit[1] - misfit[lowest]
   if (is_futile(search, context)) search$status <- "futile"
   if (search$step >= search$steps) search$status <- "steps"
-  if (search$promised < rules$search_gain / 5 * nats_of(model, misfit[1])) search$status <- "converged"
+  # What the slopes promise, or the bend leaves of it unless the trusted distance does.
+  open <- min(search$promised, if (is.infinite(search$trusted)) search$predicted)
+  if (open < rules$search_gain * nats_of(search, misfit[1])) search$status <- "converged"
   search
 }
 
-# Half the sum of squares of runs in units of the noise, and of the distance from the middle of priors that are not
-# flat: minus the log posterior density if all of the error were white noise.
-misfit_of <- function(model, outputs, z) {
+# Minus the log posterior density of runs: at first as if all of the error were white noise of the stated size, so that
+# a search goes wherever the simulation comes nearest to the record; then by draws of error and discrepancy.
+misfit_of <- function(search, outputs, z, context) {
+  model <- search$model
+  if (search$weighted) return(-values_of(model, outputs, z, search$history, search$moves, context))
   misfit <- 0.5 * colSums(((outputs - model$target) / model$noise)^2) +
     0.5 * rowSums(z[, !model$flat, drop = FALSE]^2)
   ifelse(is.finite(misfit), misfit, Inf)
 }
 
-# A misfit of many times the noise is known no better than to the same share: what counts as a nat of it.
-nats_of <- function(model, misfit) max(1, 2 * misfit / length(model$target))
+# White noise of the stated size makes too many nats of a misfit that is larger: what counts as one.
+nats_of <- function(search, misfit) {
+  if (search$weighted) 1 else max(1, 2 * misfit / length(search$model$target))
+}
 
 # The least squares of a line through z: precision, optimum `mean`, and what it promises to gain.
-squares_of_line <- function(model, z, line) {
-  slopes <- line$slopes / model$noise
-  prior <- ifelse(model$flat, rules$flat_precision, 1)
-  precision <- crossprod(slopes) + diag(prior, length(z))
-  pull <- crossprod(slopes, (model$target - line$output) / model$noise)[, 1] - prior * z
-  mean <- z + solve(precision, pull)
+squares_of_line <- function(search, z, line, context) {
+  model <- search$model
+  if (search$weighted) {
+    found <- tangent_given(model, z, line$output, line$slopes, search$history, search$moves, context)
+    precision <- solve(found$covariance)
+    mean <- found$mean
+  } else {
+    slopes <- line$slopes / model$noise
+    prior <- ifelse(model$flat, rules$flat_precision, 1)
+    precision <- crossprod(slopes) + diag(prior, length(z))
+    pull <- crossprod(slopes, (model$target - line$output) / model$noise)[, 1] - prior * z
+    mean <- z + solve(precision, pull)
+  }
   way <- within_limits(mean, precision, model$limit) - z
   list(mean = mean, precision = precision,
-       promised = sum(pull * way) - 0.5 * sum(way * (precision %*% way)))
+       promised = sum((mean - z) * (precision %*% way)) - 0.5 * sum(way * (precision %*% way)))
 }
 
 # Its optimum no farther than `trusted` from z, by as much damping as that takes.
@@ -108,14 +145,13 @@ step_within <- function(squares, z, trusted, limit) {
 # It is asked where a search has moved.
 is_futile <- function(search, context) {
   if (is.null(search$off) || search$failed > 0) return(FALSE)
-  search <- look(search, context)
-  precision <- solve(search$covariance)
-  way <- within_limits(search$mean, precision, search$model$limit) - search$model$runs$z[search$at, ]
-  value <- values_at(search$model, c(search$at, search$off), search$history, search$slopes, context)
-  isTRUE(value[1] + sum(way * (precision %*% way)) / 2 - value[2] < rules$futile_gain)
+  if (!search$weighted) search <- look(search, context)
+  value <- values_at(search$model, c(search$at, search$off), search$history, search$moves, context)
+  promised <- if (search$weighted) search$promised else promised_by(search)
+  isTRUE(value[1] + promised - value[2] < rules$futile_gain)
 }
 
-accept <- function(search, made) {
+accept <- function(search, made, context) {
   if (!length(made)) {
     search$status <- "budget"
     return(search)
@@ -123,21 +159,18 @@ accept <- function(search, made) {
   search$step <- search$step + 1
   both <- c(search$at, made)
   runs <- search$model$runs
-  misfit <- misfit_of(search$model, runs$outputs[, both], runs$z[both, , drop = FALSE])
+  misfit <- misfit_of(search, runs$outputs[, both], runs$z[both, , drop = FALSE], context)
   gain <- misfit[1] - misfit[2]
-  nats <- nats_of(search$model, min(misfit))
+  nats <- nats_of(search, min(misfit))
   length <- sqrt(sum((runs$z[made, ] - runs$z[search$at, ])^2))
   if (gain > search$predicted * rules$good_step) {
     search$trusted <- max(search$trusted, rules$trust_changes * length)
   } else if (!(gain > search$predicted * rules$poor_step)) {
     search$trusted <- length / rules$trust_changes
   }
-  is_small <- search$promised < rules$search_gain * nats && gain < rules$search_gain * nats
-  search$small <- if (is_small) search$small + 1 else 0
   search$failed <- if (gain > 0) 0 else search$failed + 1
   search$gains <- c(search$gains, max(0, gain))
   if (gain > 0) search$at <- made
-  if (search$small >= 2) search$status <- "converged"
   slow <- length(search$gains) >= rules$pace && sum(utils::tail(search$gains, rules$pace)) < nats
   if (slow) search$status <- "slow"
   if (search$failed >= rules$stalled_after) search$status <- "stalled"
@@ -256,36 +289,39 @@ regression_slopes <- function(model, at) {
 search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1,
                    importance_draws = 300, ess_drop = 0.3)
 
-# list(mean, covariance, history) of the parameters under the tangent of run `at`; `history`: draws of
-# error and discrepancy of each record, sampled if they are not given.
-tangent_at <- function(model, at, slopes, history, context) {
-  z <- model$runs$z[at, ]
+# list(mean, covariance, history, moves) of the parameters under the tangent of run `at`: with draws of error and
+# discrepancy of each record, which keeps out of `moves`, the slopes.
+tangent_at <- function(model, at, slopes, context) {
   engine <- engine_context(context$seed, context$threads)
-  each <- lapply(seq_along(model$records), function(k) {
-    record <- model$records[[k]]
-    own <- model$own[[k]]
-    run <- model$runs$outputs[model$rows[[k]], at]
-    steep <- unname(slopes[model$rows[[k]], own, drop = FALSE])
-    data <- c(record$data, list(moves = steep))
-    if (!is.null(history)) {
-      return(call_engine(tangent_given_(data, record$priors, history[[k]], z[own], run, steep, engine)))
-    }
+  z <- model$runs$z[at, ]
+  each <- Map(function(record, own, rows) {
     ais <- fill_ais_control(utils::modifyList(record$control$ais, search_ais))
-    call_engine(tangent_posterior_(data, record$priors, z[own], run, steep, rules$search_draws, ais,
-                                   engine))
-  })
+    steep <- unname(slopes[rows, own, drop = FALSE])
+    call_engine(tangent_posterior_(c(record$data, list(moves = steep)), record$priors, z[own],
+                                   model$runs$outputs[rows, at], steep, rules$search_draws, ais, engine))
+  }, model$records, model$own, model$rows)
   joint <- joint_tangent(each, model$own, length(z))
   list(mean = joint$mean, covariance = joint$covariance,
-       history = history %||% lapply(each, `[`, c("setting", "variance", "t")))
+       history = lapply(unname(each), `[`, c("setting", "variance", "t")), moves = unname(slopes))
 }
 
-# log posterior density of runs, averaged over draws of error and discrepancy.
-values_at <- function(model, at, history, slopes, context) {
-  values_of(model, model$runs$outputs[, at, drop = FALSE], model$runs$z[at, , drop = FALSE], history,
-            slopes, context)
+# list(mean, covariance) under a line through z, for draws of error and discrepancy that are known.
+tangent_given <- function(model, z, output, slopes, history, moves, context) {
+  engine <- engine_context(context$seed, context$threads)
+  each <- Map(function(record, own, rows, history) {
+    data <- c(record$data, list(moves = moves[rows, own, drop = FALSE]))
+    call_engine(tangent_given_(data, record$priors, history, z[own], output[rows],
+                               unname(slopes[rows, own, drop = FALSE]), engine))
+  }, model$records, model$own, model$rows, history)
+  joint_tangent(unname(each), model$own, length(z))
 }
 
-values_of <- function(model, outputs, z, history, slopes, context) {
+# log posterior density of runs, averaged over draws of error and discrepancy that keeps out of `moves`.
+values_at <- function(model, at, history, moves, context) {
+  values_of(model, model$runs$outputs[, at, drop = FALSE], model$runs$z[at, , drop = FALSE], history, moves, context)
+}
+
+values_of <- function(model, outputs, z, history, moves, context) {
   fine <- which(colSums(!is.finite(outputs)) == 0)
   values <- rep(-Inf, ncol(outputs))
   if (!length(fine)) return(values)
@@ -295,8 +331,7 @@ values_of <- function(model, outputs, z, history, slopes, context) {
     repeated <- rep(seq_len(draws), length(fine))
     points <- list(setting = history[[k]]$setting[repeated], variance = history[[k]]$variance[repeated],
                    t = history[[k]]$t[repeated, , drop = FALSE])
-    data <- c(model$records[[k]]$data,
-              list(moves = unname(slopes[rows, model$own[[k]], drop = FALSE])))
+    data <- c(model$records[[k]]$data, list(moves = moves[rows, model$own[[k]], drop = FALSE]))
     log_l <- call_engine(run_likelihood_(data, model$records[[k]]$priors, points,
                                          outputs[rows, rep(fine, each = draws), drop = FALSE],
                                          engine_context(context$seed, context$threads)))
