@@ -50,18 +50,24 @@ posterior_of <- function(model, context, ais = NULL, border = rules$border_inter
   list(model = model, fits = fits)
 }
 
-# The model with the region of its posterior, and draws of it.
+# The model with the region of its posterior, and draws of it. Those of the round before count as well: what the
+# discrepancy keeps out of moves the posterior, which moves that again.
 following <- function(found) {
   model <- with_draws(found$model, found$fits)
+  model$last_draws <- posterior_z(model, found$fits)
   model$region <- region_of_draws(joint_unit(model, found$fits), found$fits[[1]]$weights, model$parameters,
                                   growth = rules$region_growth)
   model
 }
 
 with_draws <- function(model, fits) {
-  drawn <- even_draws(fits[[1]], rules$slope_draws)
-  model$draws <- from_unit(joint_unit(model, fits)[drawn, , drop = FALSE], model$flat)
+  model$draws <- rbind(model$last_draws, posterior_z(model, fits))
   model
+}
+
+posterior_z <- function(model, fits) {
+  drawn <- even_draws(fits[[1]], rules$slope_draws)
+  from_unit(joint_unit(model, fits)[drawn, , drop = FALSE], model$flat)
 }
 
 border_share <- function(model, fits) {
@@ -165,11 +171,16 @@ local_moves <- function(model, k, emulator) {
   q <- ncol(emulator$basis$vectors)
   combine <- rbind(diag(p), matrix(0, q, p))
   both <- cbind(slopes, emulator$basis$vectors)
-  if (!is.null(model$draws)) combine <- turning_combination(model, own, emulator)
+  if (!is.null(model$draws)) combine <- root_of(tcrossprod(turning_combination(model, own, emulator)))
   energy <- eigen(crossprod(both %*% combine), symmetric = TRUE)
   acts <- energy$values > (1e-3 * model$records[[k]]$priors$noise_sd)^2
   combine <- combine %*% energy$vectors[, acts, drop = FALSE]
   list(root = both %*% combine, combine = combine, z = model$runs$z[model$tangent$at, own])
+}
+
+root_of <- function(covariance) {
+  parts <- eigen(covariance, symmetric = TRUE)
+  sweep(parts$vectors, 2, sqrt(pmax(parts$values, 0)), "*")
 }
 
 # Combinations of the tangent's slopes and of the basis vectors, one for each draw and parameter.
@@ -240,13 +251,12 @@ check_by_runs <- function(model, fits, n, context) {
   list(model = model, fits = exact_evidence(fits, each, context$threads))
 }
 
-# The verified posterior: local runs, the posterior by them, the check, until it passes with enough to
-# spare for intervals.
-verify_model <- function(model, context, first = 1) {
+# The verified posterior: local runs, the posterior by them, the check, until it passes with enough to spare for
+# intervals and two rounds agree on the evidence. `before`: the evidence that an earlier check found.
+verify_model <- function(model, context, before = NULL) {
   least <- least_local(model)
   best <- NULL
-  rounds <- context$control$rounds %||% rules$verify_rounds
-  for (round in seq(first, max(first, rounds))) {
+  for (round in seq_len(max(1, context$control$rounds %||% rules$verify_rounds))) {
     model <- with_local_runs(model, least - length(model$parameters), context)
     rough <- posterior_of(model, context, rough_ais)
     model <- with_exact_tangent(following(rough), context)
@@ -256,12 +266,14 @@ verify_model <- function(model, context, first = 1) {
       model <- found$model
       next
     }
-    checks <- if (round < rules$least_rounds) rules$first_check else rules$check_runs
+    checks <- if (is.null(before)) rules$first_check else rules$check_runs
     found <- check_by_runs(found$model, found$fits, checks, context)
-    found$score <- check_score(found$fits)
-    if (is.null(best) || found$score > best$score) best <- found
     model <- found$model
-    if (has_settled(found$fits, round) || is_spent(context)) break
+    settled <- has_settled(found$fits, before)
+    found$score <- check_score(found$fits)
+    if (settled || is.null(best) || found$score > best$score) best <- found
+    if (settled || is_spent(context)) break
+    before <- found$fits[[1]]$log_evidence
     passed <- isTRUE(found$fits[[1]]$check$passed)
     least <- inside + length(model$checked$at) + if (passed) 0 else rules$more_runs
   }
@@ -276,13 +288,11 @@ verify_model <- function(model, context, first = 1) {
 
 model_ais <- function(context) utils::modifyList(verified_ais, as.list(context$control$calibration$ais))
 
-# The first round shows where the posterior lies, the second measures it.
-has_settled <- function(fits, round) {
-  effective <- if (round < rules$good_rounds) rules$effective_good else rules$effective_intervals
-  round >= rules$least_rounds && all(vapply(fits, function(fit) {
+has_settled <- function(fits, before) {
+  !is.null(before) && abs(fits[[1]]$log_evidence - before) <= rules$rounds_agree && all(vapply(fits, function(fit) {
     check <- fit$check
     isTRUE(check$passed) && check$border <= rules$border_intervals &&
-      check$effective >= effective && fit$standard_error <= rules$evidence_error
+      check$effective >= rules$effective_intervals && fit$standard_error <= rules$evidence_error
   }, NA))
 }
 

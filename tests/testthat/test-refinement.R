@@ -132,24 +132,24 @@ test_that("bad arguments are refused", {
 })
 
 checked_by_hand <- function(passed = TRUE, effective = 0.5, border = 0, ratio = 0.1,
-                            standard_error = 0.1) {
+                            standard_error = 0.1, log_evidence = 10) {
   list(check = list(passed = passed, effective = effective, border = border, ratio = ratio),
-       standard_error = standard_error)
+       standard_error = standard_error, log_evidence = log_evidence)
 }
 
-test_that("verification ends once a check passes with enough to spare", {
-  settled <- function(round, ...) amiss:::has_settled(list(checked_by_hand(...)), round)
-  expect_false(settled(1, effective = 1))  # the first round shows where the posterior lies
-  expect_true(settled(2, effective = 0.9))
-  expect_false(settled(2, effective = 0.5))
-  expect_true(settled(3, effective = 0.5))
-  expect_false(settled(3, effective = 0.2))
-  expect_false(settled(3, passed = FALSE))
-  expect_false(settled(3, passed = NA))
-  expect_false(settled(3, border = 0.03))
-  expect_false(settled(3, standard_error = 1.5))
+test_that("verification ends once a check passes with enough to spare, and two rounds agree", {
+  settled <- function(before = 10, ...) amiss:::has_settled(list(checked_by_hand(...)), before)
+  expect_true(settled())
+  expect_false(settled(before = NULL))  # the first round shows where the posterior lies
+  expect_false(settled(before = 8.8))
+  expect_true(settled(before = 9.5))
+  expect_false(settled(effective = 0.2))
+  expect_false(settled(passed = FALSE))
+  expect_false(settled(passed = NA))
+  expect_false(settled(border = 0.03))
+  expect_false(settled(standard_error = 1.5))
   # Of several records all.
-  expect_false(amiss:::has_settled(list(checked_by_hand(), checked_by_hand(passed = FALSE)), 3))
+  expect_false(amiss:::has_settled(list(checked_by_hand(), checked_by_hand(passed = FALSE)), 10))
 })
 
 test_that("of rounds the one with the best check is the better one", {
