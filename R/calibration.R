@@ -215,7 +215,8 @@ free_probability <- function(fit) sum(fit$reach[is.infinite(fit$control$reach)])
 reach_words <- function(fit) {
   free <- free_probability(fit)
   if (length(fit$reach) < 2) {
-    return(if (free > 0) "the discrepancy is free" else paste("the discrepancy's reach is held at", names(fit$reach)))
+    return(if (free > 0) "the discrepancy is free"
+           else sprintf("the discrepancy keeps out of what the parameters do (reach %s)", names(fit$reach)))
   }
   if (free >= 0.9)
     return(sprintf(paste("the discrepancy reaches into what the parameters can do (probability %.2f): the model is",

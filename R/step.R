@@ -26,6 +26,8 @@ next_step <- function(state, context) {
     trials <- second_look(state$present, trials, context)
     table <- trial_table(trials, state$present, left)
   }
+  explained <- explained_factors(trials, state$present, state$catalogue, context)
+  table$explained <- unname(explained[table$mechanism])
   state$candidates <- rbind(state$candidates, table)
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
   best <- best_trial(table)

@@ -245,14 +245,15 @@ test_that("a report says what result.json says", {
   trials <- table_with(tables, c("step", "mechanism"))
   for (trial in told$candidates) {
     row <- trials[trials[, 2] == trial$mechanism, ]
-    expect_identical(row[c(4, 5, 7, 8, 9)],
+    expect_identical(row[c(4, 5, 7, 8, 9, 10)],
                      c(signed(trial$log10_bf),
                        paste(signed(unlist(trial$interval)), collapse = " to "),
+                       if (is.null(trial$explained)) "" else signed(trial$explained),
                        percent(trial$probability),
                        if (is.null(trial$error_ratio)) "" else paste(short(trial$error_ratio), "times"),
                        if (trial$judged_by == "runs") "verified"
                        else if (trial$trusted) "trial" else "rough"))
-    expect_identical(row[10] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
+    expect_identical(row[11] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
   }
 
   first <- told$models[[1]]
