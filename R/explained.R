@@ -8,13 +8,14 @@
 # log10 factors of trials, NA of those that are not trusted or whose mechanism has no condition.
 explained_factors <- function(trials, present, catalogue, context) {
   conditions <- lapply(trials, function(trial) sort(catalogue[[trial$mechanism]]$boundary))
-  explains <- mapply(is_explanation, trials, conditions)
+  explains <- vapply(seq_along(trials), function(k) is_explanation(trials[[k]], conditions[[k]]), NA)
   each <- unique(conditions[explains])
   before <- vapply(each, function(of) lost_without(present, of, context), 0)
-  factors <- rep(NA_real_, length(trials))
-  factors[explains] <- mapply(function(trial, of) {
-    log10_factor(trial, present) + before[match(list(of), each)] - lost_without(trial, of, context)
-  }, trials[explains], conditions[explains])
+  factors <- vapply(seq_along(trials), function(k) {
+    if (!explains[k]) return(NA_real_)
+    log10_factor(trials[[k]], present) + before[match(conditions[k], each)] -
+      lost_without(trials[[k]], conditions[[k]], context)
+  }, 0)
   stats::setNames(factors, names(trials))
 }
 
