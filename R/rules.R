@@ -20,7 +20,7 @@ rule_table <- list(
   search_steps = rule(40, "steps", "the longest search", "most end by themselves after twenty", "bench/seeds.R"),
   trial_steps = rule(16, "steps", "the longest search of a trial",
                      "it begins at the mode of the present model", "bench/runs.R"),
-  search_gain = rule(0.5, "nats", "promised and achieved gain below which a search has converged",
+  search_gain = rule(0.5, "nats", "promised gain below which a search has converged",
                      "half a nat is a fifth of a decade; local runs find the rest", "bench/seeds.R"),
   bent_runs = rule(4, "runs", "for each parameter, the nearest runs by which a line is bent",
                    "slopes, and as much of the bend along the way that the search went", "bench/seeds.R"),

@@ -108,6 +108,16 @@ test_that("draws within limits have the moments of the truncated normal distribu
   }
 })
 
+test_that("draws leave a corner of the limits in which all of eight correlated coordinates are pressed", {
+  root <- withr::with_seed(1, matrix(rnorm(64), 8))
+  covariance <- crossprod(root) + diag(0.01, 8)
+  mean <- rep(c(-5, 5), 4) * sqrt(diag(covariance))
+  draws <- amiss:::draws_within(mean, covariance, rep(sqrt(3), 8), 600, seed = 1)
+  # Along random directions alone no draw would move: hardly any leads inwards in all coordinates.
+  expect_lt(max(abs(draws)), sqrt(3))
+  expect_false(anyDuplicated(draws[, 1]) > 0)
+})
+
 test_that("where no limit is near, draws have the mean and covariance asked for", {
   covariance <- matrix(c(0.04, 0.018, 0.018, 0.02), 2)
   draws <- amiss:::draws_within(c(0.3, -0.5), covariance, c(4, 4), 20000, seed = 2)
