@@ -163,9 +163,9 @@ accept <- function(search, made, context) {
   gain <- misfit[1] - misfit[2]
   nats <- nats_of(search, min(misfit))
   length <- sqrt(sum((runs$z[made, ] - runs$z[search$at, ])^2))
-  if (gain > search$predicted * rules$good_step) {
+  if (gain > max(0, search$predicted * rules$good_step)) {
     search$trusted <- max(search$trusted, rules$trust_changes * length)
-  } else if (!(gain > search$predicted * rules$poor_step)) {
+  } else if (!(gain > max(0, search$predicted * rules$poor_step))) {
     search$trusted <- length / rules$trust_changes
   }
   search$failed <- if (gain > 0) 0 else search$failed + 1
