@@ -140,7 +140,7 @@ exact_evidence <- function(fits, made, threads) {
   # that of lognormal ratios; how far the two are apart is part of the error.
   above <- pmax(log_ratio - stats::median(log_ratio), 0)
   lognormal <- stats::median(log_ratio) + mean(above^2)  # twice the mean square of one half, over two
-  error <- sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2)
+  error <- if (n > 1) sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2) else Inf
   lapply(fits, corrected, effective = effective, correction = correction, error = error)
 }
 

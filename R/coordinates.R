@@ -29,6 +29,14 @@ to_unit <- function(z, flat) {
   pmin(pmax(unit, 0), 1)
 }
 
+# dz/dx, x the normal quantile: 0 at the ends of a flat prior, beyond which nothing can move.
+per_normal <- function(z, flat) {
+  slope <- rep(1, length(z))
+  side <- pmin(pmax(z[flat] / (2 * flat_limit) + 0.5, 0), 1)
+  slope[flat] <- 2 * flat_limit * stats::dnorm(stats::qnorm(side))
+  slope
+}
+
 # The most probable point of N(mean, precision^-1) between -limit and limit, by an active set: of the coordinates held
 # at an end that one is let go from which the density rises fastest inwards; the others go to their best, or to the
 # first end in their way.

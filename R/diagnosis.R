@@ -188,8 +188,8 @@ sure_sentences <- function(upgrade) {
 }
 
 raised_sentence <- function(row, when = "") {
-  sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration is %s times as large:",
-                "what is gained, the discrepancy gains."), when, row$mechanism,
+  sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration does not fall",
+                "(%s times as large): what is gained, the discrepancy gains."), when, row$mechanism,
           short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
 }
 

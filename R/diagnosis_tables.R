@@ -55,7 +55,7 @@ candidates_words <- function(upgrade) {
              "log10 Bayes factor" = signed(table$log10_bf),
              "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)),
              evidence = table$word,
-             explains = ifelse(is.na(table$explained), "", signed(table$explained)),
+             "beside an unknown response" = signed(table$beside_unknown),
              probability = percent(table$probability),
              "error in calibration" = error_words(table$error_ratio),
              estimate = ifelse(table$judged_by == "runs", "verified", ifelse(table$trusted, "trial", "rough")),

@@ -1,26 +1,24 @@
-# What a mechanism explains by itself. The Bayes factor of a trial allows an unknown response to the conditions of its
-# mechanism in both models, so that the true cause competes with a response that can imitate it. Without that response
-# in either model,
+# What a mechanism explains by itself. If both models may respond to the conditions of the mechanism in an unknown way,
+# the true cause competes with a response that can imitate it. With that response in neither model, the Bayes factor is
 #     Z1(-s) / Z0(-s) = (Z1 / Z0) (Z0 / Z0(-s)) / (Z1 / Z1(-s)),
-# s the conditions of the mechanism: the factor, and what the present model loses without the response more than the
-# extension does.
+# s the conditions of the mechanism: the factor Z1 / Z0 with the response in both, and what the mechanism takes away of
+# the evidence for that response. It decides; the factor with the response in both must not speak against it.
 
-# log10 factors of trials, NA of those that are not trusted or whose mechanism has no condition.
-explained_factors <- function(trials, present, catalogue, context) {
-  conditions <- lapply(trials, function(trial) sort(catalogue[[trial$mechanism]]$boundary))
-  explains <- vapply(seq_along(trials), function(k) is_explanation(trials[[k]], conditions[[k]]), NA)
-  each <- unique(conditions[explains])
-  before <- vapply(each, function(of) lost_without(present, of, context), 0)
-  factors <- vapply(seq_along(trials), function(k) {
-    if (!explains[k]) return(NA_real_)
-    log10_factor(trials[[k]], present) + before[match(conditions[k], each)] -
-      lost_without(trials[[k]], conditions[[k]], context)
-  }, 0)
-  stats::setNames(factors, names(trials))
+# What a mechanism takes away: decades by which the present model needs the response more than the extension does; 0 if
+# its mechanism has no condition.
+taken_away <- function(trial, present, context) {
+  conditions <- present$conditions[[trial$mechanism]]
+  if (!length(conditions)) return(0)
+  present$lost[[toString(conditions)]] - lost_without(trial, conditions, context)
 }
 
-is_explanation <- function(trial, conditions) {
-  length(conditions) > 0 && !is.null(trial$fit) && isTRUE(trial$fit$trust$trusted)
+# The present model with the conditions of the mechanisms that are left, and what it loses without a response to them.
+with_losses <- function(model, catalogue, context) {
+  model$conditions <- lapply(catalogue, function(mechanism) sort(mechanism$boundary))
+  sets <- unique(Filter(length, unname(model$conditions)))
+  lost <- lapply(sets, function(conditions) lost_without(model, conditions, context))
+  model$lost <- stats::setNames(lost, vapply(sets, toString, ""))
+  model
 }
 
 # Decades of evidence that a model loses if its discrepancies do not respond to some conditions.

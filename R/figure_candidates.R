@@ -3,7 +3,8 @@
 candidates_title <- function(table, decisive) {
   if (!any(table$adopted)) {
     best <- table[which.max(table$log10_bf), ]
-    return(if (best$log10_bf >= decisive && raises_error(best)) "No mechanism was adopted: the best raises the error"
+    return(if (best$log10_bf >= decisive && raises_error(best))
+             "No mechanism was adopted: the best does not lower the error"
            else if (best$log10_bf >= decisive && best$judged_by == "trial")
              "No mechanism was adopted: no runs were left to verify the best"
            else if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero"

@@ -7,10 +7,12 @@ verified_ais <- list(pilot_chains = 200, groups = 6, max_groups = 8, max_sweeps 
 rough_ais <- list(pilot_chains = 128, groups = 2, max_groups = 4, max_sweeps = 8, precision = 0.5,
                   gradient = FALSE, importance_draws = 0)
 
-# What the search knows, for the region: the run that the tangent touches and its slopes.
-with_mode <- function(model, search, region) {
-  model$tangent <- list(at = search$at, slopes = search$slopes)
-  model$region <- region
+# What searches know, the best first: the run of the mode; of all of them the run of least squares, and its slopes.
+with_modes <- function(model, searches, seed) {
+  model$mode <- searches[[1]]$at
+  ends <- vapply(searches, function(search) search$least$at, 0)
+  model$least <- searches[[which.min(squared_misfit(model)[ends])]]$least
+  model$region <- region_of_modes(model, searches, seed)
   model
 }
 
@@ -42,7 +44,6 @@ posterior_of <- function(model, context, ais = NULL, border = rules$border_inter
   for (try in seq_len(rules$region_tries)) {
     fits <- fits_in_region(model, context, ais)
     outside <- border_share(model, fits)
-    if (outside <= rules$border) model <- with_draws(model, fits)
     if (outside <= border || try == rules$region_tries) break
     model$region <- region_of_draws(joint_unit(model, fits), fits[[1]]$weights, model$parameters,
                                     growth = if (outside > 0.2) 1.5 else 1.2)
@@ -50,24 +51,12 @@ posterior_of <- function(model, context, ais = NULL, border = rules$border_inter
   list(model = model, fits = fits)
 }
 
-# The model with the region of its posterior, and draws of it. Those of the round before count as well: what the
-# discrepancy keeps out of moves the posterior, which moves that again.
+# The model with the region of its posterior.
 following <- function(found) {
-  model <- with_draws(found$model, found$fits)
-  model$last_draws <- posterior_z(model, found$fits)
+  model <- found$model
   model$region <- region_of_draws(joint_unit(model, found$fits), found$fits[[1]]$weights, model$parameters,
                                   growth = rules$region_growth)
   model
-}
-
-with_draws <- function(model, fits) {
-  model$draws <- rbind(model$last_draws, posterior_z(model, fits))
-  model
-}
-
-posterior_z <- function(model, fits) {
-  drawn <- even_draws(fits[[1]], rules$slope_draws)
-  from_unit(joint_unit(model, fits)[drawn, , drop = FALSE], model$flat)
 }
 
 border_share <- function(model, fits) {
@@ -109,30 +98,36 @@ without_failing <- function(model, fits) {
   })
 }
 
-# The tangent at the centre of the region, by differences: what the discrepancy keeps out of hangs on it
-# being exact. It stays as long as it is near the centre.
-with_exact_tangent <- function(model, context) {
-  if (isTRUE(model$tangent$exact) && straight_distance(model)[model$tangent$at] < rules$tangent_near) {
-    return(model)
+# The run of least squares, of all runs that there are, and the slopes there, by differences: what the discrepancy keeps
+# out of hangs on them.
+with_exact_least <- function(model, context) {
+  misfit <- squared_misfit(model)
+  nearest <- which.min(misfit)
+  if (misfit[model$least$at] - misfit[nearest] > rules$search_gain * squared_nats(model, misfit[nearest])) {
+    search <- begin_search(model, nearest, model$least$slopes, 0)
+    search$reference <- least_reference(model)
+    search <- descend(search, context)
+    model <- search$model
+    model$least <- search[c("at", "slopes")]
   }
-  made <- with_runs(model, rbind(straightened(model$region)$z), context)
-  if (!length(made$at) || !succeeded(made$model)[made$at]) return(made$model)
-  found <- difference_slopes(made$model, made$at, context)
+  if (isTRUE(model$least$exact)) return(model)
+  found <- difference_slopes(model, model$least$at, context)
   model <- found$model
-  if (!is.null(found$slopes)) model$tangent <- list(at = made$at, slopes = found$slopes, exact = TRUE)
+  if (!is.null(found$slopes)) model$least[c("slopes", "exact")] <- list(found$slopes, TRUE)
   model
 }
 
+# Where slopes are known, as a search takes them.
+least_reference <- function(model) {
+  least <- model$least
+  list(z = model$runs$z[least$at, ], slopes = least$slopes, stale = if (isTRUE(least$exact)) 0 else rules$trial_stale)
+}
+
 # The simulator about the centre of the region as a line: its `output` there and its `slopes` for a standard
-# deviation of the prior of each parameter. Slopes of the search are corrected by the runs near.
+# deviation of the prior of each parameter, those of least squares as the runs near it correct them.
 with_centre <- function(model) {
-  at <- model$tangent$at
-  slopes <- model$tangent$slopes
-  if (!isTRUE(model$tangent$exact)) {
-    reference <- list(z = model$runs$z[at, ], slopes = slopes, stale = rules$trial_stale)
-    at <- which.min(ifelse(succeeded(model), straight_distance(model), Inf))
-    slopes <- secant_slopes(model, at, reference)
-  }
+  at <- which.min(ifelse(succeeded(model), straight_distance(model), Inf))
+  slopes <- secant_slopes(model, at, least_reference(model))
   way <- straightened(model$region)$z - model$runs$z[at, ]
   model$centre <- list(output = model$runs$outputs[, at] + (slopes %*% way)[, 1], slopes = slopes)
   model
@@ -148,7 +143,7 @@ record_setting <- function(model, k, context, ais) {
   control <- utils::modifyList(list(noise_fraction = rules$basis_error), as.list(context$control$emulator))
   emulator <- without_basis_warnings(
     train_emulator(ensemble, record$measurements, control, threads = context$threads))
-  emulator$moves <- local_moves(model, k, emulator)
+  emulator$moves <- local_moves(model, k)
   control <- record$control
   if (!is.null(ais)) {
     control$ais <- fill_ais_control(utils::modifyList(control$ais, ais))
@@ -159,49 +154,11 @@ record_setting <- function(model, k, context, ais) {
        seed = context$seed)
 }
 
-# How far the simulator moves where the posterior lies: a root E (N x r) of the mean of J J' over draws of the
-# posterior, J its slopes for a standard deviation of the prior of each parameter. J is the tangent's, and the
-# emulator says how it turns from draw to draw. It is not put on the emulator's basis, which holds the posterior
-# to a hundredth of the noise: over a prior a hundred times as wide, that would be the noise itself.
-# E = [J, K] combine, K the basis.
-local_moves <- function(model, k, emulator) {
+# What the discrepancy of a record keeps out of, and where that is.
+local_moves <- function(model, k) {
   own <- model$own[[k]]
-  slopes <- unname(model$centre$slopes[model$rows[[k]], own, drop = FALSE])
-  p <- length(own)
-  q <- ncol(emulator$basis$vectors)
-  combine <- rbind(diag(p), matrix(0, q, p))
-  both <- cbind(slopes, emulator$basis$vectors)
-  if (!is.null(model$draws)) combine <- root_of(tcrossprod(turning_combination(model, own, emulator)))
-  energy <- eigen(crossprod(both %*% combine), symmetric = TRUE)
-  acts <- energy$values > (1e-3 * model$records[[k]]$priors$noise_sd)^2
-  combine <- combine %*% energy$vectors[, acts, drop = FALSE]
-  list(root = both %*% combine, combine = combine, z = model$runs$z[model$tangent$at, own])
-}
-
-root_of <- function(covariance) {
-  parts <- eigen(covariance, symmetric = TRUE)
-  sweep(parts$vectors, 2, sqrt(pmax(parts$values, 0)), "*")
-}
-
-# Combinations of the tangent's slopes and of the basis vectors, one for each draw and parameter.
-turning_combination <- function(model, own, emulator) {
-  z <- rbind(model$runs$z[model$tangent$at, own], model$draws[, own, drop = FALSE])
-  n <- nrow(z) - 1
-  step <- pmax(0.1 * apply(z[-1, , drop = FALSE], 2, stats::sd), 1e-4)
-  parts <- lapply(seq_along(own), function(j) {
-    limit <- model$limit[own[j]]
-    up <- down <- z
-    up[, j] <- pmin(z[, j] + step[j], limit)
-    down[, j] <- pmax(z[, j] - step[j], -limit)
-    seen <- lapply(list(up, down), function(z) {
-      predict_emulator_(emulator$processes, to_normal(to_unit(z, model$flat[own])))$mean
-    })
-    turned <- (seen[[1]] - seen[[2]]) / (up[, j] - down[, j])
-    own_slope <- matrix(0, length(own), n)
-    own_slope[j, ] <- 1
-    rbind(own_slope, t(turned[-1, , drop = FALSE]) - turned[1, ]) / sqrt(n)
-  })
-  do.call(cbind, parts)
+  moves <- moves_of(model, model$least)
+  list(root = unname(moves[model$rows[[k]], own, drop = FALSE]), z = model$runs$z[model$least$at, own])
 }
 
 # Runs inside the region or, if they are few, the nearest ones.
@@ -253,13 +210,13 @@ check_by_runs <- function(model, fits, n, context) {
 
 # The verified posterior: local runs, the posterior by them, the check, until it passes with enough to spare for
 # intervals and two rounds agree on the evidence. `before`: the evidence that an earlier check found.
-verify_model <- function(model, context, before = NULL) {
+verify_model <- function(model, context, before = NULL, rounds = context$control$rounds %||% rules$verify_rounds) {
   least <- least_local(model)
   best <- NULL
-  for (round in seq_len(max(1, context$control$rounds %||% rules$verify_rounds))) {
-    model <- with_local_runs(model, least - length(model$parameters), context)
+  for (round in seq_len(max(1, rounds))) {
+    model <- with_exact_least(with_local_runs(model, least, context), context)
     rough <- posterior_of(model, context, rough_ais)
-    model <- with_exact_tangent(following(rough), context)
+    model <- following(rough)
     found <- list(model = model, fits = fits_in_region(model, context, model_ais(context)))
     inside <- sum(succeeded(found$model) & straight_distance(found$model) <= 1)
     if (inside < least / 2 && !is_spent(context)) {  # the region has moved away from its runs
@@ -306,7 +263,9 @@ check_score <- function(fits) {
 }
 
 with_fit <- function(model, fits, level, rounds, context) {
-  fits <- lapply(fits, function(fit) {
+  best <- best_runs(model)
+  fits <- Map(function(fit, best) {
+    fit$best <- best
     fit$trust <- fit_trust(fit)
     if (is.null(fit$check)) fit$trust <- not_checked()
     fit$rounds <- rounds
@@ -314,10 +273,20 @@ with_fit <- function(model, fits, level, rounds, context) {
     fit$modes <- model$modes
     if (isFALSE(fit$modes$agree) || isTRUE(fit$modes$lost > 0)) fit$trust <- not_agreed(fit$trust, fit$modes)
     fit
-  })
+  }, fits, best)
   model$fit <- joined_fit(stats::setNames(fits, names(model$simulators)))
   model$level <- level
   model
+}
+
+# The run of least squares, of each record.
+best_runs <- function(model) {
+  at <- model$least$at
+  unit <- to_unit(model$runs$z[at, , drop = FALSE], model$flat)
+  Map(function(own, rows) {
+    parameters <- model$parameters[own]
+    list(values = unit_to_values(unit[, own, drop = FALSE], parameters), output = model$runs$outputs[rows, at])
+  }, model$own, model$rows)
 }
 
 not_checked <- function() {
@@ -364,8 +333,7 @@ values_under <- function(model, fits, at) {
 # The base model from its first run to its verified posterior.
 calibrate_model <- function(model, context) {
   found <- find_modes(model, context)
-  region <- region_of_modes(found$model, found$modes, context$seed)
-  model <- with_mode(found$model, found$modes[[1]], region)
+  model <- with_modes(found$model, found$modes, context$seed)
   model$modes <- list(agree = found$agree, searches = length(found$modes),
                       ends = vapply(found$modes, `[[`, 0, "at"), covariances = lapply(found$modes, `[[`, "covariance"))
   verify_model(model, context)

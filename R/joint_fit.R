@@ -50,9 +50,14 @@ joint_check <- function(fits) {
 # Of one record its calibration, of several all of them together.
 joined_fit <- function(fits) if (length(fits) == 1) fits[[1]] else new_joint(fits)
 
-# What the simulation leaves of all records, of several each in units of its noise.
+# What the simulation at its best leaves of all records, of several each in units of its noise.
 left_by_simulation <- function(fit) {
   fits <- record_fits(fit)
-  if (length(fits) == 1) return(stats::residuals(fits[[1]]))
-  unlist(lapply(unname(fits), function(one) stats::residuals(one) / one$measurements$noise_sd))
+  if (length(fits) == 1) return(left_at_best(fits[[1]]))
+  unlist(lapply(unname(fits), function(one) left_at_best(one) / one$measurements$noise_sd))
+}
+
+# What the simulation leaves of the record at its best: at the run of least squares, if there is one.
+left_at_best <- function(fit) {
+  if (is.null(fit$best)) stats::residuals(fit) else fit$measurements$y[fit$rows] - fit$best$output
 }

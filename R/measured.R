@@ -38,11 +38,13 @@ predicting_runs <- function(model) {
 
 prediction_by_runs <- function(model, fit, k) {
   record <- model$records[[k]]
-  at <- predicting_runs(model)
+  at <- c(model$least$at, predicting_runs(model))
   runs <- matrix(0, length(record$calibrates), length(at))
   runs[record$calibrates, ] <- model$runs$outputs[model$rows[[k]], at]
   runs[!record$calibrates, ] <- model$runs$held[model$held_rows[[k]], at]
+  best <- runs[, 1]
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
+  if (all(is.finite(best))) runs <- about_best(runs[, -1, drop = FALSE], best)
   rows <- sort(c(record$rows, record$held))
   with_seed(fit$seed, summarise_prediction(record$measurements, rows, runs, error_sd(fit), "prediction", 0.95))
 }

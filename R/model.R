@@ -7,6 +7,7 @@ loop_record <- function(measurements, control, call = rlang::caller_env()) {
   m <- measurements
   rows <- used_rows(m, "calibrate")
   check_target_varies(m, rows, call)
+  control$reach <- control$reach %||% rules$reach
   control <- fill_calibration_control(control, m, length(rows), call = call)
   control$check <- control$exact <- 0
   used <- which(m$use %in% c("calibrate", "validate") & !is.na(m$y))

@@ -74,6 +74,9 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
   runs <- simulate_measured(object$emulator$simulator, object$values[picked, , drop = FALSE], record, use, threads)
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
   if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
+  if (!is.null(object$best) && !discrepancy) {
+    runs <- about_best(runs, simulate_measured(object$emulator$simulator, object$best$values, record, use, threads))
+  }
   sd <- error_sd(object)
   if (discrepancy) {
     carried <- carried_response(object, use, threads, record)
@@ -156,11 +159,10 @@ moves_at <- function(fit, use, threads, record = fit$measurements) {
     wide <- emulator_over_priors(emulator)
     return(vectors_at(fit, wide, use, threads, record) %*% wide$spread)
   }
-  slopes <- slopes_at(fit, use, threads, record)
-  cbind(slopes, vectors_at(fit, emulator, use, threads, record)) %*% emulator$moves$combine
+  slopes_at(fit, use, threads, record)
 }
 
-# The simulator's slopes at other rows, where the tangent of its emulator was taken.
+# The simulator's slopes at other rows, at the run of least squares.
 slopes_at <- function(fit, use, threads, record) {
   parameters <- fit$emulator$parameters
   flat <- are_flat(parameters)
@@ -169,9 +171,9 @@ slopes_at <- function(fit, use, threads, record) {
   around <- rbind(z, matrix(z, length(z), length(z), byrow = TRUE) + diag(step, length(z)))
   runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, flat), parameters), use, threads, record)
   if (!all(is.finite(runs))) {
-    abort_numerical("The simulator failed beside the centre of the posterior at these rows.")
+    abort_numerical("The simulator failed beside its best run at these rows.")
   }
-  sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, step, "/")
+  sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, per_normal(z, flat) / step, "*")
 }
 
 # The vectors of an emulator's basis at other rows: the same combinations of its runs, without those that fail there.
@@ -196,9 +198,13 @@ runs_elsewhere <- function(fit, values, use, threads, record) {
 # What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy
 # as large as they were seen, the fitted parameters taken off the degrees of freedom.
 error_sd <- function(fit) {
-  r <- stats::residuals(fit)
+  r <- left_at_best(fit)
   sqrt(sum(r^2) / max(1, length(r) - length(fit$emulator$parameters)))
 }
+
+# Runs at draws of the posterior about the best run in place of their mean: where the discrepancy takes over what
+# parameters at the ends of their priors cannot do, draws lie off the best.
+about_best <- function(runs, best) runs + (as.numeric(best) - rowMeans(runs))
 
 summarise_prediction <- function(m, rows, runs, sd, interval, level) {
   n <- 200

@@ -1,19 +1,13 @@
 # Mechanisms as extensions of the present model: a trial of each from the present mode, as long as it can
 # still win; then those in front are verified, until the leader is exact and nobody can reach it.
 
-# The present model as its trials see it: a run at the centre of its posterior and its slopes there.
-as_present <- function(model, context) {
+# The present model as its trials see it: at its run of least squares.
+as_present <- function(model, catalogue, context) {
+  model <- with_losses(model, catalogue, context)
   if (model$level == "given") return(model)
-  fits <- record_fits(model$fit)
-  z <- from_unit(joint_unit(model, fits), model$flat)
-  made <- with_runs(model, rbind(colSums(fits[[1]]$weights * z)), context)
-  model <- made$model
-  at <- if (length(made$at) && succeeded(model)[made$at]) made$at else model$tangent$at
-  reference <- list(z = model$runs$z[model$tangent$at, ], slopes = model$tangent$slopes,
-                    stale = rules$trial_stale)
-  slopes <- secant_slopes(model, at, reference)
-  model$present <- list(at = at, slopes = slopes,
-                        history = tangent_at(model, at, slopes, context)$history)
+  least <- model$least
+  model$present <- list(at = least$at, slopes = least$slopes,
+                        history = tangent_at(model, least$at, least$slopes, moves_of(model, least), context)$history)
   model
 }
 
@@ -30,7 +24,7 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
     return(utils::modifyList(model, list(level = if (is_spent(context)) "missed" else "untried")))
   }
   search <- search_trial(looked, context)
-  model <- with_mode(search$model, search, region_of_modes(search$model, list(search), context$seed))
+  model <- with_modes(search$model, list(search), context$seed)
   model$off <- looked$off
   model$status <- search$status
   model <- tried_model(model, present, bar, context)
@@ -44,8 +38,7 @@ search_trial <- function(looked, context) {
   model <- looked$model
   best <- NULL
   for (start in utils::head(looked$starts, rules$trial_starts)) {
-    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps, looked$off_at,
-                           weighted = TRUE)
+    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps, looked$off_at)
     search <- run_search(search, context)
     model <- search$model
     others <- c(best$at, looked$off_at)
@@ -130,7 +123,7 @@ profile_value <- function(start, model, present, context) {
   at <- start$at
   slopes <- start$slopes
   history <- present$present$history
-  moves <- unname(slopes)
+  moves <- moves_of(model, start)
   tangent <- tangent_given(model, model$runs$z[at, ], model$runs$outputs[, at], slopes, history, moves, context)
   z <- within_limits(tangent$mean, solve(tangent$covariance), model$limit)
   output <- model$runs$outputs[, at] + slopes %*% (z - model$runs$z[at, ])
@@ -143,6 +136,7 @@ tried_model <- function(model, present, bar, context) {
     found <- posterior_of(model, context, trial_ais, border = rules$border)
     found <- check_by_runs(found$model, found$fits, rules$trial_check, context)
     model <- with_fit(found$model, found$fits, "tried", round, context)
+    model$taken <- taken_away(model, present, context)
     if (is_spent(context) || is_clear(model, present, bar)) break
   }
   model
@@ -157,54 +151,70 @@ is_clear <- function(model, present, bar) {
   is_confirmed(model) || upper_bound(model, present) < bar || lower_bound(model, present) > bar
 }
 
-log10_factor <- function(model, present) {
-  (model$fit$log_evidence - present$fit$log_evidence) / log(10)
-}
+# What decides: the log10 Bayes factor with no unknown response to the conditions of the mechanism in either model.
+log10_factor <- function(model, present) beside_unknown(model, present) + (model$taken %||% 0)
 
-# What the log10 Bayes factor of a model may be at most, by its level.
-upper_bound <- function(model, present) {
-  if (is_promising(model, present)) return(Inf)
+# The same with such a response in both.
+beside_unknown <- function(model, present) (model$fit$log_evidence - present$fit$log_evidence) / log(10)
+
+speaks_against <- function(factor) factor < rules$against
+
+# What the log10 Bayes factor of a model may be at most, by its level; `leader` is the best model that is known.
+upper_bound <- function(model, present, leader = present) {
+  if (is_promising(model, leader)) return(Inf)
   error <- sqrt(model$fit$standard_error^2 + present$fit$standard_error^2) / log(10)
   log10_factor(model, present) + 3 * min(error, rules$worst_error) + trial_margin(model)
 }
 
-# A trial whose emulator runs refute, so that its evidence says little, though one of its runs is nearer to the record
-# than any of the present model.
-is_promising <- function(model, present) {
+# A trial whose emulator runs refute, so that its evidence says little, though it is nearer to the record at its best
+# than the leader.
+is_promising <- function(model, leader) {
   refuted <- !is_verified(model) && isFALSE(model$fit$check$passed)
-  refuted && least_error(model) < rules$promising_error * least_error(present)
+  refuted && least_error(model) < rules$promising_error * least_error(leader)
 }
 
-least_error <- function(model) min(over_noise(model, model$runs$outputs - model$target), na.rm = TRUE)
+least_error <- function(model) sqrt(mean(left_by_simulation(model$fit)^2))
 
 lower_bound <- function(model, present) 2 * log10_factor(model, present) - upper_bound(model, present)
 
 # What a mechanism must reach to be adopted, as far as the trials before it show.
 needed_factor <- function(trials, present, context) {
-  seen <- Filter(function(model) !is.null(model$fit) && !raises_simulation(model, present), trials)
+  seen <- Filter(function(model) isTRUE(model$fit$trust$trusted) && !cannot_be_adopted(model, present), trials)
   max(context$control$decisive, vapply(seen, lower_bound, 0, present))
 }
 
 # The next trial to verify, or NULL: of those that may be adopted and may lead the one of highest evidence, so that
-# what the others must reach is known early.
+# what the others must reach is known early; then, of those whose evidence says nothing yet, the one that is nearest to
+# the record.
 next_to_verify <- function(trials, present, context) {
-  open <- Filter(function(model) model$level == "tried" && !raises_simulation(model, present), trials)
+  open <- Filter(function(model) model$level == "tried" && !cannot_be_adopted(model, present), trials)
   if (!length(open)) return(NULL)
-  bound <- vapply(open, upper_bound, 0, present)
   needed <- context$control$decisive
-  verified <- Filter(function(model) is_verified(model) && !raises_simulation(model, present), trials)
-  if (length(verified)) needed <- max(needed, vapply(verified, log10_factor, 0, present))
-  open <- open[bound >= needed]
-  if (length(open)) open[[which.max(vapply(open, log10_factor, 0, present))]]$mechanism
+  leader <- present
+  verified <- Filter(function(model) is_verified(model) && !cannot_be_adopted(model, present), trials)
+  factor <- vapply(verified, log10_factor, 0, present)
+  if (any(factor >= needed)) {
+    leader <- verified[[which.max(factor)]]
+    needed <- max(factor)
+  }
+  bound <- vapply(open, upper_bound, 0, present, leader)
+  likely <- open[bound >= needed & bound < Inf]
+  if (length(likely)) return(likely[[which.max(vapply(likely, log10_factor, 0, present))]]$mechanism)
+  near <- open[bound == Inf]
+  if (length(near)) near[[which.min(vapply(near, least_error, 0))]]$mechanism
 }
 
-raises_simulation <- function(model, present) {
-  is_verified(model) && error_ratio(model$fit, present$fit) > rules$risen_error
+cannot_be_adopted <- function(model, present) {
+  is_verified(model) && (error_ratio(model$fit, present$fit) > rules$fallen_error ||
+                           speaks_against(beside_unknown(model, present)))
 }
 
 # A trial that its runs confirm has had its first round.
-verify_trial <- function(model, context) {
-  verify_model(model, context, before = if (is_confirmed(model)) model$fit$log_evidence)
+verify_trial <- function(model, present, context) {
+  before <- if (is_confirmed(model)) model$fit$log_evidence
+  model <- verify_model(model, context, before, rules$trial_rounds)
+  model$taken <- taken_away(model, present, context)
+  model
 }
 
 # A trial searched again from runs over all priors, far from where it ended: an extension may have a better mode
@@ -214,8 +224,9 @@ widened_trial <- function(trial, present, bar, context) {
   p <- length(model$parameters)
   unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
   model <- with_runs(model, from_unit(unit, model$flat), context)$model
-  own <- list(at = trial$tangent$at, slopes = trial$tangent$slopes)
-  own[c("mean", "covariance", "history", "moves")] <- tangent_at(model, own$at, own$slopes, context)
+  own <- list(at = trial$mode, slopes = secant_slopes(model, trial$mode, least_reference(model)), least = trial$least)
+  own[c("mean", "covariance", "history", "moves")] <- tangent_at(model, own$at, own$slopes,
+                                                               moves_of(model, own$least), context)
   modes <- list(own)
   for (start in start_runs(model, own$at)[-1]) {
     if (is_spent(context)) break
@@ -228,8 +239,7 @@ widened_trial <- function(trial, present, bar, context) {
   best <- found$modes[[1]]
   trial$runs <- found$model$runs
   if (best$at == own$at) return(trial)
-  again <- with_mode(trial, best, region_of_modes(trial, list(best), context$seed))
-  again$draws <- again$last_draws <- NULL
+  again <- with_modes(trial, list(best), context$seed)
   again <- tried_model(again, present, bar, context)
   if (again$fit$log_evidence > trial$fit$log_evidence) return(again)
   trial$runs <- again$runs
@@ -243,7 +253,7 @@ second_look <- function(present, trials, context) {
     bar <- needed_factor(trials, present, context)
     before <- trials[[name]]
     trials[[name]] <- staged(paste(name, "again"), widened_trial(before, present, bar, context))
-    if (trials[[name]]$tangent$at != before$tangent$at) report_trial(trials[[name]], present, context)
+    if (trials[[name]]$mode != before$mode) report_trial(trials[[name]], present, context)
   }
   race(present, trials, context)
 }
@@ -253,7 +263,7 @@ race <- function(present, trials, context) {
   repeat {
     name <- next_to_verify(trials, present, context)
     if (is.null(name) || is_spent(context)) break
-    trials[[name]] <- staged(paste("verifying", name), verify_trial(trials[[name]], context))
+    trials[[name]] <- staged(paste("verifying", name), verify_trial(trials[[name]], present, context))
     report_trial(trials[[name]], present, context)
   }
   trials

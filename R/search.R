@@ -5,24 +5,27 @@
 
 # A search from run `at` of a model. `slopes` are right at that run to within what they change over
 # `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is switched off; the search
-# ends if all that it promises beyond that could not make evidence. `weighted`: whether it begins near enough to the
-# posterior to know error and discrepancy.
-begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL, weighted = FALSE) {
+# ends if all that it promises beyond that could not make evidence.
+begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL) {
   list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0,
-       weighted = weighted, reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes,
+       weighted = FALSE, reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes,
        status = "going")
 }
 
+# `least`: the run of least squares, where the simulation is at its best, and the slopes there: what the discrepancy
+# keeps out of.
 run_search <- function(search, context) {
-  if (!search$weighted) search <- descend(search, context)
+  search <- descend(search, context)
+  search$least <- search[c("at", "slopes")]
   search <- look(search, context)
   for (round in seq_len(rules$weighted_rounds)) {
-    if (search$status %in% c("budget", "futile")) return(search)
+    if (search$status == "budget") return(search)
+    if (is_futile(search, context)) return(replace(search, "status", "futile"))
     if (promised_by(search) < rules$search_gain) return(replace(search, "status", "converged"))
-    again <- list(weighted = TRUE, status = "going", step = 0, trusted = Inf, failed = 0)
-    search <- utils::modifyList(search, again)
+    search <- utils::modifyList(search, list(weighted = TRUE, status = "going", trusted = Inf, failed = 0))
     search["gains"] <- list(NULL)
     search <- look(descend(search, context), context)
+    if (search$status != "converged") return(search)
   }
   search
 }
@@ -47,8 +50,15 @@ finished <- function(search) search$status != "going"
 # The posterior under the tangent, with error and discrepancy sampled under it.
 look <- function(search, context) {
   search[c("mean", "covariance", "history", "moves")] <-
-    tangent_at(search$model, search$at, search$slopes, context)
+    tangent_at(search$model, search$at, search$slopes, moves_of(search$model, search$least), context)
   search
+}
+
+# How far a model moves at its run of least squares: its slopes there for a unit of the normal quantile of each
+# parameter (Plumlee 2017). They vanish where a parameter is pressed against the end of a flat prior: what it cannot do
+# any more, the discrepancy may. They hang on simulator and record alone.
+moves_of <- function(model, least) {
+  sweep(least$slopes, 2, per_normal(model$runs$z[least$at, ], model$flat), "*")
 }
 
 # What its optimum would gain.
@@ -70,7 +80,7 @@ propose <- function(search, context) {
   tried <- rbind(z)
   outputs <- cbind(line$output)
   for (inner in seq_len(rules$bent_steps)) {
-    to <- step_within(best, z, search$trusted, model$limit)
+    to <- step_within(best, z, search$trusted, model$limit, bent$scale)
     line <- along(bent, to - z)
     moved <- max(abs(to - tried[nrow(tried), ]))
     tried <- rbind(tried, to)
@@ -82,7 +92,6 @@ propose <- function(search, context) {
   lowest <- which.min(misfit[-1]) + 1
   search$proposal <- stats::setNames(tried[lowest, ], names(z))
   search$predicted <- misfit[1] - misfit[lowest]
-  if (is_futile(search, context)) search$status <- "futile"
   if (search$step >= search$steps) search$status <- "steps"
   # What the slopes promise, or the bend leaves of it unless the trusted distance does.
   open <- min(search$promised, if (is.infinite(search$trusted)) search$predicted)
@@ -93,17 +102,20 @@ propose <- function(search, context) {
 # Minus the log posterior density of runs: at first as if all of the error were white noise of the stated size, so that
 # a search goes wherever the simulation comes nearest to the record; then by draws of error and discrepancy.
 misfit_of <- function(search, outputs, z, context) {
-  model <- search$model
-  if (search$weighted) return(-values_of(model, outputs, z, search$history, search$moves, context))
+  if (search$weighted) -values_of(search$model, outputs, z, search$history, search$moves, context)
+  else squared_misfit(search$model, outputs, z)
+}
+
+squared_misfit <- function(model, outputs = model$runs$outputs, z = model$runs$z) {
   misfit <- 0.5 * colSums(((outputs - model$target) / model$noise)^2) +
     0.5 * rowSums(z[, !model$flat, drop = FALSE]^2)
   ifelse(is.finite(misfit), misfit, Inf)
 }
 
+nats_of <- function(search, misfit) if (search$weighted) 1 else squared_nats(search$model, misfit)
+
 # White noise of the stated size makes too many nats of a misfit that is larger: what counts as one.
-nats_of <- function(search, misfit) {
-  if (search$weighted) 1 else max(1, 2 * misfit / length(search$model$target))
-}
+squared_nats <- function(model, misfit) max(1, 2 * misfit / length(model$target))
 
 # The least squares of a line through z: precision, optimum `mean`, and what it promises to gain.
 squares_of_line <- function(search, z, line, context) {
@@ -125,13 +137,14 @@ squares_of_line <- function(search, z, line, context) {
 }
 
 # Its optimum no farther than `trusted` from z, by as much damping as that takes.
-step_within <- function(squares, z, trusted, limit) {
+step_within <- function(squares, z, trusted, limit, scale) {
   damped <- function(damping) {
+    damping <- damping * scale^2
     precision <- squares$precision + diag(damping, length(z))
     target <- solve(precision, squares$precision %*% squares$mean + damping * z)[, 1]
     within_limits(target, precision, limit)
   }
-  is_near <- function(to) sum((to - z)^2) <= trusted^2
+  is_near <- function(to) sum((scale * (to - z))^2) <= trusted^2
   to <- damped(0)
   if (is_near(to)) return(to)
   ends <- log10(max(diag(squares$precision))) + c(-12, 6)
@@ -142,13 +155,10 @@ step_within <- function(squares, z, trusted, limit) {
 }
 
 # Whether the evidence could not exceed that of the run without the mechanism by much, if all went as the tangent says.
-# It is asked where a search has moved.
 is_futile <- function(search, context) {
-  if (is.null(search$off) || search$failed > 0) return(FALSE)
-  if (!search$weighted) search <- look(search, context)
+  if (is.null(search$off)) return(FALSE)
   value <- values_at(search$model, c(search$at, search$off), search$history, search$moves, context)
-  promised <- if (search$weighted) search$promised else promised_by(search)
-  isTRUE(value[1] + promised - value[2] < rules$futile_gain)
+  isTRUE(value[1] + promised_by(search) - value[2] < rules$futile_gain)
 }
 
 accept <- function(search, made, context) {
@@ -162,7 +172,7 @@ accept <- function(search, made, context) {
   misfit <- misfit_of(search, runs$outputs[, both], runs$z[both, , drop = FALSE], context)
   gain <- misfit[1] - misfit[2]
   nats <- nats_of(search, min(misfit))
-  length <- sqrt(sum((runs$z[made, ] - runs$z[search$at, ])^2))
+  length <- sqrt(sum((way_scale(search$reference) * (runs$z[made, ] - runs$z[search$at, ]))^2))
   if (gain > max(0, search$predicted * rules$good_step)) {
     search$trusted <- max(search$trusted, rules$trust_changes * length)
   } else if (!(gain > max(0, search$predicted * rules$poor_step))) {
@@ -245,27 +255,37 @@ difference_side <- function(z) ifelse(z > 1, -1, 1)
 # turns over a way L, run i fits to within c |s_i|^3 / L. c cancels.
 bent_line <- function(model, at, reference) {
   z <- model$runs$z[at, ]
-  ways <- sweep(model$runs$z, 2, z)
+  scale <- way_scale(reference)
+  ways <- sweep(sweep(model$runs$z, 2, z), 2, scale, "*")
   squared <- rowSums(ways^2)
   near <- which(succeeded(model) & squared > 1e-8)
   near <- utils::head(near[order(squared[near])], rules$bent_runs * length(z))
-  bent <- list(output = model$runs$outputs[, at], slopes = reference$slopes,
-               d2 = 4 * (sum((z - reference$z)^2) + reference$stale^2), ways = ways[near, , drop = FALSE])
+  bent <- list(output = model$runs$outputs[, at], slopes = sweep(reference$slopes, 2, scale, "/"), scale = scale,
+               d2 = 4 * (sum((scale * (z - reference$z))^2) + reference$stale^2), ways = ways[near, , drop = FALSE])
   dot <- tcrossprod(bent$ways)
   of_way <- squared[near]  # rows and columns in units of |s|^2: near and far runs have one size
   covariance <- (bent$d2 * dot + dot^2) / outer(of_way, of_way)
   diag(covariance) <- diag(covariance) * (1 + 1e-8) + of_way / rules$bend_length^2
-  missed <- model$runs$outputs[, near, drop = FALSE] - bent$output - tcrossprod(reference$slopes, bent$ways)
+  missed <- model$runs$outputs[, near, drop = FALSE] - bent$output - tcrossprod(bent$slopes, bent$ways)
   bent$weights <- missed
   if (length(near)) bent$weights <- t(solve(covariance, t(missed) / of_way) / of_way)
   bent
 }
 
+# A way counts as long as the simulator moves along it, beside the parameter that moves it most (More 1978).
+way_scale <- function(reference) {
+  moves <- sqrt(colSums(reference$slopes^2))
+  if (all(moves == 0)) moves[] <- 1
+  unname(pmax(moves / max(moves), rules$least_scale))
+}
+
 # Its output a way from the run, and its slopes there.
 along <- function(bent, way) {
+  way <- bent$scale * way
   dot <- (bent$ways %*% way)[, 1]
+  slopes <- bent$slopes + bent$weights %*% ((bent$d2 + 2 * dot) * bent$ways)
   list(output = bent$output + (bent$slopes %*% way + bent$weights %*% (bent$d2 * dot + dot^2))[, 1],
-       slopes = bent$slopes + bent$weights %*% ((bent$d2 + 2 * dot) * bent$ways))
+       slopes = sweep(slopes, 2, bent$scale, "*"))
 }
 
 secant_slopes <- function(model, at, reference) {
@@ -290,19 +310,20 @@ search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4
                    importance_draws = 300, ess_drop = 0.3)
 
 # list(mean, covariance, history, moves) of the parameters under the tangent of run `at`: with draws of error and
-# discrepancy of each record, which keeps out of `moves`, the slopes.
-tangent_at <- function(model, at, slopes, context) {
+# discrepancy of each record, which keeps out of `moves`.
+tangent_at <- function(model, at, slopes, moves, context) {
   engine <- engine_context(context$seed, context$threads)
   z <- model$runs$z[at, ]
   each <- Map(function(record, own, rows) {
     ais <- fill_ais_control(utils::modifyList(record$control$ais, search_ais))
     steep <- unname(slopes[rows, own, drop = FALSE])
-    call_engine(tangent_posterior_(c(record$data, list(moves = steep)), record$priors, z[own],
+    out <- unname(moves[rows, own, drop = FALSE])
+    call_engine(tangent_posterior_(c(record$data, list(moves = out)), record$priors, z[own],
                                    model$runs$outputs[rows, at], steep, rules$search_draws, ais, engine))
   }, model$records, model$own, model$rows)
   joint <- joint_tangent(each, model$own, length(z))
   list(mean = joint$mean, covariance = joint$covariance,
-       history = lapply(unname(each), `[`, c("setting", "variance", "t")), moves = unname(slopes))
+       history = lapply(unname(each), `[`, c("setting", "variance", "t")), moves = unname(moves))
 }
 
 # list(mean, covariance) under a line through z, for draws of error and discrepancy that are known.

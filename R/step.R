@@ -18,7 +18,7 @@ next_step <- function(state, context) {
                     words = "no mechanism that is left can be applied on top of what was adopted")
   }
   if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
-  state$present <- as_present(state$present, context)
+  state$present <- as_present(state$present, state$catalogue[left], context)
   trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
   trials <- race(state$present, trials, context)
   table <- trial_table(trials, state$present, left)
@@ -26,8 +26,6 @@ next_step <- function(state, context) {
     trials <- second_look(state$present, trials, context)
     table <- trial_table(trials, state$present, left)
   }
-  explained <- explained_factors(trials, state$present, state$catalogue, context)
-  table$explained <- unname(explained[table$mechanism])
   state$candidates <- rbind(state$candidates, table)
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
   best <- best_trial(table)
@@ -96,7 +94,10 @@ try_all <- function(state, left, context) {
 # A mechanism that cannot be computed is told as such, and the others go on.
 try_one <- function(state, name, simulators, bar, context) {
   present <- state$present
-  if (is_given(simulators)) return(given_trial(present, name, simulators, context))
+  if (is_given(simulators)) {
+    trial <- given_trial(present, name, simulators, context)
+    return(c(trial, taken = taken_away(trial, present, context)))
+  }
   tryCatch(try_mechanism(present, name, simulators, state$off[[name]], bar, context),
            amiss_error_numerical = function(e) {
     failed <- new_model(simulators, present$records, paste(present$name, "+", name), present$name, name)
@@ -177,8 +178,13 @@ why_not <- function(table, decisive, context) {
   highest <- seen[which.max(seen$log10_bf), ]
   if (raises_error(highest) && highest$log10_bf >= decisive) {
     return(list(id = "raises_error", words = sprintf(
-      "no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but raises it)",
+      "no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but does not lower it)",
       highest$mechanism, highest$log10_bf)))
+  }
+  if (is_refuted(highest) && highest$log10_bf >= decisive) {
+    return(list(id = "imitated", words = sprintf(
+      paste("no mechanism is decisive (%s has a log10 Bayes factor of %.1f, but one of %.1f beside an unknown response",
+            "to what drives it)"), highest$mechanism, highest$log10_bf, highest$beside_unknown)))
   }
   if (!nrow(best) || highest$log10_bf < decisive) best <- highest
   # As many digits as it takes to see that it is less than what is needed.

@@ -18,9 +18,13 @@ trial_table <- function(trials, present, left) {
 trial_row <- function(trial, present) {
   if (is.null(trial$fit)) return(empty_row(trial$mechanism, present, trial$level, trial$own_runs))
   factor <- bayes_factor(trial$fit, present$fit)
+  beside <- factor$log10_bf
+  shifted <- c("log10_bf", "lower95", "upper95")
+  if (trial$fit$trust$trusted) factor[shifted] <- factor[shifted] + (trial$taken %||% 0)
+  factor$word <- evidence_word(factor$lower95, factor$upper95)
   if (!is_verified(trial)) factor <- as_tried(factor, trial)
   factor <- readable(factor)
-  row <- data.frame(from = present$name, mechanism = trial$mechanism, factor,
+  row <- data.frame(from = present$name, mechanism = trial$mechanism, factor, beside_unknown = beside,
                     error_ratio = error_ratio(trial$fit, present$fit), trusted = trial$fit$trust$trusted,
                     judged_by = if (is_verified(trial)) "runs" else "trial", runs = trial$own_runs %||% 0)
   row$parameters <- list(added_parameters(trial$fit, present$fit))
@@ -29,7 +33,8 @@ trial_row <- function(trial, present) {
 
 empty_row <- function(mechanism, present, why, runs = NULL) {
   row <- data.frame(from = present$name, mechanism = mechanism, log10_bf = NA_real_, lower95 = NA_real_,
-                    upper95 = NA_real_, word = NA_character_, error_ratio = NA_real_, trusted = FALSE,
+                    upper95 = NA_real_, word = NA_character_, beside_unknown = NA_real_, error_ratio = NA_real_,
+                    trusted = FALSE,
                     judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
   row$parameters <- list(added_parameters(present$fit, present$fit))
   row
@@ -68,7 +73,11 @@ error_ratio <- function(fit, current) {
   sqrt(mean(left_by_simulation(fit)^2) / mean(left_by_simulation(current)^2))
 }
 
-raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > rules$risen_error
+# Beside an unknown response to its conditions a mechanism that is the cause may gain little, as the response imitates
+# it; it must not lose decisively.
+is_refuted <- function(table) !is.na(table$beside_unknown) & speaks_against(table$beside_unknown)
+
+raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > rules$fallen_error
 
 # Estimates of the parameters that a mechanism brought with it.
 added_parameters <- function(fit, parent) {
@@ -79,7 +88,7 @@ added_parameters <- function(fit, parent) {
 # The row of highest evidence among the mechanisms that may be adopted: they were verified, and the
 # simulation's own error does not rise with them. No row if there is none.
 best_trial <- function(table) {
-  open <- table[table$judged_by == "runs" & !raises_error(table), ]
+  open <- table[table$judged_by == "runs" & !raises_error(table) & !is_refuted(table), ]
   open[which.max(open$log10_bf), ]
 }
 

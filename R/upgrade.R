@@ -47,9 +47,9 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' @return An object of class `amiss_upgrade`: the `models` adopted (first the base model), all `candidates`
 #'   tried (a row each: the model that it extends, `from`, the `mechanism`, `log10_bf` with `lower95` and
 #'   `upper95` and its `word`, its `probability`, the simulation's error in calibration over that before,
-#'   `error_ratio`, `trusted`, `judged_by`, its `runs`, the estimates of its `parameters`, and `explained`: the log10
-#'   Bayes factor if neither model has an unknown response to the conditions of the mechanism, `NA` if it is not
-#'   trusted), the
+#'   `error_ratio`, `trusted`, `judged_by`, its `runs`, and the estimates of its `parameters`). `log10_bf` is the log10
+#'   Bayes factor if neither model has an unknown response to the conditions of the mechanism; `beside_unknown` is that
+#'   with the response in both, which imitates the mechanism. Of what is not trusted both are the second. Besides: the
 #'   `named_cause`, the `gain`, why the loop stopped (`stopped_because`, in a word `stopped_id`) and how many
 #'   runs of the simulator it took (`runs_total`). Each model that adopted a mechanism has a `verdict`:
 #'   `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks against it; or
@@ -126,7 +126,7 @@ finish_upgrade <- function(state, context) {
 inert_parameters <- function(state) {
   last <- state$present
   gone <- setdiff(state$base, names(last$parameters))
-  idle <- if (isTRUE(last$tangent$exact)) names(last$parameters)[colSums(last$tangent$slopes^2) == 0]
+  idle <- if (isTRUE(last$least$exact)) names(last$parameters)[colSums(last$least$slopes^2) == 0]
   c(gone, intersect(idle, state$base))
 }
 

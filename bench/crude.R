@@ -24,7 +24,7 @@ one_house <- function(house, states) {
           paste0(vapply(models[-1], function(m) sprintf(" -> %s (%s) %s", m$mechanism, m$verdict, rmse(m)), ""),
                  collapse = ""))
   first <- upgrade$candidates[upgrade$candidates$from == models[[1]]$name, ]
-  print(first[order(-first$explained), c("mechanism", "log10_bf", "explained", "error_ratio", "trusted", "runs")],
+  print(first[order(-first$log10_bf), c("mechanism", "log10_bf", "beside_unknown", "error_ratio", "trusted", "runs")],
         digits = 3, row.names = FALSE)
   adopted <- vapply(models[-1], `[[`, "", "mechanism")
   data.frame(house, states, runs_total = upgrade$runs_total, adopted = toString(adopted),

@@ -8,20 +8,24 @@ test_that("it is the factor, and what the present model loses without the respon
     table <- model$attribution$table
     table$log10_bf_dropped[table$boundary == "Gv"]
   }
-  by_attribution <- row$log10_bf + lost(upgrade$models[[1]]) - lost(upgrade$models[[2]])
+  by_attribution <- row$beside_unknown + lost(upgrade$models[[1]]) - lost(upgrade$models[[2]])
   # The attribution samples the same evidences with other random numbers: a tenth of a decade each.
-  expect_equal(row$explained, by_attribution, tolerance = 0.4 / abs(by_attribution))
+  expect_equal(row$log10_bf, by_attribution, tolerance = 0.4 / abs(by_attribution))
   # The sun is the cause: an unknown response to it competes, and takes most of the factor.
-  expect_gt(row$explained, row$log10_bf)
+  expect_gt(row$log10_bf, row$beside_unknown)
 })
 
-test_that("it is not known of a mechanism without conditions, or whose numbers are not trusted", {
-  upgrade <- small_upgrade()
-  trial <- function(trusted) list(mechanism = "sun", fit = list(trust = list(trusted = trusted)))
-  expect_false(amiss:::is_explanation(trial(TRUE), character()))
-  expect_false(amiss:::is_explanation(trial(FALSE), "Gv"))
-  expect_false(amiss:::is_explanation(list(mechanism = "sun"), "Gv"))
-  none <- amiss:::explained_factors(list(sun = trial(FALSE)), NULL, upgrade$catalogue, NULL)
-  expect_identical(none, c(sun = NA_real_))
-  expect_length(amiss:::explained_factors(list(), NULL, upgrade$catalogue, NULL), 0)
+test_that("a mechanism without conditions takes nothing away", {
+  present <- list(conditions = list(sun = character()), lost = list())
+  expect_identical(amiss:::taken_away(list(mechanism = "sun"), present, NULL), 0)
+})
+
+test_that("what numbers that are not trusted take away is not told", {
+  present <- small_upgrade()$models[[1]]
+  trial <- c(small_upgrade()$models[[2]], list(level = "verified", taken = 5))
+  row <- amiss:::trial_row(trial, present)
+  expect_equal(row$log10_bf, row$beside_unknown + 5)
+  trial$fit$trust$trusted <- FALSE
+  row <- amiss:::trial_row(trial, present)
+  expect_equal(row$log10_bf, row$beside_unknown)
 })

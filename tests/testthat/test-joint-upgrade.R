@@ -62,7 +62,7 @@ test_that("what both records lack is named, with one parameter for both", {
   expect_true(interval[1] < 0.01 && interval[2] > 0.01)
   expect_named(coef(upgrade), c("gain", "base a", "sun", "base b"))
   expect_s3_class(model$fit, "amiss_joint")
-  expect_equal(upgrade$candidates$log10_bf[1], bayes_factor(model$fit, upgrade$models[[1]]$fit)$log10_bf)
+  expect_equal(upgrade$candidates$beside_unknown[1], bayes_factor(model$fit, upgrade$models[[1]]$fit)$log10_bf)
   expect_identical(upgrade$candidates$judged_by, c("runs", "trial", "trial"))
   expect_gt(upgrade$runs_total, 0)
 })

@@ -246,24 +246,27 @@ test_that("a mechanism with which the simulation's own error rises is not adopte
   upgrade$candidates$error_ratio <- 1.9
   told <- summary(upgrade)
   expect_match(paste(told$sure, collapse = " "),
-               "not adopted, because with sun the simulation's own error .* 1.9 times")
+               "not adopted, because with sun the simulation's own error .* does not fall \\(1.9 times")
   expect_match(told$candidates[["error in calibration"]], "1.9 times", all = FALSE)
-  expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title, "the best raises the error")
+  expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title, "the best does not lower the error")
 })
 
 test_that("why nothing was adopted names the best, also where the error rises with it", {
   present <- list(attribution = small_upgrade()$models[[2]]$attribution)
   context <- amiss:::new_context(1, 1, list(decisive = 2))
   table <- data.frame(mechanism = c("sun", "lag"), log10_bf = c(1.2, 0.3), lower95 = c(0.1, -1), upper95 = 2,
-                      judged_by = "runs", error_ratio = c(1.4, 1))
+                      judged_by = "runs", error_ratio = c(1.4, 0.9), beside_unknown = 1)
   told <- function(...) amiss:::no_winner(utils::modifyList(table, list(...)), present, context)
   expect_identical(told()$id, "not_decisive")
   expect_match(told()$words, "no mechanism is decisive \\(best: sun, log10 Bayes factor 1.2; 2 or more")
   risen <- told(log10_bf = c(3, 0.3))
   expect_identical(risen$id, "raises_error")
-  expect_match(risen$words, "lowers the error decisively \\(sun has a log10 Bayes factor of 3.0, but raises it")
+  expect_match(risen$words, "lowers the error decisively \\(sun has a log10 Bayes factor of 3.0, but does not lower it")
   expect_identical(told(log10_bf = c(3, 4), lower95 = c(1, -1))$id, "uncertain")
   expect_match(told(log10_bf = c(3, 4), lower95 = c(1, -1))$words, "too uncertain \\(best: lag")
+  imitated <- told(log10_bf = c(1, 4), beside_unknown = c(1, -5))
+  expect_identical(imitated$id, "imitated")
+  expect_match(imitated$words, "lag has a log10 Bayes factor of 4.0, but one of -5.0 beside an unknown response")
   expect_identical(told(log10_bf = c(NA_real_, NA_real_))$id, "none_computed")
   # Rounded it would look like enough.
   expect_match(told(log10_bf = c(1.96, 0.3))$words, "log10 Bayes factor 1.96;")
@@ -346,7 +349,7 @@ test_that("why the one of highest evidence was not adopted is told", {
   upgrade$candidates$error_ratio[other] <- 1.2
   told <- paste(summary(upgrade)$sure, collapse = " ")
   expect_match(told, paste("not adopted first, because with", upgrade$candidates$mechanism[other][1],
-                           "the simulation's own error in calibration is 1.2 times as large"))
-  upgrade$candidates$error_ratio[other] <- 1
+                           "the simulation's own error in calibration does not fall \\(1.2 times as large"))
+  upgrade$candidates$error_ratio[other] <- 0.9
   expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "not adopted first")
 })

@@ -72,7 +72,8 @@ test_that("a large error that answers to nothing makes the verdict unexplained",
 test_that("a discrepancy that reaches into what the parameters can do is told", {
   upgrade <- small_upgrade()
   expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "do not read their values")
-  upgrade$models[[2]]$fit$reach[] <- c(0.01, 0.01, 0.98)
+  upgrade$models[[2]]$fit$control$reach <- c(13, Inf)  # a grid of which the record prefers the free one
+  upgrade$models[[2]]$fit$reach <- c("13" = 0.02, "Inf" = 0.98)
   expect_match(summary(upgrade)$remains, "they may hide a part of it, so do not read their values as physical",
                all = FALSE)
 })

@@ -248,7 +248,7 @@ test_that("a report says what result.json says", {
     expect_identical(row[c(4, 5, 7, 8, 9, 10)],
                      c(signed(trial$log10_bf),
                        paste(signed(unlist(trial$interval)), collapse = " to "),
-                       if (is.null(trial$explained)) "" else signed(trial$explained),
+                       signed(trial$beside_unknown),
                        percent(trial$probability),
                        if (is.null(trial$error_ratio)) "" else paste(short(trial$error_ratio), "times"),
                        if (trial$judged_by == "runs") "verified"

@@ -26,7 +26,7 @@ test_that("a response of nothing says nothing: its factor is one", {
 
 test_that("the factor of a response lies near that of the mechanism, calibrated in full", {
   upgrade <- small_upgrade()
-  full <- upgrade$candidates$log10_bf[upgrade$candidates$mechanism == "sun"]
+  full <- upgrade$candidates$beside_unknown[upgrade$candidates$mechanism == "sun"]
   # The prior of the sun is uniform to 0.02, of standard deviation 0.0058.
   seen <- of_response(0.0058 * felt("Gv", 3), scales = 1)$log10_bf
   # A normal prior of that size about none and the uniform one differ at the truth, 0.006, by a

@@ -156,7 +156,7 @@ test_that("slopes that a reference knows exactly at its own point are not change
                      rbind(c(0, 0), c(0.5, 0), c(0.2, 0.4)))
   exact <- slopes_of_linear(model)
   reference <- list(z = model$runs$z[2, ], slopes = exact + 1, stale = 0)
-  expect_identical(amiss:::secant_slopes(model, 2, reference), reference$slopes)
+  expect_equal(amiss:::secant_slopes(model, 2, reference), reference$slopes, tolerance = 1e-14)
 })
 
 test_that("one run corrects slopes of which nothing else is known as Broyden's update does", {

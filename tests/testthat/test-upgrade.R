@@ -51,14 +51,14 @@ test_that("an adopted model has the evidence of its row, and one of a calibratio
   upgrade <- small_upgrade()
   fits <- lapply(upgrade$models, `[[`, "fit")
   row <- upgrade$candidates[upgrade$candidates$mechanism == "sun", ]
-  expect_equal(row$log10_bf, bayes_factor(fits[[2]], fits[[1]])$log10_bf)
+  expect_equal(row$beside_unknown, bayes_factor(fits[[2]], fits[[1]])$log10_bf)
   alone <- lapply(fits, function(fit) {
     calibrate_refined(simulate_design(model_of(fit), upgrade$measurements, 8, seed = 5),
                       upgrade$measurements, control = list(calibration = quick_ais), seed = 5)
   })
   apart <- bayes_factor(alone[[2]], alone[[1]])
   # Two samplers, of five standard errors each at most, and a tenth of a decade for the emulators.
-  expect_lt(abs(apart$log10_bf - row$log10_bf),
+  expect_lt(abs(apart$log10_bf - row$beside_unknown),
             1.25 * (apart$upper95 - apart$lower95 + row$upper95 - row$lower95) + 0.1)
 })
 
@@ -157,7 +157,7 @@ present_model <- made_once(function() {
   control <- amiss:::fill_upgrade_control(quick_control, m)
   context <- amiss:::new_context(1, 1, control)
   base <- amiss:::base_model(amiss:::upgrade_start(linear_simulator(), m), NULL, context)
-  list(model = amiss:::as_present(base, context), context = context)
+  list(model = amiss:::as_present(base, catalogue(), context), context = context)
 })
 
 trial_of <- function(mechanism, off = NULL) {
@@ -315,7 +315,7 @@ test_that("mechanisms are tried in the order of what the error responds to", {
 
 # `error`: the simulation's, and that of its only run; `level`: what its runs have shown.
 model_by_hand <- function(log10_evidence, se = 0.05, level = "verified", passed = TRUE,
-                          effective = 1, ratio = 0.1, error = 1, name = "a") {
+                          effective = 1, ratio = 0.1, error = 0.95, name = "a") {
   check <- list(mean = 1:3 - error, passed = passed, effective = effective, ratio = ratio)
   fit <- structure(list(measurements = list(y = 1:3), rows = 1:3, check = check,
                         log_evidence = log10_evidence * log(10), standard_error = se * log(10),
@@ -329,7 +329,7 @@ model_by_hand <- function(log10_evidence, se = 0.05, level = "verified", passed 
 tried_by_hand <- function(log10_evidence, ...) model_by_hand(log10_evidence, level = "tried", ...)
 
 test_that("a trial's evidence may be off by what its runs leave open, a verified one's is not", {
-  present <- model_by_hand(0, se = 0)
+  present <- model_by_hand(0, se = 0, error = 1)
   bound <- function(model) amiss:::upper_bound(model, present)
   expect_equal(bound(model_by_hand(3, se = 0.1)), 3 + 3 * 0.1)
   expect_equal(bound(tried_by_hand(3, se = 0)), 3 + rules$trial_margin)
@@ -339,6 +339,8 @@ test_that("a trial's evidence may be off by what its runs leave open, a verified
   # A run has half the error: what refutes the emulator cannot rule that out.
   promising <- tried_by_hand(-40, se = 0, passed = FALSE, ratio = 2, error = 0.5)
   expect_equal(bound(promising), Inf)
+  # A leader that is as near to the record can.
+  expect_lt(amiss:::upper_bound(promising, present, leader = model_by_hand(8, error = 0.5)), -20)
   unchecked <- tried_by_hand(3, se = 0)
   unchecked$fit$check <- NULL
   expect_equal(bound(unchecked), 3 + rules$trial_doubt * 2)
@@ -346,7 +348,7 @@ test_that("a trial's evidence may be off by what its runs leave open, a verified
 })
 
 test_that("of trials that can still win the one of highest evidence is verified", {
-  present <- model_by_hand(0, se = 0)
+  present <- model_by_hand(0, se = 0, error = 1)
   context <- amiss:::new_context(1, 1, list(decisive = 2))
   following <- function(...) {
     trials <- list(...)
@@ -372,7 +374,7 @@ test_that("of trials that can still win the one of highest evidence is verified"
 })
 
 test_that("a trial goes on while its runs leave open whether it can win", {
-  present <- model_by_hand(0, se = 0)
+  present <- model_by_hand(0, se = 0, error = 1)
   clear <- function(..., bar = 2) amiss:::is_clear(tried_by_hand(...), present, bar)
   expect_true(clear(3))
   expect_false(clear(3, effective = 0.5))
@@ -382,7 +384,7 @@ test_that("a trial goes on while its runs leave open whether it can win", {
 })
 
 test_that("the odds are of what was computed; what was not has no part in them", {
-  present <- model_by_hand(0, se = 0)
+  present <- model_by_hand(0, se = 0, error = 1)
   present$fit$emulator <- list(parameters = list())
   present$fit$values <- matrix(0, 1, 0)
   trials <- list(a = model_by_hand(1), b = tried_by_hand(-1, name = "b"))
@@ -402,17 +404,18 @@ test_that("the odds are of what was computed; what was not has no part in them",
   expect_equal(table$upper95 - table$lower95, c(0.2, 0.2 + 2 * rules$trial_margin, NA, NA))
 })
 
-test_that("what is adopted was verified, raises no error, and leads by a decisive evidence", {
-  row <- function(log10_bf = 3, lower95 = 2, judged_by = "runs", error_ratio = 0.5) {
-    data.frame(mechanism = "a", log10_bf, lower95, judged_by, error_ratio)
+test_that("what is adopted was verified, lowers the error, and leads by a decisive evidence", {
+  row <- function(log10_bf = 3, lower95 = 2, judged_by = "runs", error_ratio = 0.5, beside_unknown = -1) {
+    data.frame(mechanism = "a", log10_bf, lower95, judged_by, error_ratio, beside_unknown)
   }
   adopted <- function(...) amiss:::may_be_adopted(amiss:::best_trial(row(...)), list(decisive = 2))
   expect_true(adopted())
   expect_false(adopted(judged_by = "trial"))
   expect_false(adopted(log10_bf = 1.9))
   expect_false(adopted(lower95 = -0.1))
-  expect_false(adopted(error_ratio = 1.03))
-  expect_true(adopted(error_ratio = 1.01))
+  expect_false(adopted(error_ratio = 1))
+  expect_true(adopted(error_ratio = 0.98))
+  expect_false(adopted(beside_unknown = -4))
   expect_false(adopted(log10_bf = NA))
   both <- rbind(row(5, error_ratio = 1.5), row(3))
   expect_equal(amiss:::best_trial(both)$log10_bf, 3)
