@@ -157,8 +157,6 @@ log10_factor <- function(model, present) beside_unknown(model, present) + (model
 # The same with such a response in both.
 beside_unknown <- function(model, present) (model$fit$log_evidence - present$fit$log_evidence) / log(10)
 
-speaks_against <- function(factor) factor < rules$against
-
 # What the log10 Bayes factor of a model may be at most, by its level; `leader` is the best model that is known.
 upper_bound <- function(model, present, leader = present) {
   if (is_promising(model, leader)) return(Inf)

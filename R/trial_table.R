@@ -77,6 +77,8 @@ error_ratio <- function(fit, current) {
 # it; it must not lose decisively.
 is_refuted <- function(table) !is.na(table$beside_unknown) & speaks_against(table$beside_unknown)
 
+speaks_against <- function(factor) factor < rules$against
+
 raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > rules$fallen_error
 
 # Estimates of the parameters that a mechanism brought with it.
