@@ -98,18 +98,23 @@ without_failing <- function(model, fits) {
   })
 }
 
-# The run of least squares, of all runs that there are, and the slopes there, by differences: what the discrepancy keeps
-# out of hangs on them.
-with_exact_least <- function(model, context) {
+# The run of least squares, of all runs that there are: if one is nearer to the record, the search goes on from it.
+with_least <- function(model, context) {
   misfit <- squared_misfit(model)
   nearest <- which.min(misfit)
-  if (misfit[model$least$at] - misfit[nearest] > rules$search_gain * squared_nats(model, misfit[nearest])) {
-    search <- begin_search(model, nearest, model$least$slopes, 0)
-    search$reference <- least_reference(model)
-    search <- descend(search, context)
-    model <- search$model
-    model$least <- search[c("at", "slopes")]
-  }
+  enough <- rules$search_gain * squared_nats(model, misfit[nearest])
+  if (misfit[model$least$at] - misfit[nearest] <= enough) return(model)
+  search <- begin_search(model, nearest, model$least$slopes, 0)
+  search$reference <- least_reference(model)
+  search <- descend(search, context)
+  model <- search$model
+  model$least <- search[c("at", "slopes")]
+  model
+}
+
+# The slopes there by differences: what the discrepancy keeps out of hangs on them.
+with_exact_least <- function(model, context) {
+  model <- with_least(model, context)
   if (isTRUE(model$least$exact)) return(model)
   found <- difference_slopes(model, model$least$at, context)
   model <- found$model

@@ -24,7 +24,7 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
     return(utils::modifyList(model, list(level = if (is_spent(context)) "missed" else "untried")))
   }
   search <- search_trial(looked, context)
-  model <- with_modes(search$model, list(search), context$seed)
+  model <- with_least(with_modes(search$model, list(search), context$seed), context)
   model$off <- looked$off
   model$status <- search$status
   model <- tried_model(model, present, bar, context)
@@ -202,8 +202,9 @@ next_to_verify <- function(trials, present, context) {
   if (length(near)) near[[which.min(vapply(near, least_error, 0))]]$mechanism
 }
 
+# Further runs of a model that runs have confirmed change neither.
 cannot_be_adopted <- function(model, present) {
-  is_verified(model) && (error_ratio(model$fit, present$fit) > rules$fallen_error ||
+  (is_verified(model) || is_confirmed(model)) && (error_ratio(model$fit, present$fit) > rules$fallen_error ||
                            speaks_against(beside_unknown(model, present)))
 }
 
