@@ -36,9 +36,8 @@ calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL
 #'   `error_draws` (posterior draws kept for the discrepancy over time), `check` (runs of the simulator at posterior
 #'   draws, 40; 0 for none), `exact` (runs that correct the evidence; default those of the check; 0 for none), and
 #'   `ais`, options of [ais()] (here `pilot_chains` 400, `groups` 8, `max_groups` 16, `max_sweeps` 12, `precision` 0.2,
-#'   with gradients). Defaults of the
-#'   times: `time_constants` of 0, 2, 4, 8, ... 64 steps of the record, up to a sixth of the calibration rows: give
-#'   longer ones where the system is slower; `error_times` of 2 and 8 steps.
+#'   with gradients). Defaults of the times: `time_constants` of 0, 2, 4, 8, ... 64 steps of the record, up to a sixth
+#'   of the calibration rows: give longer ones where the system is slower; `error_times` of 2 and 8 steps.
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
 #' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the parameters;

@@ -29,7 +29,8 @@ describe_gain <- function(gain) {
   if (length(gain) == 0) return("No gain: the model was not extended.")
   bayes_factor <- numbers(gain$log10_bf)
   coverage <- numbers(gain$coverage95_validation)
-  c(if (length(bayes_factor) == 1 && !is.na(bayes_factor)) paste("Extended model, beside unknown responses:", odds(bayes_factor)),
+  known <- length(bayes_factor) == 1 && !is.na(bayes_factor)
+  c(if (known) paste("Extended model, beside unknown responses:", odds(bayes_factor)),
     from_to("Error (RMSE) on the calibration data", numbers(gain$rmse_calibration)),
     from_to("Error (RMSE) on data held out", numbers(gain$rmse_validation)),
     if (length(coverage) %in% 1:2 && !anyNA(coverage)) {
