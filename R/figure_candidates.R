@@ -21,9 +21,11 @@ figure_candidates <- function(upgrade) {
   table$panel <- factor(ifelse(table$step == 1, "added to the base model", paste("added after", adopted[table$step])))
   table$panel <- factor(table$panel, unique(table$panel[order(table$step)]))
   table$row <- paste(formatC(rank(table$log10_bf), width = 4, flag = "0"), table$mechanism)
-  states <- c("adopted", "tried", "tried, estimate rough")
-  table$state <- factor(ifelse(table$adopted, states[1], ifelse(table$trusted, states[2], states[3])), states)
-  of_state <- function(...) stats::setNames(c(...), states)
+  refused <- table$log10_bf >= decisive & table$trusted & !table$adopted & (raises_error(table) | is_refuted(table))
+  states <- c("adopted", "tried", "tried, estimate rough", if (any(refused)) "error stays: refused")
+  table$state <- ifelse(table$adopted, states[1], ifelse(table$trusted, states[2], states[3]))
+  table$state <- factor(ifelse(refused, "error stays: refused", table$state), states)
+  of_state <- function(...) stats::setNames(c(...)[seq_along(states)], states)
   grey <- "grey45"
   axis <- signed_log_axis(unlist(table[c("lower95", "upper95")]), decisive)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$log10_bf, .data$row, colour = .data$state, shape = .data$state)) +
@@ -32,11 +34,11 @@ figure_candidates <- function(upgrade) {
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), table,
                             linewidth = 1.1, show.legend = FALSE) +
     ggplot2::geom_point(ggplot2::aes(size = .data$state), fill = "white", stroke = 1.2) +
-    ggplot2::scale_size_manual(values = of_state(6, 3.4, 3.4), limits = states) +
+    ggplot2::scale_size_manual(values = of_state(6, 3.4, 3.4, 3.4), limits = states) +
     ggplot2::geom_text(ggplot2::aes(x = Inf, label = paste0("  ", signed(.data$log10_bf))), hjust = 0, size = 4.4,
                        show.legend = FALSE) +
-    ggplot2::scale_colour_manual(values = of_state(stage_colours[["after"]], grey, grey), limits = states) +
-    ggplot2::scale_shape_manual(values = of_state(18, 19, 21), limits = states) +
+    ggplot2::scale_colour_manual(values = of_state(stage_colours[["after"]], grey, grey, grey), limits = states) +
+    ggplot2::scale_shape_manual(values = of_state(18, 19, 21, 4), limits = states) +
     ggplot2::scale_y_discrete(labels = function(x) wrap_labels(0.36)(sub("^[0-9.]+ ", "", x))) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y", labeller = wrap_strips()) +
     axis +
