@@ -173,6 +173,7 @@ sure_sentences <- function(upgrade) {
   if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
     if (raises_error(best)) needed <- raised_sentence(best)
+    else if (is_refuted(best)) needed <- refuted_sentence(best)
     else if (is_unverified(best, upgrade)) needed <- "It was not adopted, because no runs were left to verify it."
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
              trust_sentence(upgrade, best)))
@@ -191,6 +192,11 @@ raised_sentence <- function(row, when = "") {
   sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration does not fall",
                 "(%s times as large): what is gained, the discrepancy gains."), when, row$mechanism,
           short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
+}
+
+refuted_sentence <- function(row) {
+  sprintf(paste("It was not adopted, because an unknown response to what drives it does better: beside that, its log10",
+                "Bayes factor is %s."), signed(row$beside_unknown))
 }
 
 unjudged_sentence <- function(fit) {

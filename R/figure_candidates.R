@@ -5,6 +5,8 @@ candidates_title <- function(table, decisive) {
     best <- table[which.max(table$log10_bf), ]
     return(if (best$log10_bf >= decisive && raises_error(best))
              "No mechanism was adopted: the best does not lower the error"
+           else if (best$log10_bf >= decisive && is_refuted(best))
+             "No mechanism was adopted: an unknown response does better than the best"
            else if (best$log10_bf >= decisive && best$judged_by == "trial")
              "No mechanism was adopted: no runs were left to verify the best"
            else if (best$log10_bf >= decisive) "No mechanism was adopted: the interval of the best reaches to zero"
@@ -22,9 +24,9 @@ figure_candidates <- function(upgrade) {
   table$panel <- factor(table$panel, unique(table$panel[order(table$step)]))
   table$row <- paste(formatC(rank(table$log10_bf), width = 4, flag = "0"), table$mechanism)
   refused <- table$log10_bf >= decisive & table$trusted & !table$adopted & (raises_error(table) | is_refuted(table))
-  states <- c("adopted", "tried", "tried, estimate rough", if (any(refused)) "error stays: refused")
+  states <- c("adopted", "tried", "tried, estimate rough", if (any(refused)) "refused")
   table$state <- ifelse(table$adopted, states[1], ifelse(table$trusted, states[2], states[3]))
-  table$state <- factor(ifelse(refused, "error stays: refused", table$state), states)
+  table$state <- factor(ifelse(refused, "refused", table$state), states)
   of_state <- function(...) stats::setNames(c(...)[seq_along(states)], states)
   grey <- "grey45"
   axis <- signed_log_axis(unlist(table[c("lower95", "upper95")]), decisive)

@@ -34,8 +34,7 @@ trial_row <- function(trial, present) {
 empty_row <- function(mechanism, present, why, runs = NULL) {
   row <- data.frame(from = present$name, mechanism = mechanism, log10_bf = NA_real_, lower95 = NA_real_,
                     upper95 = NA_real_, word = NA_character_, beside_unknown = NA_real_, error_ratio = NA_real_,
-                    trusted = FALSE,
-                    judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
+                    trusted = FALSE, judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
   row$parameters <- list(added_parameters(present$fit, present$fit))
   row
 }
@@ -87,8 +86,8 @@ added_parameters <- function(fit, parent) {
   table[!table$name %in% names(drawn_parameters(parent)), ]
 }
 
-# The row of highest evidence among the mechanisms that may be adopted: they were verified, and the
-# simulation's own error does not rise with them. No row if there is none.
+# The row of highest evidence among the mechanisms that may be adopted: they were verified, the simulation's own error
+# falls with them, and they do not lose to an unknown response. No row if there is none.
 best_trial <- function(table) {
   open <- table[table$judged_by == "runs" & !raises_error(table) & !is_refuted(table), ]
   open[which.max(open$log10_bf), ]

@@ -1,6 +1,6 @@
 #!/usr/bin/env Rscript
-# Crude base models of the two Twin Houses (crude/house.R): what is adopted and said, and how near the calibrated
-# simulation is to the record. The truth: in O5 the sun is missing, in N2 a second state and the kitchen.
+# Crude base models of the two Twin Houses (crude/house.R): what is adopted and said, and how near the simulation at
+# its best is to the record. The truth: in O5 the sun is missing, in N2 a second state and the kitchen.
 # A row for each house and number of states, and one for each mechanism of the first step.
 # Usage: Rscript bench/crude.R [--houses O5,N2] [--states 1,2] [--seed 1] [--threads 2] [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))

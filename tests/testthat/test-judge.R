@@ -249,6 +249,13 @@ test_that("a mechanism with which the simulation's own error rises is not adopte
                "not adopted, because with sun the simulation's own error .* does not fall \\(1.9 times")
   expect_match(told$candidates[["error in calibration"]], "1.9 times", all = FALSE)
   expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title, "the best does not lower the error")
+  # One that loses to an unknown response is refused for that.
+  upgrade$candidates[c("error_ratio", "beside_unknown")] <- list(0.5, -5)
+  expect_match(paste(summary(upgrade)$sure, collapse = " "),
+               "not adopted, because an unknown response .* its log10 Bayes factor is -5.0")
+  figure <- ggplot2::autoplot(upgrade, "candidates")
+  expect_match(figure$labels$title, "an unknown response does better than the best")
+  expect_identical(as.character(figure$data$state[figure$data$mechanism == "sun"]), "refused")
 })
 
 test_that("why nothing was adopted names the best, also where the error rises with it", {
