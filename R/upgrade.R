@@ -52,14 +52,14 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   with the response in both, which imitates the mechanism. If a trial is not trusted, both hold the second factor.
 #'   The result also has the `named_cause`, the `gain`, why the loop stopped (`stopped_because`, in a word
 #'   `stopped_id`) and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
-#'   has a `verdict`: `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks against it; or
-#'   `"stand-in"`, if held-out data do not improve (`held_out_gain`, with its standard error). `inert` names
-#'   parameters of the base model that the last model no longer uses. `steps` has, for each record, what shorter
-#'   steps of the simulator change: the RMS (`error`, in the target's unit) of what the parameters cannot take up, and
-#'   by how many of its standard deviations each would move (`moved`); `NULL` if that is not
-#'   known ([function_simulator()]). `confounded_with` names parameters that are correlated beyond 0.4 with those
-#'   that it brought. For several records `fit` is what [calibrate_jointly()] gives, and `records` of a model
-#'   has `prediction`, `scores` and `held_out_gain` of each in its own unit.
+#'   has a `verdict`: `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks
+#'   against it; or `"stand-in"`, if held-out data do not improve (`held_out_gain`, with its standard error). `inert`
+#'   names parameters of the base model that the last model no longer uses. `steps` has, for each record, what
+#'   shorter steps of the simulator change: the RMS (`error`, in the target's unit) of what the parameters cannot
+#'   take up, and by how many of its standard deviations each would move (`moved`); `NULL` if that is not known
+#'   ([function_simulator()]). `confounded_with` names parameters that are correlated beyond 0.4 with those that it
+#'   brought. For several records `fit` is what [calibrate_jointly()] gives, and `records` of a model has
+#'   `prediction`, `scores` and `held_out_gain` of each in its own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own:
 #'   `vignette("algorithm", "amiss")`, *Naming*.
 #' @examples
