@@ -25,8 +25,10 @@ score_world <- function(world, control = list(max_steps = 2, calibration = list(
               log10_bf = max(upgrade$candidates$log10_bf[upgrade$candidates$from == upgrade$models[[1]]$name],
                              na.rm = TRUE),
               gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
-              rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best, wall_s = wall,
-              runs_total = upgrade$runs_total)
+              rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best,
+              over_least = if (least_squares) over_least_squares(world, upgrade) else c(NA, NA),
+              doubts = lapply(upgrade$models[-1], function(m) names(m$doubts)), candidates = first_trials(upgrade),
+              wall_s = wall, runs_total = upgrade$runs_total)
   if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world),
                        list(paper_condition = paper_condition(world, 120)))
   row
@@ -56,6 +58,28 @@ best_rmse <- function(world) {
   values <- c(world$values, unlist(lapply(unname(world$effects), function(e) e[names(e) != "size"])))
   unit <- vapply(names(true$parameters), function(n) amiss:::prior_cdf(true$parameters[[n]]$prior, values[[n]]), 0)
   best_on_record(true, world$measurements, fit_seed(world), starts = 3, known = list(unname(unit)))$rms
+}
+
+# The error of the last model's simulation at its best, calibrated and held out, over that of least squares on the same
+# simulator by itself.
+over_least_squares <- function(world, upgrade) {
+  model <- upgrade$models[[length(upgrade$models)]]
+  adopted <- vapply(upgrade$models[-1], `[[`, "", "mechanism")
+  simulator <- Reduce(function(simulator, name) world$catalogue[[name]]$edit(simulator), adopted, world$base)
+  m <- world$measurements
+  found <- best_on_record(simulator, m, fit_seed(world), starts = 2)
+  values <- amiss:::unit_to_values(t(found$unit), amiss::free_parameters(simulator))
+  rms <- function(use) {
+    y <- m$y[m$use == use & !is.na(m$y)]
+    sqrt(mean((amiss:::simulate_measured(simulator, values, m, use, 1L) - y)^2))
+  }
+  c(model$scores$calibrate[["rmse"]] / rms("calibrate"), model$scores$validate[["rmse"]] / rms("validate"))
+}
+
+# What was found of each mechanism on the base model.
+first_trials <- function(upgrade) {
+  table <- upgrade$candidates[upgrade$candidates$from == upgrade$models[[1]]$name, ]
+  table[c("mechanism", "log10_bf", "beside_unknown", "error_ratio", "trusted", "judged_by", "runs")]
 }
 
 attributed_condition <- function(upgrade) {
@@ -192,7 +216,8 @@ score_means <- function(rows) {
     v <- v[is.finite(v)]
     list(mean = mean(v), standard_error = stats::sd(v) / sqrt(length(v)), median = stats::median(v), n = length(v))
   }
-  list(gain_share = of(strong, "gain_share"), rmse_ratio = of(strong, "rmse_ratio"), wall_s = of(rows, "wall_s"))
+  list(gain_share = of(strong, "gain_share"), rmse_ratio = of(strong, "rmse_ratio"),
+       runs_total = of(rows, "runs_total"), wall_s = of(rows, "wall_s"))
 }
 
 # What the attribution by itself said in the worlds of each mechanism: how often a right condition, a wrong one, none.
