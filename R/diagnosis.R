@@ -172,7 +172,7 @@ sure_sentences <- function(upgrade) {
             sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted)) {
     if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
-    if (raises_error(best)) needed <- raised_sentence(best)
+    if (keeps_error(best)) needed <- raised_sentence(best)
     else if (is_refuted(best)) needed <- refuted_sentence(best)
     else if (is_unverified(best, upgrade)) needed <- "It was not adopted, because no runs were left to verify it."
     return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
@@ -184,7 +184,7 @@ sure_sentences <- function(upgrade) {
   }))
   first <- trials[1, ]
   c(each, probability_sentence(trials),
-    if (first$mechanism != best$mechanism && raises_error(first)) raised_sentence(first, " first"),
+    if (first$mechanism != best$mechanism && keeps_error(first)) raised_sentence(first, " first"),
     trust_sentence(upgrade, best))
 }
 

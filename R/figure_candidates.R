@@ -3,7 +3,7 @@
 candidates_title <- function(table, decisive) {
   if (!any(table$adopted)) {
     best <- table[which.max(table$log10_bf), ]
-    return(if (best$log10_bf >= decisive && raises_error(best))
+    return(if (best$log10_bf >= decisive && keeps_error(best))
              "No mechanism was adopted: the best does not lower the error"
            else if (best$log10_bf >= decisive && is_refuted(best))
              "No mechanism was adopted: an unknown response does better than the best"
@@ -23,7 +23,7 @@ figure_candidates <- function(upgrade) {
   table$panel <- factor(ifelse(table$step == 1, "added to the base model", paste("added after", adopted[table$step])))
   table$panel <- factor(table$panel, unique(table$panel[order(table$step)]))
   table$row <- paste(formatC(rank(table$log10_bf), width = 4, flag = "0"), table$mechanism)
-  refused <- table$log10_bf >= decisive & table$trusted & !table$adopted & (raises_error(table) | is_refuted(table))
+  refused <- table$log10_bf >= decisive & table$trusted & !table$adopted & (keeps_error(table) | is_refuted(table))
   states <- c("adopted", "tried", "tried, estimate rough", if (any(refused)) "refused")
   table$state <- ifelse(table$adopted, states[1], ifelse(table$trusted, states[2], states[3]))
   table$state <- factor(ifelse(refused, "refused", table$state), states)

@@ -18,12 +18,20 @@ with_modes <- function(model, searches, seed) {
 
 # Runs that fill the region, as many as are missing from `least` in it.
 with_local_runs <- function(model, least, context) {
-  inside <- sum(succeeded(model) & straight_distance(model) <= 1)
-  n <- least - inside
+  n <- least - sum(fills(model))
   if (n <= 0) return(model)
   seed <- context$seed + nrow(model$runs$z)  # each time others
   unit <- region_design(model$region, n, seed)
   with_runs(model, from_unit(unit, model$flat), context)$model
+}
+
+is_inside <- function(model) succeeded(model) & straight_distance(model) <= 1
+
+# Those that fill it: of an extension not the runs of the model before, which show the region from one side.
+fills <- function(model) {
+  is_new <- rep(TRUE, nrow(model$runs$z))
+  if (length(model$off)) is_new <- colSums(t(model$runs$z[, names(model$off), drop = FALSE]) != model$off) > 0
+  is_inside(model) & is_new
 }
 
 least_local <- function(model) {
@@ -223,8 +231,8 @@ verify_model <- function(model, context, before = NULL, rounds = context$control
     rough <- posterior_of(model, context, rough_ais)
     model <- following(rough)
     found <- list(model = model, fits = fits_in_region(model, context, model_ais(context)))
-    inside <- sum(succeeded(found$model) & straight_distance(found$model) <= 1)
-    if (inside < least / 2 && !is_spent(context)) {  # the region has moved away from its runs
+    filled <- sum(fills(found$model))
+    if (filled < least / 2 && !is_spent(context)) {  # the region has moved away from its runs
       model <- found$model
       next
     }
@@ -237,7 +245,7 @@ verify_model <- function(model, context, before = NULL, rounds = context$control
     if (settled || is_spent(context)) break
     before <- found$fits[[1]]$log_evidence
     passed <- isTRUE(found$fits[[1]]$check$passed)
-    least <- inside + length(model$checked$at) + if (passed) 0 else rules$more_runs
+    least <- filled + length(model$checked$at) + if (passed) 0 else rules$more_runs
   }
   best <- best %||% found
   if (is.null(best$fits[[1]]$check)) {  # the budget ended before the check

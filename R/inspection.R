@@ -248,7 +248,7 @@ last_trials <- function(upgrade) {
 nearest_trial <- function(upgrade) {
   trials <- last_trials(upgrade)
   if (!NROW(trials)) return(NULL)
-  open <- trials[!is.na(trials$log10_bf) & !raises_error(trials), ]
+  open <- trials[!is.na(trials$log10_bf) & !keeps_error(trials), ]
   best <- open[which.max(open$log10_bf), ]
   best[best$probability >= rules$rival_probability & best$log10_bf > rules$told_evidence, ]
 }

@@ -204,8 +204,23 @@ next_to_verify <- function(trials, present, context) {
 
 # Further runs of a model that runs have confirmed change neither.
 cannot_be_adopted <- function(model, present) {
-  (is_verified(model) || is_confirmed(model)) && (error_ratio(model$fit, present$fit) > rules$fallen_error ||
-                           speaks_against(beside_unknown(model, present)))
+  (is_verified(model) || is_confirmed(model)) && is_refused(model, present)
+}
+
+is_refused <- function(model, present) {
+  error_ratio(model$fit, present$fit) > rules$fallen_error || speaks_against(beside_unknown(model, present))
+}
+
+settled_trial <- function(model, present, bar, context) {
+  if (!asks_for_checks(model, present, bar)) return(verify_trial(model, present, context))
+  model$rechecked <- TRUE
+  tried_model(model, present, bar, context)
+}
+
+# Whether a few runs more may show that a trial cannot win, for a tenth of what its verification costs: once.
+asks_for_checks <- function(model, present, bar) {
+  is_open <- !is_confirmed(model) && !is_promising(model, present) && is.null(model$rechecked)
+  is_open && (is_refused(model, present) || lower_bound(model, present) <= bar)
 }
 
 # A trial that its runs confirm has had its first round.
@@ -262,7 +277,8 @@ race <- function(present, trials, context) {
   repeat {
     name <- next_to_verify(trials, present, context)
     if (is.null(name) || is_spent(context)) break
-    trials[[name]] <- staged(paste("verifying", name), verify_trial(trials[[name]], present, context))
+    bar <- needed_factor(trials[names(trials) != name], present, context)
+    trials[[name]] <- staged(paste("verifying", name), settled_trial(trials[[name]], present, bar, context))
     report_trial(trials[[name]], present, context)
   }
   trials

@@ -7,7 +7,7 @@
 # `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is switched off; the search
 # ends if all that it promises beyond that could not make evidence.
 begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL) {
-  list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0,
+  list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0, poor = 0, since = 0,
        weighted = FALSE, reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes,
        status = "going")
 }
@@ -22,7 +22,8 @@ run_search <- function(search, context) {
     if (search$status == "budget") return(search)
     if (is_futile(search, context)) return(replace(search, "status", "futile"))
     if (promised_by(search) < rules$search_gain) return(replace(search, "status", "converged"))
-    search <- utils::modifyList(search, list(weighted = TRUE, status = "going", trusted = Inf, failed = 0))
+    search <- utils::modifyList(search, list(weighted = TRUE, status = "going", failed = 0,
+                                             trusted = search$trusted * rules$trust_changes))
     search["gains"] <- list(NULL)
     search <- look(descend(search, context), context)
     if (search$status != "converged") return(search)
@@ -37,15 +38,19 @@ descend <- function(search, context) {
     made <- with_runs(search$model, rbind(search$proposal), context)
     search$model <- made$model
     search <- accept(search, made$at, context)
-    if (search$failed == rules$renew_after && !finished(search)) {
-      search <- renew_slopes(search, context)
-    }
+    if (!finished(search) && needs_slopes(search)) search <- renew_slopes(search, context)
   }
   search$slopes <- secant_slopes(search$model, search$at, search$reference)
   search
 }
 
 finished <- function(search) search$status != "going"
+
+# Slopes by differences cost a run a parameter: they are worth it if steps failed in a row, or if as many were made and
+# some of them were poor.
+needs_slopes <- function(search) {
+  search$failed == rules$renew_after || search$poor >= rules$renew_after && search$since >= length(search$model$flat)
+}
 
 # The posterior under the tangent, with error and discrepancy sampled under it.
 look <- function(search, context) {
@@ -95,7 +100,11 @@ propose <- function(search, context) {
   if (search$step >= search$steps) search$status <- "steps"
   # What the slopes promise, or the bend leaves of it unless the trusted distance does.
   open <- min(search$promised, if (is.infinite(search$trusted)) search$predicted)
-  if (open < rules$search_gain * nats_of(search, misfit[1])) search$status <- "converged"
+  nats <- nats_of(search, misfit[1])
+  if (open < rules$search_gain * nats) search$status <- "converged"
+  # A search that cannot come nearer to the record than the run without the mechanism is.
+  if (!search$weighted && search$step > 0 && !is.null(search$off) &&
+      misfit[1] - search$promised > squared_misfit(model)[search$off] - rules$futile_gain) search$status <- "behind"
   search
 }
 
@@ -167,17 +176,20 @@ accept <- function(search, made, context) {
     return(search)
   }
   search$step <- search$step + 1
+  search$since <- search$since + 1
   both <- c(search$at, made)
   runs <- search$model$runs
   misfit <- misfit_of(search, runs$outputs[, both], runs$z[both, , drop = FALSE], context)
   gain <- misfit[1] - misfit[2]
   nats <- nats_of(search, min(misfit))
   length <- sqrt(sum((way_scale(search$reference) * (runs$z[made, ] - runs$z[search$at, ]))^2))
-  if (gain > max(0, search$predicted * rules$good_step)) {
+  is_poor <- !(gain > max(0, search$predicted * rules$poor_step))
+  if (is_poor) {
+    search$trusted <- length * shrinkage(max(0, search$predicted), gain)
+  } else if (gain > search$predicted * rules$good_step) {
     search$trusted <- max(search$trusted, rules$trust_changes * length)
-  } else if (!(gain > max(0, search$predicted * rules$poor_step))) {
-    search$trusted <- length / rules$trust_changes
   }
+  search$poor <- search$poor + is_poor
   search$failed <- if (gain > 0) 0 else search$failed + 1
   search$gains <- c(search$gains, max(0, gain))
   if (gain > 0) search$at <- made
@@ -187,13 +199,20 @@ accept <- function(search, made, context) {
   search
 }
 
+# By how much: to the least value of the parabola that falls as predicted and ends at what the run says.
+shrinkage <- function(predicted, gain) {
+  least <- if (is.finite(gain)) predicted / (2 * predicted - min(gain, 0)) else 0
+  min(max(least, rules$least_shrinkage), 1 / rules$trust_changes)
+}
+
 renew_slopes <- function(search, context) {
   found <- difference_slopes(search$model, search$at, context)
   search$model <- found$model
+  search[c("poor", "since")] <- 0
   if (is.null(found$slopes)) return(search)
   search$reference <- list(z = search$model$runs$z[search$at, ], slopes = found$slopes, stale = 0)
   search["gains"] <- list(NULL)
-  search$trusted <- Inf
+  search$trusted <- search$trusted * rules$trust_changes
   search
 }
 

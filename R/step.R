@@ -176,8 +176,8 @@ why_not <- function(table, decisive, context) {
   if (!nrow(seen)) return(list(id = "none_computed", words = "no mechanism could be computed"))
   best <- best_trial(table)
   highest <- seen[which.max(seen$log10_bf), ]
-  if (raises_error(highest) && highest$log10_bf >= decisive) {
-    return(list(id = "raises_error", words = sprintf(
+  if (keeps_error(highest) && highest$log10_bf >= decisive) {
+    return(list(id = "keeps_error", words = sprintf(
       "no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but does not lower it)",
       highest$mechanism, highest$log10_bf)))
   }

@@ -78,7 +78,7 @@ is_refuted <- function(table) !is.na(table$beside_unknown) & speaks_against(tabl
 
 speaks_against <- function(factor) factor < rules$against
 
-raises_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > rules$fallen_error
+keeps_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > rules$fallen_error
 
 # Estimates of the parameters that a mechanism brought with it.
 added_parameters <- function(fit, parent) {
@@ -89,7 +89,7 @@ added_parameters <- function(fit, parent) {
 # The row of highest evidence among the mechanisms that may be adopted: they were verified, the simulation's own error
 # falls with them, and they do not lose to an unknown response. No row if there is none.
 best_trial <- function(table) {
-  open <- table[table$judged_by == "runs" & !raises_error(table) & !is_refuted(table), ]
+  open <- table[table$judged_by == "runs" & !keeps_error(table) & !is_refuted(table), ]
   open[which.max(open$log10_bf), ]
 }
 

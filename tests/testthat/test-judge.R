@@ -267,7 +267,7 @@ test_that("why nothing was adopted names the best, also where the error rises wi
   expect_identical(told()$id, "not_decisive")
   expect_match(told()$words, "no mechanism is decisive \\(best: sun, log10 Bayes factor 1.2; 2 or more")
   risen <- told(log10_bf = c(3, 0.3))
-  expect_identical(risen$id, "raises_error")
+  expect_identical(risen$id, "keeps_error")
   expect_match(risen$words, "lowers the error decisively \\(sun has a log10 Bayes factor of 3.0, but does not lower it")
   expect_identical(told(log10_bf = c(3, 4), lower95 = c(1, -1))$id, "uncertain")
   expect_match(told(log10_bf = c(3, 4), lower95 = c(1, -1))$words, "too uncertain \\(best: lag")

@@ -1,0 +1,57 @@
+# What a search does after a poor step, and what a trial is given before it is verified.
+
+test_that("a step that fails shrinks the trusted distance to the least value of a parabola", {
+  # It falls by 2 per way at first, promised 1 at its least value, and ends 2 higher: 1 / (2 + 2) of the way.
+  expect_equal(amiss:::shrinkage(1, -2), 1 / 4)
+  # Of one that gained too little a third is left, of one that rose without bound or failed a tenth.
+  expect_equal(amiss:::shrinkage(1, 0.1), 1 / rules$trust_changes)
+  expect_equal(amiss:::shrinkage(1, -1e6), rules$least_shrinkage)
+  expect_equal(amiss:::shrinkage(1, -Inf), rules$least_shrinkage)
+})
+
+test_that("slopes are taken again after failures in a row, or once they have had as many steps as they cost", {
+  search <- list(failed = 0, poor = 0, since = 0, model = list(flat = rep(FALSE, 5)))
+  with <- function(...) amiss:::needs_slopes(utils::modifyList(search, list(...)))
+  expect_false(with(since = 20))
+  expect_true(with(failed = rules$renew_after))
+  expect_false(with(poor = rules$renew_after, since = 4))
+  expect_true(with(poor = rules$renew_after, since = 5))
+})
+
+test_that("new slopes do not make a step longer than three times what was trusted", {
+  m <- linear_measurements()
+  model <- amiss:::new_model(list(linear_simulator()), list(amiss:::loop_record(m, quick_ais)))
+  context <- amiss:::new_context(1, 1, list())
+  model <- amiss:::with_runs(model, rbind(c(1, 1)), context)$model
+  search <- amiss:::begin_search(model, 1, matrix(0, nrow(model$runs$outputs), 2), 0)
+  search[c("trusted", "poor", "since")] <- list(0.2, 3, 4)
+  renewed <- amiss:::renew_slopes(search, context)
+  expect_equal(renewed$trusted, 0.6)
+  expect_equal(unlist(renewed[c("poor", "since")], use.names = FALSE), c(0, 0))
+})
+
+test_that("runs of the model before do not fill the region of its extension", {
+  m <- linear_measurements()
+  context <- amiss:::new_context(1, 1, list())
+  model <- amiss:::new_model(list(linear_simulator()), list(amiss:::loop_record(m, quick_ais)))
+  z <- rbind(c(0, 0), c(0, 0.1), c(0.1, 0), c(0.1, 0.1))
+  model <- amiss:::with_runs(model, z, context)$model
+  model$region <- amiss:::new_region(c(0, 0), diag(2), 1, model$parameters)
+  expect_equal(sum(amiss:::fills(model)), 4)
+  model$off <- c(gain = 0)
+  expect_equal(amiss:::fills(model), c(FALSE, TRUE, FALSE, TRUE))
+})
+
+test_that("a trial that its runs do not confirm is checked again, once, before it is verified", {
+  models <- small_upgrade()$models
+  trial <- c(models[[2]], list(level = "tried", taken = 0))
+  present <- models[[1]]
+  asks <- function(bar, ...) amiss:::asks_for_checks(utils::modifyList(trial, list(...)), present, bar)
+  trial$fit$check$effective <- 0.5
+  low <- amiss:::lower_bound(trial, present)
+  expect_true(asks(low + 1))
+  expect_false(asks(low - 1))  # it will be verified whatever they say
+  expect_false(asks(low + 1, rechecked = TRUE))
+  trial$fit$check$effective <- 0.9
+  expect_false(asks(low + 1))
+})
