@@ -13,6 +13,13 @@ doubts <- list(
   rivals = doubt(function(case) {
     if (case$others > rules$rival_probability) "other causes are possible"
   }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
+  untried = doubt(function(case) {
+    twins <- untried_twins(case$parent, case$entry, case$catalogue)
+    if (length(twins)) {
+      sprintf("the error answers to %s as well, which this record cannot tell from %s and no mechanism was given for",
+              listed(twins), listed(case$entry$boundary, "or"))
+    }
+  }, "a place or driver that nobody thought of is no less likely"),
   untrusted = doubt(function(case) {
     if (!case$parent$fit$trust$trusted || !case$model$fit$trust$trusted) "the numbers behind it are not trusted"
   }, "runs of the simulator refute an emulator, or searches do not agree"),
@@ -79,7 +86,7 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads) {
   later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
   gain <- held_out_gain(parent, model)
   list(model = model, parent = parent, models = models[seq_len(k)], row = row, new = new,
-       entry = catalogue[[model$mechanism]], gain = gain, no_gain = isFALSE(gain$improves),
+       entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain, no_gain = isFALSE(gain$improves),
        others = 1 - row$probability - sum(trials$probability[trials$mechanism %in% later]),
        confounded = confounded_parameters(model$fit, new),
        drift = k == 2 && drift_rivals(models, control, threads))
@@ -123,6 +130,14 @@ held_out_gain <- function(parent, model) {
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
+}
+
+# Conditions of which no mechanism of the catalogue is driven, and which the error before cannot tell from those that
+# drive this one.
+untried_twins <- function(parent, entry, catalogue) {
+  same <- Filter(function(g) g$significant && any(g$conditions %in% entry$boundary), parent$attribution$groups)
+  driven <- unlist(lapply(unclass(catalogue), `[[`, "boundary"))
+  setdiff(unlist(lapply(same, `[[`, "conditions")), driven)
 }
 
 # The condition that drives a mechanism answered before and does so still, with more than half of its evidence.

@@ -71,6 +71,35 @@ test_that("each doubt makes a mechanism likely", {
   })
 })
 
+test_that("a condition that nobody gave a mechanism for, and that the record cannot tell apart, is a doubt", {
+  twin <- function(u, significant = TRUE) {
+    u$models[[1]]$attribution$groups <- list(list(conditions = c("Gs", "Gv"), significant = significant))
+    u
+  }
+  expect_doubt("answers to Gs as well, which this record cannot tell from Gv", twin)
+  expect_length(judged(function(u) twin(u, significant = FALSE))$doubts, 0)
+  # If a mechanism of the catalogue is driven by it, the evidence tells the two apart.
+  expect_length(judged(function(u) {
+    u$catalogue$drift$boundary <- "Gs"
+    twin(u)
+  })$doubts, 0)
+})
+
+test_that("so it is of a second sensor of the sun, not of one that is coarse", {
+  skip_on_cran()  # second tier: tools/test --quick
+  doubts_of <- function(sd) {
+    table <- small_record()
+    table$Gs <- table$Gv + withr::with_seed(2, rnorm(nrow(table), 0, sd))
+    m <- measurements(table, time = "time", target = "Ti", boundary = ~ Te + Gv + Gs, noise_sd = 0.05,
+                      calibrate = seq_len(240) <= 168, validate = seq_len(240) > 168, warmup = 12)
+    upgrade <- upgrade_model(model_of(small_upgrade()$models[[1]]$fit), m, small_upgrade()$catalogue["sun"], seed = 1,
+                             quiet = TRUE, control = small_upgrade()$control)
+    upgrade$models[[2]]$doubts
+  }
+  expect_match(doubts_of(0.5), "answers to Gs as well")
+  expect_length(doubts_of(40), 0)
+})
+
 test_that("what was adopted later is no other cause", {
   upgrade <- small_upgrade()
   upgrade$candidates$probability <- ifelse(upgrade$candidates$mechanism == "sun", 0.6, 0.4)
