@@ -176,7 +176,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                  hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
-                 time_format = table$format, time_zone = time_zone, constant = constant, findings = findings),
+                 time_format = table$format, time_zone = time_zone, constant = constant, findings = findings,
+                 given_row = grid$row),
             class = "amiss_measurements")
 }
 
