@@ -7,17 +7,17 @@ missing_codes <- c(-99, -99.9, -99.99, -999, -999.9, -999.99, -6999, -7999, -999
                    9999, 9999.9, 99999, 999999, 32767, -32768, 65535, 2147483647, -2147483648)
 direction_codes <- c(990, 991)  # variable, calm
 
-# Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The rows that one has found are not
-# looked at by the next.
+# Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The next looks at what is left: at the
+# other rows, and at nothing if all are concerned.
 record_checks <- list(
   missing_code = function(x) code_finding(x),
   far_outside = function(x) far_finding(x),
+  direction = function(x) if (x$is_condition && !x$is_circular) direction_finding(x),
+  counter = function(x) if (!x$is_circular) counter_finding(x),
   range_end = function(x) if (x$is_target) range_finding(x),
   stuck = function(x) if (x$is_target || !has_few_levels(x$v)) stuck_finding(x),
   quantised = function(x) if (x$is_target) quantised_finding(x),
   repeated = function(x) if (x$is_target || !has_few_levels(x$v)) repeated_finding(x),
-  direction = function(x) if (x$is_condition && !x$is_circular) direction_finding(x),
-  counter = function(x) if (!x$is_circular) counter_finding(x),
   constant = function(x) if (!x$is_target) constant_finding(x))
 
 # `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of a table by name, the
@@ -49,6 +49,7 @@ column_findings <- function(x) {
     if (is.null(one)) next
     found[[id]] <- data.frame(id = id, column = x$name, rows = I(list(as.integer(one$rows))), value = one$value,
                               says = one$says)
+    if (is.null(one$rows)) break
     x$v[one$rows] <- NA
   }
   unname(found)

@@ -76,6 +76,7 @@ strongest_suspect <- function(case) {
 }
 
 best_suspect <- function(tried, case) {
+  tried <- Filter(Negate(is.null), tried)
   if (!length(tried)) return(NULL)
   gains <- vapply(tried, function(s) error_gain(case$before$left, s$left, s$more), 0) - log10(length(tried))
   best <- tried[[which.max(gains)]]
@@ -129,15 +130,17 @@ clock_suspects <- function(case) {
 
 # The clock differs from a row on, or up to it, as with daylight saving.
 changed_clock <- function(case, lag, shifted) {
-  unlist(lapply(places(case, 25), function(at) {
-    lapply(c(TRUE, FALSE), function(later) {
-      other <- (seq_along(case$y) >= at) == later
-      slopes <- case$slopes
-      slopes[other, ] <- shifted$slopes[other, ]
-      found <- left_with(case, ifelse(other, shifted$simulated, case$simulated), slopes)
-      suspect("daylight", case$measurements$target, found, 2, lag = lag, at = at, later = later)
-    })
-  }), recursive = FALSE)
+  each_part(case, function(other, at, later) {
+    slopes <- case$slopes
+    slopes[other, ] <- shifted$slopes[other, ]
+    found <- left_with(case, ifelse(other, shifted$simulated, case$simulated), slopes)
+    suspect("daylight", case$measurements$target, found, 2, lag = lag, at = at, later = later)
+  })
+}
+
+each_part <- function(case, f) {
+  parts <- expand.grid(at = places(case, 25), later = c(TRUE, FALSE))
+  Map(function(at, later) f((seq_along(case$y) >= at) == later, at, later), parts$at, parts$later)
 }
 
 places <- function(case, number) {
@@ -145,35 +148,47 @@ places <- function(case, number) {
   unique(round(seq(0.08 * n, 0.92 * n, length.out = min(number, n))))
 }
 
-# One driver: a first run with it a step late shows along what the error would fall.
+# One driver: runs with it a step early and late show along what the error falls; if along none, a day is tried.
 driver_clock_suspects <- function(case) {
   if (!is_unsettled(case)) return(NULL)
-  step <- case$measurements$raw$step_h
-  first <- list()
-  for (name in moving_drivers(case)) {
-    late <- with_driver(case, name, function(v, hours) lagged_driver(v, hours, step))
-    first[[name]] <- list(driver_along(case, name, late))
-  }
-  best <- best_suspect(unlist(first, recursive = FALSE), case)
-  named <- if (is.null(best)) names(first) else best$column
+  names <- moving_drivers(case)
+  steps <- expand.grid(name = names, sign = c(1, -1), stringsAsFactors = FALSE)
+  gains <- mapply(function(name, sign) first_gain(case, name, sign * case$measurements$raw$step_h), steps$name, steps$sign)
+  best <- steps[which.max(gains), ]
   lags <- clock_lags(case)
-  lags <- if (is.null(best)) lags[abs(lags) == 24] else lags[sign(lags) == sign(best$amount) & abs(lags) < 12]
-  unlist(lapply(named, function(name) driver_lags(case, name, lags)), recursive = FALSE)
+  if (max(gains) < rules$decisive) return(driver_lags(case, names, lags[abs(lags) == 24]))
+  driver_lags(case, best$name, lags[sign(lags) == best$sign & abs(lags) < 12])
 }
 
-driver_along <- function(case, name, late) {
-  found <- left_with(case, extra = late - case$simulated)
-  suspect("clock", name, found, 1, amount = found$amounts)
+# What is gained along the change that a small lag makes.
+first_gain <- function(case, name, lag) {
+  moved <- with_driver(case, name, function(v, hours) lagged_driver(v, hours, lag))
+  found <- left_with(case, extra = moved - case$simulated)
+  if (isTRUE(found$amounts > 0)) error_gain(case$before$left, found$left, 1) else -Inf
 }
 
-driver_lags <- function(case, name, lags) {
-  unlist(lapply(lags, function(lag) {
-    moved <- with_driver(case, name, function(v, hours) lagged_driver(v, hours, lag))
-    whole <- list(suspect("clock", name, left_with(case, moved), 1, lag = lag))
-    if (abs(lag) != 1) return(whole)
-    changed <- changed_clock(case, lag, list(simulated = moved, slopes = case$slopes))
-    c(whole, lapply(changed, utils::modifyList, list(column = name)))
-  }), recursive = FALSE)
+# The amount is free, as the parameters were calibrated with the wrong clock.
+driver_lags <- function(case, names, lags) {
+  pairs <- expand.grid(name = names, lag = lags, stringsAsFactors = FALSE)
+  unlist(Map(function(name, lag) {
+    change <- with_driver(case, name, function(v, hours) lagged_driver(v, hours, lag)) - case$simulated
+    change[!is_known(case, lag)] <- NA
+    of <- function(id, change, more, ...) {
+      found <- left_with(case, extra = change)
+      if (isTRUE(found$amounts > 0)) suspect(id, name, found, more, lag = lag, ...)
+    }
+    changed <- if (abs(lag) == 1) each_part(case, function(other, at, later) {
+      of("daylight", change * other, 3, at = at, later = later)
+    })
+    c(list(of("clock", change, 2)), changed)
+  }, pairs$name, pairs$lag), recursive = FALSE)
+}
+
+# Rows whose driver `lag` hours before is in the record.
+is_known <- function(case, lag) {
+  raw <- case$measurements$raw
+  end <- function(f) vapply(split(raw$hours, raw$segment), f, 0)[as.character(case$segment)]
+  case$hours - lag >= end(min) & case$hours - lag <= end(max)
 }
 
 lagged_driver <- function(v, hours, lag) stats::approx(hours, v, hours - lag, rule = 2)$y
@@ -182,7 +197,7 @@ lagged_driver <- function(v, hours, lag) stats::approx(hours, v, hours - lag, ru
 is_unsettled <- function(case) {
   left <- if (is.null(case$adopted)) case$before$left else case$adopted$left
   length(moving_drivers(case)) > 0 && mean(left^2) > rules$excess_error * case$noise^2 &&
-    case$runs >= 4 * length(moving_drivers(case)) + 12
+    case$runs >= 8 * length(moving_drivers(case))
 }
 
 # Drivers that the simulator reads and that vary.
@@ -235,18 +250,32 @@ step_suspects <- function(case) {
 
 # ---- conditions at the end of a range, or in coarse steps
 
-# A sensor that ends cuts off what lies beyond: an arc that goes on as the values came and went.
+# A sensor that ends cuts off what lies beyond: each time an amount of its own, level and as an arc that goes on as the
+# values came and went.
 range_suspects <- function(case) {
   if (!is_unsettled(case)) return(NULL)
   unlist(lapply(moving_drivers(case), function(name) {
     v <- case$measurements$raw$drivers[, name]
     if (has_few_levels(v)) return(NULL)
-    lapply(Filter(Negate(is.null), list(piled_rows(v, TRUE), if (min(v) != 0) piled_rows(v, FALSE))), function(piled) {
-      whole <- with_driver(case, name, function(v, hours) beyond_end(v, piled$end))
-      found <- left_with(case, extra = whole - case$simulated)
-      suspect("range_end", name, found, 2, end = piled$end, rows = piled$rows, amount = found$amounts)
-    }) |> Filter(f = function(s) isTRUE(s$amount > 0))
+    piled <- list(piled_rows(v, TRUE), if (min(v) != 0) piled_rows(v, FALSE))
+    lapply(Filter(Negate(is.null), piled), function(piled) range_suspect(case, name, piled))
   }), recursive = FALSE)
+}
+
+range_suspect <- function(case, name, piled) {
+  drivers <- case$measurements$raw$drivers[, name]
+  outwards <- (if (piled$end == max(drivers)) 0.1 else -0.1) * diff(range(drivers))
+  change <- function(f) with_driver(case, name, f) - case$simulated
+  level <- change(function(v, hours) v + outwards * (v == piled$end))
+  arc <- change(function(v, hours) beyond_end(v, piled$end))
+  began <- case$measurements$raw$hours[piled$rows[c(TRUE, diff(piled$rows) > 1)]]
+  part <- findInterval(case$hours, began)
+  parts <- lapply(unique(part), function(k) ifelse(part == k, 1, 0))
+  extra <- do.call(cbind, c(lapply(parts, `*`, level), lapply(parts, `*`, arc)))
+  extra <- extra[, colSums(extra^2) > 0, drop = FALSE]
+  if (!ncol(extra) || ncol(extra) > length(case$y) / 4) return(NULL)
+  found <- left_with(case, extra = extra)
+  suspect("range_end", name, found, ncol(extra), end = piled$end, rows = piled$rows)
 }
 
 beyond_end <- function(v, end) {
@@ -269,9 +298,8 @@ beyond_end <- function(v, end) {
 coarse_driver_suspects <- function(case) {
   if (!is_unsettled(case)) return(NULL)
   do.call(rbind, lapply(moving_drivers(case), function(name) {
-    v <- case$measurements$raw$drivers[, name]
-    step <- if (!has_few_levels(v)) value_step(v)
-    if (is.null(step) || step < 0.01 * diff(range(v)) || stats::median(abs(diff(v))) > 2 * step) return(NULL)
+    step <- coarse_value_step(case$measurements$raw$drivers[, name])
+    if (is.null(step)) return(NULL)
     shaken <- with_driver(case, name, function(v, hours) v + step * (with_seed(1, stats::runif(length(v))) - 0.5))
     moves <- rms(shaken - case$simulated)
     excess <- mean(case$before$left^2) - case$noise^2
@@ -280,6 +308,13 @@ coarse_driver_suspects <- function(case) {
                says = sprintf(paste("%s comes in steps of %s, which moves the simulation by %s, with a noise of %s: use",
                                     "finer readings of %s."), name, short(step), short(moves), short(case$noise), name))
   }))
+}
+
+# Of what moves by single steps, and is rounded to a hundredth of its range or more.
+coarse_value_step <- function(v) {
+  step <- value_step(v)
+  change <- abs(diff(v))
+  if (!is.null(step) && step >= 0.01 * diff(range(v)) && mean(change[change > 0] < 1.5 * step) > 0.5) step
 }
 
 # ---- in words
