@@ -36,7 +36,8 @@ summary.amiss_upgrade <- function(object, ...) {
   last <- object$models[[length(object$models)]]
   structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
               list(record = record_faults(object), note = size_note(object), sure = sure_sentences(object),
-                   change = change_sentences(object), gain = gain_sentences(object), remains = remaining_sentences(object),
+                   change = change_sentences(object), gain = gain_sentences(object),
+                   remains = remaining_sentences(object),
                    inspect = upgrade_inspections(object),
                    mechanisms = lapply(adopted_models(object), mechanism_words, object), scores = scores_table(object),
                    changes = changes_table(object), candidates = candidates_words(object),

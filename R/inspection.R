@@ -351,8 +351,8 @@ driver_inspections <- function(upgrade) {
     listed(names(upgrade$catalogue)[vapply(upgrade$catalogue, function(m) any(m$boundary %in% conditions), NA)])
   }
   c(if (length(constant)) {
-      c(constant = sprintf("%s did not vary in calibration, so that %s cannot be judged: calibrate on rows with changes.",
-                           listed(constant), driven_by(constant)))
+      c(constant = sprintf(paste("%s did not vary in calibration, so that %s cannot be judged: calibrate on rows with",
+                                 "changes."), listed(constant), driven_by(constant)))
     },
     if (length(absent)) {
       c(driver = sprintf(paste("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of",

@@ -53,8 +53,8 @@ doubts <- list(
   }, "a parabola in time does as well"))
 
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism, and `steps`
-# (step_effect() of each record) of all, and `suspects` of the first (record_suspects()). A mechanism is a stand-in if held-out data do not improve; it is named if
-# nothing speaks against it, and likely otherwise.
+# (step_effect() of each record) of all, and `suspects` of the first (record_suspects()). A mechanism is a stand-in if
+# held-out data do not improve; it is named if nothing speaks against it, and likely otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control, threads, runs = Inf) {
   models <- lapply(models, function(model) {
     model$steps <- lapply(record_fits(model$fit), step_effect, threads)

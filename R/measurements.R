@@ -69,8 +69,8 @@
 #'   such as `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular
 #'   boundary conditions by way of sine and cosine.
-#' @param missing Values that stand for a missing one, such as `c(-9999, 85)`: they become `NA` in every column. `NA` says
-#'   that no value does. Otherwise, codes in the target or in a boundary condition are refused.
+#' @param missing Values that stand for a missing one, such as `c(-9999, 85)`: they become `NA` in every column. `NA`
+#'   says that no value does. Otherwise, codes in the target or in a boundary condition are refused.
 #' @param range Lower and upper end of the range of the target's sensor. Rows at an end, or beyond, are left out of the
 #'   comparison.
 #' @return An object of class `amiss_measurements`. Of each row, after averaging, `time`, `hours`, the target `y` and
@@ -177,8 +177,14 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
                  time_format = table$format, time_zone = time_zone, constant = constant, findings = findings,
-                 given_row = grid$row),
+                 faulty = faulty_steps(findings, target, coarse$block, grid$row)),
             class = "amiss_measurements")
+}
+
+# Steps of the averaged record in which a reading of the target is known to be none.
+faulty_steps <- function(findings, target, block, row) {
+  rows <- unlist(findings$rows[findings$column == target])
+  unique(block[match(rows, row)])
 }
 
 #' @rdname measurements

@@ -1,28 +1,28 @@
-# What a record shows by itself: values that cannot be measurements. record_findings() is a function of the table alone.
-# What is natural for a condition is none: zeros (night, no rain, off), few levels (switches, schedules, set points), and
-# either end of what something controlled can do.
+# What a record shows by itself: values that cannot be measurements. record_findings() is a function of the table
+# alone. What is natural for a condition is none: zeros (night, no rain, off), few levels (switches, schedules, set
+# points), and either end of what something controlled can do.
 
 # Codes of loggers and file formats for a value that is missing; any as large as 1e20 counts as one, too.
 missing_codes <- c(-99, -99.9, -99.99, -999, -999.9, -999.99, -6999, -7999, -9999, -9999.9, -99999, -999999, 999, 999.9,
                    9999, 9999.9, 99999, 999999, 32767, -32768, 65535, 2147483647, -2147483648)
 direction_codes <- c(990, 991)  # variable, calm
 
-# Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The next looks at what is left: at the
-# other rows, and at nothing if all are concerned.
+# Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The next looks at what is left: at
+# the other rows, and at nothing if all are concerned.
 record_checks <- list(
   missing_code = function(x) code_finding(x),
   far_outside = function(x) far_finding(x),
   direction = function(x) if (x$is_condition && !x$is_circular) direction_finding(x),
   counter = function(x) if (!x$is_circular) counter_finding(x),
+  constant = function(x) if (!x$is_target) constant_finding(x),
   range_end = function(x) if (x$is_target) range_finding(x),
   stuck = function(x) if (x$is_target || !has_few_levels(x$v)) stuck_finding(x),
   quantised = function(x) if (x$is_target) quantised_finding(x),
-  repeated = function(x) if (x$is_target || !has_few_levels(x$v)) repeated_finding(x),
-  constant = function(x) if (!x$is_target) constant_finding(x))
+  repeated = function(x) if (x$is_target || !has_few_levels(x$v)) repeated_finding(x))
 
-# `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of a table by name, the
-# use of each row, the noise of a single reading, and how many rows an average takes. Returns a data frame with a row for
-# each finding: its `id`, the `column`, its `rows` (all, if none is listed), the `value`, and what it `says`.
+# `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of a table by name,
+# the use of each row, the noise of a single reading, and how many rows an average takes. Returns a data frame with a
+# row for each finding: its `id`, the `column`, its `rows` (all, if none is listed), the `value`, and what it `says`.
 record_findings <- function(record) {
   found <- lapply(names(record$columns), function(name) column_findings(record_column(record, name)))
   do.call(rbind, c(list(no_findings()), unlist(found, recursive = FALSE)))
@@ -150,7 +150,7 @@ range_finding <- function(x) {
   at <- vapply(ends, `[[`, 0, "end")
   limits <- c(lower = "-Inf", upper = "Inf")
   limits[names(at)] <- format_each(at)
-  extreme <- if (length(at) > 1) "its ends" else sprintf("its %s", c(lower = "least value", upper = "largest value")[names(at)])
+  extreme <- if (length(at) > 1) "both ends" else switch(names(at), lower = "its least value", "its largest value")
   list(rows = rows, value = unname(at[1]),
        says = sprintf(paste("%s is %s, %s, in %d of %d rows: the range of its sensor seems to end there. Give range =",
                             "c(%s, %s) to leave these rows out of the comparison."), x$name,
@@ -218,26 +218,34 @@ quantised_finding <- function(x) {
   step <- value_step(x$v)
   if (is.null(step) || step <= rules$coarse_step * x$noise_sd) return(NULL)
   list(value = step,
-       says = sprintf(paste("%s comes in steps of %s, coarse for a noise of %s: use finer readings, or state a noise of",
-                            "%s at least."), x$name, short(step), short(x$noise_sd), short(step / sqrt(12))))
+       says = sprintf(paste("%s comes in steps of %s, coarse for a noise of %s: use finer readings, or state a noise",
+                            "of %s at least."), x$name, short(step), short(x$noise_sd), short(step / sqrt(12))))
 }
 
 # ---- what is no quantity of its own
 
-# Degrees jump between the ends of the circle, and neighbours are close when taken around it.
+# Degrees jump between the ends of the circle, and neighbours are close when taken around it. Those that never do may
+# have the name of a direction.
 direction_finding <- function(x) {
   v <- x$v[!is.na(x$v)]
-  if (has_few_levels(v) || min(v) < -180 || max(v) > 360 || diff(range(v)) < 330) return(NULL)
-  if (min(v) < 0 && max(v) > 180) return(NULL)
+  if (has_few_levels(v) || min(v) < -180 || max(v) > 360 || min(v) < 0 && max(v) > 180) return(NULL)
+  is_named <- grepl("^(w|wind)?_?(d|dir)$|direction|dir_|_dir|wind_?dir|azimuth", x$name, ignore.case = TRUE)
+  jumps <- circle_jumps(v)
+  if (jumps < 2 && !(is_named && diff(range(v)) > 90)) return(NULL)
+  list(value = jumps,
+       says = sprintf("%s looks like a direction in degrees (%s): write circular(%s) in boundary.", x$name,
+                      if (jumps) sprintf("it jumps %d times from one end of the circle to the other", jumps)
+                      else sprintf("its name, and values from %s to %s", short(min(v)), short(max(v))), x$name))
+}
+
+# How often neighbours lie at either end of the circle, if they then are close and all its quarters occur.
+circle_jumps <- function(v) {
   pairs <- cbind(v[-length(v)], v[-1])
   pairs <- pairs[rowSums(pairs == 0) == 0, , drop = FALSE]  # zero is off, or calm
   jump <- abs(pairs[, 2] - pairs[, 1])
   over <- jump > 180
-  quarters <- tabulate(floor((v %% 360) / 90) + 1, 4)
-  if (sum(over) < 3 || stats::median(360 - jump[over]) > 90 || min(quarters) < 0.02 * length(v)) return(NULL)
-  list(value = sum(over),
-       says = sprintf(paste("%s looks like a direction in degrees (it jumps %d times from one end of the circle to the",
-                            "other): write circular(%s) in boundary."), x$name, sum(over), x$name))
+  close <- any(over) && stats::median(360 - jump[over]) < 60
+  if (close && all(tabulate(floor((v %% 360) / 90) + 1, 4) > 0)) sum(over) else 0
 }
 
 # It never falls but to where it began; what rises by equal steps is a clock.

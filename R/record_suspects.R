@@ -1,9 +1,10 @@
-# Faults of a record that only a simulation shows: clocks that differ, a start that is not forgotten, a step of a sensor,
-# a condition whose sensor ends or is coarse. Each changes what the base model simulates; it is suspected if the base
-# model's error then falls decisively, by most of what exceeds the noise, and no less than with what was adopted.
+# Faults of a record that only a simulation shows: clocks that differ, a start that is not forgotten, a step of a
+# sensor, a condition whose sensor ends or is coarse. Each changes what the base model simulates; it is suspected if
+# the base model's error then falls decisively, by most of what exceeds the noise, and no less than with what was
+# adopted.
 
-# The suspects of all records, as record_findings() gives them: `record`, `id`, `column`, `says`. `runs`: how many runs of
-# the simulator may be made.
+# The suspects of all records, as record_findings() gives them: `record`, `id`, `column`, `says`. `runs`: how many runs
+# of the simulator may be made.
 record_suspects <- function(models, measurements, threads, runs = Inf) {
   ends <- models[unique(c(1, length(models)))]
   views <- lapply(ends, each_view, measurements)
@@ -50,8 +51,8 @@ left_with <- function(case, simulated = case$simulated, slopes = case$slopes, ex
   list(left = left, amounts = amounts[-seq_len(ncol(slopes))])
 }
 
-# log10 of how much more probable the errors are when `left` than when `before`, if `more` parameters do it; errors count
-# as normal, and as fewer by the autocorrelation that is left.
+# log10 of how much more probable the errors are when `left` than when `before`, if `more` parameters do it; errors
+# count as normal, and as fewer by the autocorrelation that is left.
 error_gain <- function(before, left, more) {
   there <- is.finite(left) & is.finite(before)
   left <- left[there]
@@ -153,7 +154,8 @@ driver_clock_suspects <- function(case) {
   if (!is_unsettled(case)) return(NULL)
   names <- moving_drivers(case)
   steps <- expand.grid(name = names, sign = c(1, -1), stringsAsFactors = FALSE)
-  gains <- mapply(function(name, sign) first_gain(case, name, sign * case$measurements$raw$step_h), steps$name, steps$sign)
+  step_h <- case$measurements$raw$step_h
+  gains <- mapply(function(name, sign) first_gain(case, name, sign * step_h), steps$name, steps$sign)
   best <- steps[which.max(gains), ]
   lags <- clock_lags(case)
   if (max(gains) < rules$decisive) return(driver_lags(case, names, lags[abs(lags) == 24]))
@@ -305,47 +307,61 @@ coarse_driver_suspects <- function(case) {
     excess <- mean(case$before$left^2) - case$noise^2
     if (moves < case$noise / 2 || excess < moves^2 / 2) return(NULL)
     data.frame(id = "quantised", column = name,
-               says = sprintf(paste("%s comes in steps of %s, which moves the simulation by %s, with a noise of %s: use",
-                                    "finer readings of %s."), name, short(step), short(moves), short(case$noise), name))
+               says = sprintf(paste("%s comes in steps of %s, which moves the simulation by %s, with a noise of %s:",
+                                    "use finer readings."), name, short(step), short(moves), short(case$noise)))
   }))
 }
 
-# Of what moves by single steps, and is rounded to a hundredth of its range or more.
+# Of what moves by one step or two, and is rounded to a hundredth of its range or more.
 coarse_value_step <- function(v) {
   step <- value_step(v)
   change <- abs(diff(v))
-  if (!is.null(step) && step >= 0.01 * diff(range(v)) && mean(change[change > 0] < 1.5 * step) > 0.5) step
+  if (!is.null(step) && step >= 0.01 * diff(range(v)) && mean(change[change > 0] < 2.5 * step) > 0.5) step
 }
 
 # ---- in words
 
 suspect_words <- function(s, case) {
   if (is.null(s)) return(NULL)
-  m <- case$measurements
-  fall <- sprintf("the base model's error falls from %s to %s", short(rms(case$before$left[is.finite(s$left)])),
-                  with_unit(short(rms(s$left[is.finite(s$left)])), m$unit))
-  at <- if (!is.null(s$at)) format(m$time[case$fit$rows][s$at])
-  if (is.numeric(m$time) && !is.null(at)) at <- paste("hour", at)
-  hours <- if (!is.null(s$lag)) paste(short(abs(s$lag)), "h")
-  # A target that is late is simulated with a lag; a driver that is late gives its response too late, which a shorter
-  # lag mends.
-  late <- (s$lag %||% 0) > 0
-  if (s$column != m$target) late <- !late
-  behind <- if (late) "behind" else "ahead of"
-  says <- switch(s$id,
-    clock = sprintf("The clock of %s seems to be %s %s that of the rest: with it set right, %s.", s$column, hours, behind,
-                    fall),
-    daylight = sprintf(paste("The clock of %s seems to be %s %s that of the rest %s %s, as with daylight saving in only",
-                             "one of them: with it set right, %s."), s$column, hours, behind,
-                       if (s$later) "from" else "until", at, fall),
-    start = sprintf(paste("The error decays from the first row (by half in %s h): the start is not forgotten. Give a",
-                          "warmup of %s h or more."), short(log(2) * s$time), short(4 * s$time)),
-    step_change = sprintf(paste("From %s on, %s lies %s %s than before, as if a sensor was moved or exchanged: with that",
-                                "taken off, %s."), at, s$column, with_unit(short(abs(s$amount)), m$unit),
-                          if (s$amount > 0) "higher" else "lower", fall),
-    range_end = sprintf(paste("%s is %s in %d rows, as at the end of its sensor's range: with what may lie beyond, %s."),
-                        s$column, format(s$end), length(s$rows), fall))
-  data.frame(id = s$id, column = s$column, says = says)
+  there <- is.finite(s$left)
+  s$fall <- sprintf("the base model's error falls from %s to %s", short(rms(case$before$left[there])),
+                    with_unit(short(rms(s$left[there])), case$measurements$unit))
+  data.frame(id = s$id, column = s$column, says = suspect_sentences[[s$id]](s, case))
+}
+
+suspect_sentences <- list(
+  clock = function(s, case) {
+    sprintf("The clock of %s seems to be %s that of the rest: with it set right, %s.", s$column, behind_words(s, case),
+            s$fall)
+  },
+  daylight = function(s, case) {
+    sprintf(paste("The clock of %s seems to be %s that of the rest %s %s, as with daylight saving in one of them: with",
+                  "it set right, %s."), s$column, behind_words(s, case), if (s$later) "from" else "until",
+            at_words(s, case), s$fall)
+  },
+  start = function(s, case) {
+    sprintf(paste("The error decays from the first row (by half in %s h): the start is not forgotten. Give a warmup of",
+                  "%s h or more."), short(log(2) * s$time), short(4 * s$time))
+  },
+  step_change = function(s, case) {
+    sprintf(paste("From %s on, %s lies %s %s than before, as if a sensor was moved or exchanged: with that taken off,",
+                  "%s."), at_words(s, case), s$column, with_unit(short(abs(s$amount)), case$measurements$unit),
+            if (s$amount > 0) "higher" else "lower", s$fall)
+  },
+  range_end = function(s, case) {
+    sprintf("%s is %s in %d rows, as at the end of its sensor's range: with what may lie beyond, %s.", s$column,
+            format(s$end), length(s$rows), s$fall)
+  })
+
+# A target that is late is simulated with a lag; a driver that is late needs a lead.
+behind_words <- function(s, case) {
+  late <- (s$lag > 0) == (s$column == case$measurements$target)
+  paste(short(abs(s$lag)), "h", if (late) "behind" else "ahead of")
+}
+
+at_words <- function(s, case) {
+  at <- case$measurements$time[case$fit$rows][s$at]
+  paste0(if (is.numeric(at)) "hour ", format(at))
 }
 
 # ---- what is said of a record as a whole

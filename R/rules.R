@@ -153,7 +153,7 @@ rule_table <- list(
                          "a true mechanism of eight times the noise began with an evidence of -37", "bench/runs.R"),
   worst_error = rule(2, "decades", "standard error of an evidence beyond which a trial's bound rises no further",
                      "where a few runs refute an emulator wholly, their spread says nothing", "bench/runs.R"),
-  code_apart = rule(3, "times", "distance of a code for a missing value from all others, over the widest gap among those",
+  code_apart = rule(3, "times", "distance of a code for a missing value from the others, over their widest gap",
                     "a value among others is a measurement", "bench/records.R"),
   far_outside = rule(3, "times", "gap before values far outside all others, over all that lies inside of it",
                      "the largest of thousands of normal errors leaves no such gap", "bench/records.R"),

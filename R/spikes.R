@@ -11,13 +11,6 @@ spikes <- function(r, hours, step_h) {
   which(before * after > 0 & pmin(abs(before), abs(after)) > rules$spike_size * usual)
 }
 
-# Rows of the record in which its target is known to be no measurement.
-rows_of_findings <- function(measurements) {
-  found <- measurements$findings
-  given <- unlist(found$rows[found$column == measurements$target])
-  unique(measurements$block[match(given, measurements$given_row)])
-}
-
 spike_inspection <- function(model, measurements) {
   if (is_several(measurements)) {
     told <- lapply(each_view(model, measurements), function(view) spike_inspection(view$model, view$measurements))
@@ -28,7 +21,7 @@ spike_inspection <- function(model, measurements) {
   rows <- model$fit$rows
   r <- p$observed - p$mean
   apart <- spikes(r, measurements$hours[rows], measurements$step_h)
-  apart <- apart[!rows[apart] %in% rows_of_findings(measurements)]
+  apart <- apart[!rows[apart] %in% measurements$faulty]
   if (!length(apart)) return(NULL)
   at <- measurements$time[rows][apart[1]]
   c(spikes = sprintf(paste("%d of %d readings, the first at %s, %s apart from those before and after: a sensor that",

@@ -42,9 +42,9 @@ simulate_room <- function(values, drivers, memory, step_h) {
 room_model <- function(world) {
   memory <- world$memory
   step_h <- world$step_h
-  function_simulator(function(values, drivers) simulate_room(values, drivers, memory, step_h), free("o", uniform(14, 22)),
-                     free("g", uniform(0, 1)), free("s", uniform(0, 0.02)), free("h", uniform(0, 8)),
-                     boundary = c("Te", "Gv", "P"))
+  function_simulator(function(values, drivers) simulate_room(values, drivers, memory, step_h),
+                     free("o", uniform(14, 22)), free("g", uniform(0, 1)), free("s", uniform(0, 0.02)),
+                     free("h", uniform(0, 8)), boundary = c("Te", "Gv", "P"))
 }
 
 added <- function(name, boundary, parameter, f) {

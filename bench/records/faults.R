@@ -25,13 +25,25 @@ at_step <- function(v) round(stats::runif(1, 0.3, 0.6) * length(v))
 # As if read `hours` late; from a row on, if one is given.
 late <- function(v, world, hours, from = 1) {
   k <- round(hours / world$step_h)
-  index <- pmin(pmax(seq_along(v) - k, 1), length(v))
+  index <- abs(seq_along(v) - k - 0.5) + 0.5  # mirrored at either end
+  index <- ifelse(index > length(v), 2 * length(v) + 1 - index, index)
   ifelse(seq_along(v) >= from, v[index], v)
 }
 
 clock_hours <- function(world) sample(c(-1, 1), 1) * sample(c(1, 1, 2, 24), 1)
 
 repeated <- function(v, world) v[4 * ((seq_along(v) - 1) %/% 4) + 1]
+
+# With noise so small that what a fault changes is three times as large, as what does not show is no fault.
+visible <- function(put) function(world) {
+  faulty <- put(world)
+  changed <- faulty$data$Ti - world$data$Ti + simulate_room(world$true, world$data, world$memory, world$step_h) -
+    simulate_room(world$true, faulty$data, world$memory, world$step_h)
+  smaller <- min(1, sqrt(mean(changed^2)) / (3 * world$noise))
+  faulty$data$Ti <- faulty$data$Ti - (1 - smaller) * world$error
+  faulty$noise <- smaller * world$noise
+  faulty
+}
 
 faults <- list(
   code_target = list(put = in_target(coded(c(-9999, -999, -99.9, 9999, 32767, 1e30, 85))),
@@ -41,7 +53,9 @@ faults <- list(
   code_direction = list(put = in_driver(coded(c(990, 999, -999)), "Wd"), right = "missing_code"),
   range_target = list(put = in_target(function(v, world) pmin(v, stats::quantile(v, stats::runif(1, 0.5, 0.85)))),
                       right = "range_end"),
-  range_driver = list(put = in_driver(function(v, world) pmin(v, stats::quantile(v, stats::runif(1, 0.6, 0.8)))),
+  range_driver = list(put = visible(in_driver(function(v, world) {
+    pmin(v, stats::quantile(v, stats::runif(1, 0.6, 0.8)))
+  })),
                       right = "range_end"),
   stuck_target = list(put = in_target(stuck), right = "stuck"),
   stuck_driver = list(put = in_driver(stuck), right = "stuck"),
@@ -49,10 +63,10 @@ faults <- list(
     step <- stats::runif(1, 3, 6) * world$noise
     step * round(v / step)
   }), right = "quantised"),
-  coarse_driver = list(put = in_driver(function(v, world) {
+  coarse_driver = list(put = visible(in_driver(function(v, world) {
     step <- stats::runif(1, 4, 6) * world$noise / world$true[["g"]]
     step * round(v / step)
-  }), right = "quantised"),
+  })), right = "quantised"),
   repeated_target = list(put = in_target(repeated), right = "repeated"),
   repeated_driver = list(put = in_driver(repeated), right = "repeated"),
   counter = list(put = in_driver(function(v, world) {
@@ -62,14 +76,14 @@ faults <- list(
   step_target = list(put = in_target(function(v, world) {
     v + ifelse(seq_along(v) >= at_step(v), stats::runif(1, 4, 10) * world$noise, 0)
   }), right = "step_change"),
-  clock_target = list(put = in_target(function(v, world) late(v, world, clock_hours(world))), right = "clock"),
-  clock_driver = list(put = function(world) {
+  clock_target = list(put = visible(in_target(function(v, world) late(v, world, clock_hours(world)))), right = "clock"),
+  clock_driver = list(put = visible(function(world) {
     in_driver(function(v, world) late(v, world, clock_hours(world)), sample(c("Te", "Gv"), 1))(world)
-  }, right = "clock"),
-  daylight = list(put = function(world) {
+  }), right = "clock"),
+  daylight = list(put = visible(function(world) {
     change <- function(v, world) late(v, world, sample(c(-1, 1), 1), at_step(v))
     if (stats::runif(1) < 0.5) in_target(change)(world) else in_driver(change, "Gv")(world)
-  }, right = c("daylight", "clock")),
+  }), right = c("daylight", "clock")),
   start = list(put = function(world) {
     since <- world$data$hour - world$warmup
     away <- sample(c(-1, 1), 1) * stats::runif(1, 8, 20) * world$noise

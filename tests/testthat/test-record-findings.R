@@ -6,7 +6,8 @@ weather <- function(...) {
     hour <- 1:288
     Te <- 8 + 5 * sin(2 * pi * hour / 24) + as.numeric(stats::filter(rnorm(288), 0.9, "recursive"))
     Gv <- pmax(0, 500 * sin(2 * pi * (hour - 6) / 24)) * runif(288, 0.3, 1)
-    data.frame(hour, Te, Gv, Wd = cumsum(rnorm(288, 0, 25)) %% 360, Ti = 18 + 0.5 * Te + 0.004 * Gv + rnorm(288, 0, 0.1))
+    data.frame(hour, Te, Gv, Wd = cumsum(rnorm(288, 0, 25)) %% 360,
+               Ti = 18 + 0.5 * Te + 0.004 * Gv + rnorm(288, 0, 0.1))
   })
   edits <- list(...)
   for (name in names(edits)) data[[name]] <- edits[[name]](data[[name]])
@@ -45,7 +46,9 @@ test_that("codes for a missing value are refused in target and conditions, with 
     expect_error(measure(do.call(weather, edit)), "rows 40 to 41 and 120: a code.*Give `missing = ",
                  class = "amiss_error_input", info = paste(name, code))
   }
-  for (code in c(-9999, -999, -99.9, -99, 9999, 99999, 32767, 65535, 1e30)) for (name in c("Ti", "Te")) refused(name, code)
+  for (name in c("Ti", "Te")) {
+    for (code in c(-9999, -999, -99.9, -99, 9999, 99999, 32767, 65535, 1e30)) refused(name, code)
+  }
   for (code in c(-9999, -99.9, 9999, 32767)) refused("Gv", code)
   for (code in c(990, 999, 9999, -999)) refused("Wd", code)
   two <- weather(Te = function(v) replace(v, c(3, 9), c(-999, 9999)))
@@ -121,6 +124,10 @@ test_that("a counter and a direction are found", {
   expect_identical(ids(weather(Gv = counter)), "Gv counter")
   expect_identical(ids(weather(), boundary = ~ Te + Gv + Wd), "Wd direction")
   expect_identical(ids(weather(Wd = function(v) ifelse(v > 180, v - 360, v)), boundary = ~ Te + Wd), "Wd direction")
+  # One that never jumps has a name; another quantity in such a range has neither.
+  narrow <- weather(Wd = function(v) 100 + v / 2)
+  expect_identical(ids(narrow, boundary = ~ Te + Wd), "Wd direction")
+  expect_identical(ids(transform(narrow, power = Wd), boundary = ~ Te + power), character())
 })
 
 test_that("a condition that is constant in calibration only is found, and nobody is asked to name it", {
@@ -139,8 +146,8 @@ test_that("stamps that stray by fractions of a second move no row", {
   data <- weather()[1:240, ]
   exact <- as.POSIXct("2024-01-01", tz = "UTC") + 600 * data$hour
   of <- function(time) {
-    measurements(transform(data, time = time), time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1, average = 1,
-                 warmup = 6)
+    measurements(transform(data, time = time), time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+                 average = 1, warmup = 6)
   }
   stray <- of(exact + withr::with_seed(1, runif(240, -0.4, 0.4)))
   expect_identical(stray[c("time", "y", "use")], of(exact)[c("time", "y", "use")])

@@ -48,7 +48,8 @@ test_that("the clock of the target is suspected, and said before all else", {
 })
 
 test_that("the clock of one driver is suspected, by steps or by a day", {
-  expect_suspect(suspect_room(edit = function(d) transform(d, Gv = late(Gv, 2))), "clock", "Gv", "Gv seems to be 2.0 h behind")
+  expect_suspect(suspect_room(edit = function(d) transform(d, Gv = late(Gv, 2))), "clock", "Gv",
+                 "Gv seems to be 2.0 h behind")
   expect_suspect(suspect_room(edit = function(d) transform(d, Gv = late(Gv, -24))), "clock", "Gv", "24 h ahead of")
 })
 
@@ -91,7 +92,8 @@ test_that("what a mechanism explains decisively better is no fault of the record
 
 test_that("a fault of the record makes a mechanism likely", {
   upgrade <- small_upgrade()
-  upgrade$measurements$findings <- data.frame(id = "stuck", column = "Te", rows = I(list(1:9)), value = 1, says = "Stuck.")
+  upgrade$measurements$findings <- data.frame(id = "stuck", column = "Te", rows = I(list(1:9)), value = 1,
+                                             says = "Stuck.")
   own <- rejudged(upgrade)$models[[2]]
   expect_identical(own$verdict, "likely")
   expect_identical(own$doubts, c(record = "the record itself has a sensor that is stuck"))
