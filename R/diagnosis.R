@@ -7,7 +7,8 @@
 #' @param x The summary.
 #' @param ... Not used.
 #' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`), `tag`, `headline`; the
-#'   sentences `note`, `sure`, `change`, `gain`, `remains` and `inspect` (what to inspect next, to settle what is open);
+#'   sentences `record` (faults of the record), `note`, `sure`, `change`, `gain`, `remains` and `inspect` (what to
+#'   inspect next, to settle what is open);
 #'   `mechanisms`, for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits
 #'   `also` and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`, `attribution` and
 #'   `method`. Of several records the sentences and `scores` are in units of each one's noise, and `records` and
@@ -34,8 +35,9 @@ summary.amiss_upgrade <- function(object, ...) {
   verdict <- diagnosis_verdict(object)
   last <- object$models[[length(object$models)]]
   structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
-              list(note = size_note(object), sure = sure_sentences(object), change = change_sentences(object),
-                   gain = gain_sentences(object), remains = remaining_sentences(object),
+              list(record = record_faults(object), note = size_note(object), sure = sure_sentences(object),
+                   change = change_sentences(object), gain = gain_sentences(object),
+                   remains = remaining_sentences(object),
                    inspect = upgrade_inspections(object),
                    mechanisms = lapply(adopted_models(object), mechanism_words, object), scores = scores_table(object),
                    changes = changes_table(object), candidates = candidates_words(object),
@@ -52,10 +54,10 @@ summary.amiss_upgrade <- function(object, ...) {
 print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$tag}")
   cli::cli_text("{x$headline}")
-  parts <- list("How sure" = x$sure, "What would change" = x$change, "What it brings" = c(x$gain, x$of_records),
-                "What remains" = x$remains,
+  parts <- list("Faults of the record" = x$record, "How sure" = x$sure, "What would change" = x$change,
+                "What it brings" = c(x$gain, x$of_records), "What remains" = x$remains,
                 "What to inspect next" = x$inspect)
-  say_parts(parts)
+  say_parts(parts[lengths(parts) > 0])
 })
 
 # The first step's trials that have a number, best first.
@@ -67,8 +69,18 @@ first_trials <- function(upgrade) {
 
 last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$attribution$table
 
-# The verdict on the whole: what of the mechanisms adopted is named, or what stays open.
+# The verdict on the whole, after what the record itself has.
 diagnosis_verdict <- function(upgrade) {
+  verdict <- mechanism_verdict(upgrade)
+  faults <- record_doubt_words(names(record_faults(upgrade)))
+  if (is.null(faults)) return(verdict)
+  if (verdict$verdict != "likely") verdict$tag <- paste0(verdict$tag, "; ", faults)
+  verdict$headline <- paste0("Mend the record first: ", sub("the record itself", "it", faults), ". ", verdict$headline)
+  verdict
+}
+
+# What of the mechanisms adopted is named, or what stays open.
+mechanism_verdict <- function(upgrade) {
   adopted <- adopted_models(upgrade)
   if (!length(adopted)) return(open_verdict(upgrade))
   of <- function(verdict) Filter(function(m) m$verdict == verdict, adopted)
@@ -432,6 +444,7 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   if (length(others)) cli::cli_bullets(c("*" = "{others}"))
   told <- unlist(lapply(x$catalogue[vapply(adopted, `[[`, "", "mechanism")], description_sentence, last_fit(x)))
   for (sentence in told) cli::cli_bullets(c("*" = "{sentence}"))
+  for (fault in utils::head(record_faults(x), 3)) cli::cli_bullets(c("!" = "{fault}"))
   g <- x$gain
   errors <- function(rmse) if (length(adopted)) paste(signif(rmse, 3), collapse = " -> ") else signif(rmse[1], 3)
   cli::cli_bullets(c("*" = paste0("RMSE {errors(g$rmse_calibration)} in calibration, ",

@@ -14,11 +14,11 @@ regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
     apart > max(0.02, 2 * stats::quantile(apart, 0.9))
   segment <- cumsum(c(1L, ends))
   row <- seq_along(hours)
-  if (any(!ends & (apart > 0.01 * steps | steps < 0.5))) {
+  if (any(!ends & (apart > 1e-6 * steps | steps < 0.5))) {
     snapped <- snap(hours, segment, step)
     row <- which(snapped$keep)
     if (length(row) < (1 - stray_share) * length(hours)) refuse_unequal(steps, step, ends, name, call)
-    tell_stray(hours, snapped, name)
+    if (any(!ends & (apart > 0.01 * steps | steps < 0.5))) tell_stray(hours, snapped, name)
     hours <- snapped$hours[row]
     segment <- segment[row]
     step <- snapped$step

@@ -25,7 +25,8 @@ upgrade_inspections <- function(upgrade) {
 }
 
 calibration_inspections <- function(fit, model = NULL) {
-  c(trust_inspections(fit, "the model"),
+  c(read_findings(list(list(fit = fit)), fit$measurements),
+    trust_inspections(fit, "the model"),
     if (!is.null(model)) held_out_inspection(model, fit$measurements),
     edge_inspections(fit), tied_inspections(fit), loose_inspections(fit),
     if (!is.null(model)) remainder_inspection(model, fit$measurements),
@@ -38,7 +39,8 @@ comparison_inspections <- function(comparison) {
   best <- comparison$models[[best_model(comparison)]]
   attribution <- comparison$tables$attribution
   answers <- attribution$boundary[attribution$model == best$name & attribution$significant]
-  c(unlist(lapply(comparison$models, function(m) trust_inspections(m$fit, m$name)), use.names = FALSE),
+  c(read_findings(unname(comparison$models), comparison$measurements),
+    unlist(lapply(comparison$models, function(m) trust_inspections(m$fit, m$name)), use.names = FALSE),
     separation_inspection(comparison),
     held_out_inspection(best, comparison$measurements),
     edge_inspections(best$fit),
@@ -339,15 +341,24 @@ answer_inspections <- function(upgrade, last) {
   stats::setNames(told, rep("answer", length(told)))
 }
 
-# Drivers of mechanisms that are not among the conditions analysed.
+# Drivers of mechanisms that are not among the conditions analysed: left out as constant, or never given.
 driver_inspections <- function(upgrade) {
   drivers <- unique(unlist(lapply(upgrade$catalogue, `[[`, "boundary")))
   absent <- setdiff(drivers, upgrade$measurements$conditions)
-  if (!length(absent)) return(NULL)
-  driven <- names(upgrade$catalogue)[vapply(upgrade$catalogue, function(m) any(m$boundary %in% absent), NA)]
-  c(driver = sprintf(paste("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of",
-                           "measurements(), so that the error can answer to it."),
-                     listed(absent), if (length(absent) > 1) "drive" else "drives", listed(driven)))
+  constant <- intersect(absent, unlist(lapply(each_record(upgrade$measurements), `[[`, "constant")))
+  absent <- setdiff(absent, constant)
+  driven_by <- function(conditions) {
+    listed(names(upgrade$catalogue)[vapply(upgrade$catalogue, function(m) any(m$boundary %in% conditions), NA)])
+  }
+  c(if (length(constant)) {
+      c(constant = sprintf(paste("%s did not vary in calibration, so that %s cannot be judged: calibrate on rows with",
+                                 "changes."), listed(constant), driven_by(constant)))
+    },
+    if (length(absent)) {
+      c(driver = sprintf(paste("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of",
+                               "measurements(), so that the error can answer to it."),
+                         listed(absent), if (length(absent) > 1) "drive" else "drives", driven_by(absent)))
+    })
 }
 
 # ---- the parameters

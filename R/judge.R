@@ -7,6 +7,7 @@ doubt <- function(says, reason) list(says = says, reason = reason)
 # Tests of a case: the mechanism's model and its parent, its row and those of its rivals, and what judge_models()
 # knows of all models.
 doubts <- list(
+  record = doubt(function(case) record_doubt_words(case$faults), "a fault of the record looks like a cause"),
   describes = doubt(function(case) {
     if (describes(case$entry)) "it describes what is missing and does not explain it"
   }, "a response is no cause"),
@@ -59,15 +60,17 @@ doubts <- list(
   }, "a parabola in time does as well"))
 
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism, and `steps`
-# (step_effect() of each record) of all. A mechanism is a stand-in if held-out data do not improve; it is named if
-# nothing speaks against it, and likely otherwise.
-judge_models <- function(models, candidates, catalogue, measurements, control, threads) {
+# (step_effect() of each record) of all, and `suspects` of the first (record_suspects()). A mechanism is a stand-in if
+# held-out data do not improve; it is named if nothing speaks against it, and likely otherwise.
+judge_models <- function(models, candidates, catalogue, measurements, control, threads, runs = Inf) {
   models <- lapply(models, function(model) {
     model$steps <- lapply(record_fits(model$fit), step_effect, threads)
     model
   })
+  models[[1]]$suspects <- record_suspects(models, measurements, threads, runs)
   shared <- list(candidates = candidates, measurements = measurements, threads = threads,
                  remains = much_remains(models, measurements),
+                 faults = c(names(read_findings(models, measurements)), models[[1]]$suspects$id),
                  inside = last_model(models)$scores$validate[["coverage95"]])
   for (k in seq_along(models)[-1]) {
     case <- c(shared, mechanism_case(models, k, catalogue, candidates, control, threads))

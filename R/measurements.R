@@ -29,6 +29,23 @@
 #' quarter of a step are taken at the nearest of equal steps; rows at none, up to a tenth of all, are left out. Each of
 #' these is told.
 #'
+#' # Faults of a record
+#'
+#' Some values cannot be measurements. Codes for a missing value are refused (`missing`). Other faults are findings:
+#'
+#' * values far outside all others,
+#' * a target at the end of its sensor's range (`range`),
+#' * a sensor that is stuck,
+#' * a target in steps that are coarse for its noise,
+#' * values that are repeated in several rows,
+#' * a direction that is not `circular()`,
+#' * a counter that rises and is reset,
+#' * a condition that is constant in calibration but not in the held-out rows.
+#'
+#' Zeros, columns of few levels (switches, schedules) and the ends of what drives are no faults. [upgrade_model()] adds
+#' what its base model shows: clocks that differ, a start that is not forgotten, a step of the sensor. While a finding
+#' stands, a mechanism is *likely* at most.
+#'
 #' @param data A data frame, or a series of class `zoo`, `xts`, `ts` or `tsibble`; every numeric column may drive the
 #'   simulator. A `ts` of 24 values a cycle, or a multiple of that, counts days.
 #' @param time Name of the time column; a series that knows its own needs none.
@@ -52,10 +69,15 @@
 #'   such as `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular
 #'   boundary conditions by way of sine and cosine.
+#' @param missing Values that stand for a missing one, such as `c(-9999, 85)`: they become `NA` in every column. `NA`
+#'   says that no value does. Otherwise, codes in the target or in a boundary condition are refused.
+#' @param range Lower and upper end of the range of the target's sensor. Rows at an end, or beyond, are left out of the
+#'   comparison.
 #' @return An object of class `amiss_measurements`. Of each row, after averaging, `time`, `hours`, the target `y` and
 #'   `use` (`"calibrate"`, `"validate"`, `"warmup"` or `"none"`); the calibration rows are those of the first use
 #'   whose `y` is not `NA`. `noise` says how `noise_sd` came about (`method`, and
-#'   `per_step`, the value of each average, where it was estimated).
+#'   `per_step`, the value of each average, where it was estimated). `findings` is a data frame with a row for each
+#'   fault of the record: `id`, `column`, `rows`, `value`, and what it `says`.
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6)
@@ -69,7 +91,7 @@
 #' @export
 measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, average = NULL, calibrate = NULL,
                          validate = NULL, warmup = 0, name = target, unit = "", time_format = NULL, time_zone = NULL,
-                         fill_gaps = 0) {
+                         fill_gaps = 0, missing = NULL, range = NULL) {
   table <- time_table(data, time, time_format)
   data <- table$data
   time <- table$time
@@ -79,6 +101,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   check_input(checkmate::check_number(fill_gaps, lower = 0, finite = TRUE), "fill_gaps")
   terms <- boundary_terms(boundary)
   check_record(data, time, target, terms, name, unit)
+  check_marks(missing, range)
   require_columns(data, c(time, target, terms$name))
   if (any(terms$name %in% c(time, target))) {
     abort_input(
@@ -89,6 +112,9 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   data <- with_switches(data, terms$name)
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
   require_numeric(data, c(target, terms$name))
+  circular <- terms$name[terms$circular]
+  data <- with_marks(data, c(target, numeric_columns), target, missing, range)
+  if (!identical(missing, NA)) refuse_codes(data, c(target, terms$name), circular)
   drivers <- as.matrix(data[numeric_columns])
   y <- as.numeric(data[[target]])
   if (any(is.infinite(y))) {
@@ -109,8 +135,9 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   used_for <- ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none"))
   grid <- regular_grid(time_hours(stamps), fill_gaps, time)
   there <- !is.na(grid$row)
+  use_given <- used_for
   tell_gaps(grid$hours[there], grid$segment[there], used_for[grid$row[there]], grid$row[there])
-  drivers <- fill_drivers(drivers[grid$row, , drop = FALSE], grid, fill_gaps, terms$name[terms$circular])
+  drivers <- fill_drivers(drivers[grid$row, , drop = FALSE], grid, fill_gaps, circular)
   stamps <- grid_time(stamps, grid)
   require_complete(drivers, terms$name, stamps, grid$row)
   # A lost row has the use of the row before it, which it needs for averages only.
@@ -141,14 +168,23 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
     x <- x_keep(x, setdiff(x$names, constant))
   }
   noise <- noise_level(noise_sd, coarse, raw$y)
-  check_target_values(y, target)
+  findings <- record_findings(list(columns = c(data[target], data[numeric_columns]), target = target,
+                                   conditions = terms$name, circular = circular, use = use_given,
+                                   noise_sd = noise$sd * sqrt(coarse$per_step), per_step = coarse$per_step))
   structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise$sd,
                  noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time,
                  hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
-                 time_format = table$format, time_zone = time_zone),
+                 time_format = table$format, time_zone = time_zone, constant = constant, findings = findings,
+                 faulty = faulty_steps(findings, target, coarse$block, grid$row)),
             class = "amiss_measurements")
+}
+
+# Steps of the averaged record in which a reading of the target is known to be none.
+faulty_steps <- function(findings, target, block, row) {
+  rows <- unlist(findings$rows[findings$column == target])
+  unique(block[match(rows, row)])
 }
 
 #' @rdname measurements
@@ -418,8 +454,11 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
     c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}{origin}",
                      "*" = "{n[['calibrate']]} calibrate, {n[['validate']]} validate, {n[['warmup']]} warm up",
                      "*" = if (any(lost)) "{sum(lost)} without a measurement, left out",
-                     "*" = "boundary conditions {.field {x$conditions}}",
-                     ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
+                     "*" = "boundary conditions {.field {x$conditions}}"))
+  said <- findings_read(x)$says
+  for (one in utils::head(said, 5)) cli::cli_bullets(c("!" = "{one}"))
+  if (length(said) > 5) cli::cli_bullets(c("!" = "{length(said) - 5} more: see {.code $findings}"))
+  cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
 
 condition_values <- function(measurements, name) {

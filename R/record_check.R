@@ -1,8 +1,5 @@
 # What a table of measurements must not hold, beside what cannot be read.
 
-# Codes of loggers for a value that is missing.
-missing_codes <- c(-9999, -99999)
-
 check_record <- function(data, time, target, terms, name, unit, call = rlang::caller_env()) {
   check_input(checkmate::check_string(name), "name", call = call)
   check_input(checkmate::check_string(unit), "unit", call = call)
@@ -19,12 +16,40 @@ check_record <- function(data, time, target, terms, name, unit, call = rlang::ca
   }
 }
 
-check_target_values <- function(y, target, call = rlang::caller_env()) {
-  coded <- which(y %in% missing_codes)
-  if (length(coded)) {
-    abort_input(c(paste("Target {.val {target}} is {y[coded[1]]} in {length(coded)} row{?s}, the first {coded[1]}: a",
-                        "code for what is missing."),
-                  i = "Mark a missing value as NA: it is then left out."), call = call)
+check_marks <- function(missing, range, call = rlang::caller_env()) {
+  if (!identical(missing, NA)) {
+    check_input(checkmate::check_numeric(missing, null.ok = TRUE, any.missing = FALSE), "missing",
+                "Give the values that stand for a missing one, or {.code NA} if there is none.", call = call)
+  }
+  check_input(checkmate::check_numeric(range, len = 2, any.missing = FALSE, null.ok = TRUE), "range",
+              "Give the lower and the upper end of the sensor's range, such as {.code c(-Inf, 27)}.", call = call)
+  if (!is.null(range) && range[1] >= range[2]) {
+    abort_input("{.arg range} goes from {range[1]} to {range[2]}: the lower end comes first.", call = call)
+  }
+}
+
+# The table with NA for the codes in `missing`, and for a target at or beyond an end of its range.
+with_marks <- function(data, columns, target, missing, range) {
+  codes <- missing[!is.na(missing)]
+  for (column in columns) data[[column]][data[[column]] %in% codes] <- NA
+  if (length(range)) {
+    y <- data[[target]]
+    data[[target]][!is.na(y) & (y <= range[1] | y >= range[2])] <- NA
+  }
+  data
+}
+
+# `columns`: the target and the boundary conditions. `circular`: those of them in degrees.
+refuse_codes <- function(data, columns, circular, call = rlang::caller_env()) {
+  for (column in columns) {
+    v <- as.numeric(data[[column]])
+    rows <- coded_rows(v, column %in% circular)
+    if (!length(rows)) next
+    codes <- unique(v[rows])
+    abort_input(c(paste("{.val {column}} is {listed(format_each(codes), 'or')} in {rows_words(rows)}: a code for a",
+                        "missing value."),
+                  i = "Give {.code missing = {value_code(codes)}} to set it to NA, or correct these rows.",
+                  i = "If it was measured, {.code missing = NA} says that no value is a code."), call = call)
   }
 }
 

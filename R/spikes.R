@@ -21,6 +21,7 @@ spike_inspection <- function(model, measurements) {
   rows <- model$fit$rows
   r <- p$observed - p$mean
   apart <- spikes(r, measurements$hours[rows], measurements$step_h)
+  apart <- apart[!rows[apart] %in% measurements$faulty]
   if (!length(apart)) return(NULL)
   at <- measurements$time[rows][apart[1]]
   c(spikes = sprintf(paste("%d of %d readings, the first at %s, %s apart from those before and after: a sensor that",

@@ -47,18 +47,22 @@ likely_amounts <- function(drivers, off) {
   }
 }
 
-# A change of the output, seen by least squares under the priors, white noise and the emulator's slopes.
-taken_up <- function(fit, change) {
+# Slopes of the emulated output at the posterior's centre, in the target's unit for a standard deviation of each prior.
+emulated_slopes <- function(fit) {
   centre <- posterior_centre(fit)
   p <- length(centre)
   by <- 0.05  # standard deviations of the prior
   coefficients <- function(x) predict_emulator_(fit$emulator$processes, x)$mean
   around <- matrix(centre, p, p, byrow = TRUE)
-  slopes <- fit$emulator$basis$vectors %*% t(coefficients(around + diag(by, p)) - coefficients(around - diag(by, p))) /
-    (2 * by)
+  fit$emulator$basis$vectors %*% t(coefficients(around + diag(by, p)) - coefficients(around - diag(by, p))) / (2 * by)
+}
+
+# A change of the output, seen by least squares under the priors, white noise and the emulator's slopes.
+taken_up <- function(fit, change) {
+  slopes <- emulated_slopes(fit)
   weight <- 1 / fit$measurements$noise_sd^2
-  move <- solve(weight * crossprod(slopes) + diag(p), weight * crossprod(slopes, change))[, 1]
-  sd <- sqrt(colSums(fit$weights * sweep(to_normal(posterior_unit(fit)), 2, centre)^2))
+  move <- solve(weight * crossprod(slopes) + diag(ncol(slopes)), weight * crossprod(slopes, change))[, 1]
+  sd <- sqrt(colSums(fit$weights * sweep(to_normal(posterior_unit(fit)), 2, posterior_centre(fit))^2))
   list(error = rms(change - slopes %*% move), moved = stats::setNames(move / sd, names(fit$emulator$parameters)))
 }
 

@@ -111,7 +111,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, contr
 finish_upgrade <- function(state, context) {
   measurements <- state$started$measurements
   models <- judge_models(state$models, state$candidates, state$catalogue, measurements, context$control,
-                         context$threads)
+                         context$threads, runs_left(context))
   structure(list(format_version = format_version, models = models, candidates = state$candidates,
                  catalogue = state$catalogue,
                  named_cause = named_cause(models, state$candidates, state$catalogue),
