@@ -33,7 +33,7 @@ amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, contro
   } else {
     record_measurements(data, noise_sd)
   }
-  if (is.data.frame(runs)) runs <- as.matrix(runs)
+  runs <- as_number_matrix(runs)
   check_input(checkmate::check_matrix(runs, "numeric"), "runs")
   made <- ensemble(design, runs, parameters, m)
   calibrate_refined(made, m, rounds = 0, control = control, seed = seed, threads = threads)

@@ -85,7 +85,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
       c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
                   i = "Leave it out of {.arg boundary}."))
   }
-  stamps <- read_time(data[[time]], time, table$format, time_zone)
+  reading <- time_reading(data[[time]], time, table$format, time_zone)
+  stamps <- reading$time
   data <- with_switches(data, terms$name)
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
   require_numeric(data, c(target, terms$name))
@@ -147,7 +148,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                  hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
-                 time_format = table$format, time_zone = time_zone),
+                 time_format = reading$format, time_zone = time_zone),
             class = "amiss_measurements")
 }
 
