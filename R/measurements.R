@@ -87,6 +87,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   }
   reading <- time_reading(data[[time]], time, table$format, time_zone)
   stamps <- reading$time
+  clock <- condition_clock(data[[time]], reading, time_zone)
+  columns_known <- with_time(data, stamps)
   data <- with_switches(data, terms$name)
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
   require_numeric(data, c(target, terms$name))
@@ -97,8 +99,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                         "{which(is.infinite(y))[1]}."),
                   i = "Mark a missing value as NA: it is then left out."))
   }
-  if (is.character(calibrate)) calibrate <- eval_rows(calibrate, data, "calibrate")
-  if (is.character(validate)) validate <- eval_rows(validate, data, "validate")
+  calibrate <- chosen_rows(calibrate, columns_known, clock, "calibrate")
+  validate <- chosen_rows(validate, columns_known, clock, "validate")
   calibrate <- rows_flag(calibrate, nrow(data), "calibrate", default = is.null(validate) | !isTRUE(any(validate)))
   if (is.null(calibrate)) calibrate <- !validate
   validate <- rows_flag(validate, nrow(data), "validate", default = FALSE)
@@ -232,16 +234,38 @@ require_complete <- function(drivers, analysed, time, row = seq_along(time), cal
   }
 }
 
-eval_rows <- function(text, data, what, call = rlang::caller_env()) {
+# What conditions may name: the columns, and the record's time as `time` if none is called so.
+with_time <- function(data, stamps) {
+  if (!"time" %in% names(data)) data$time <- stamps
+  data
+}
+
+# The rows that an argument chooses: a condition of a study file, R code as text, or logical values as they are.
+chosen_rows <- function(rows, data, clock, what, call = rlang::caller_env()) {
+  if (inherits(rows, "amiss_row_condition")) row_condition(rows$text, data, what, clock, call)
+  else if (is.character(rows)) eval_rows(rows, data, what, clock, call)
+  else rows
+}
+
+eval_rows <- function(text, data, what, clock, call = rlang::caller_env()) {
   check_input(checkmate::check_string(text, min.chars = 1), what, "One expression in the columns of the data.",
               call = call)
-  rows <- tryCatch(eval(str2lang(text), data, baseenv()),
-                   error = function(e) abort_input(
-                     c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
-                                                     i = paste("Write an expression in the columns, for example",
-                                                               "{.code phase == \"rolbs\"}.")),
-                                                     call = call))
-  rows
+  refuse <- function(e) {
+    abort_input(c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
+                  i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."), call = call)
+  }
+  scope <- list2env(comparisons(clock), parent = baseenv())
+  in_zone(clock$zone %||% attr(clock$time, "tzone")[1],
+          tryCatch(eval(str2lang(text), as.list(data), scope), error = refuse))
+}
+
+# Code to which times that say no zone are in this one.
+in_zone <- function(zone, code) {
+  if (is.null(zone) || !nzchar(zone)) return(code)
+  before <- Sys.getenv("TZ", NA)
+  on.exit(if (is.na(before)) Sys.unsetenv("TZ") else Sys.setenv(TZ = before))
+  Sys.setenv(TZ = zone)
+  code
 }
 
 rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {

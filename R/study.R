@@ -175,7 +175,9 @@ naming_record <- function(name, code, call = rlang::caller_env()) {
 
 study_measurements <- function(study, files) {
   data <- study_data(files[["data"]])
-  rows <- function(field) row_condition(study[[field]], data, field)
+  rows <- function(field) {
+    if (!is.null(study[[field]])) structure(list(text = study[[field]]), class = "amiss_row_condition")
+  }
   measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
                noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
                validate = rows("validate"),

@@ -154,7 +154,7 @@ stamps_time <- function(text, name, format, zone, call) {
   clock <- parts[, ncol(parts) - 4:0, drop = FALSE]
   seconds <- clock_seconds(clock)
   date <- switch(stamps$form, ymd = parts[, 1:3, drop = FALSE], no_year = cbind(NA, parts[, 1:2, drop = FALSE]),
-                 ordered_date(parts, if (isTRUE(format %in% c("dmy", "mdy"))) format else day_order(stamps, name, call)))
+                 ordered_date(parts, if (said_order(format)) format else day_order(stamps, name, call)))
   if (stamps$form == "no_year") {
     hours <- hours_of_year(date, seconds)
     require_read(is.na(hours), text, name, call)
@@ -213,6 +213,8 @@ offset_seconds <- function(offset) {
 
 # Days since 1970 of year, month and day; NA where there is no such day.
 day_number <- function(date) as.numeric(as.Date(paste(date[, 1], date[, 2], date[, 3]), format = "%Y %m %d"))
+
+said_order <- function(format) isTRUE(format %in% c("dmy", "mdy"))
 
 # Year, month and day of a column such as 01/02/2020.
 ordered_date <- function(parts, order) {

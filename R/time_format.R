@@ -54,8 +54,8 @@ plain_time <- function(values, name, call) {
   if (inherits(values, c("POSIXt", "Date")) || is_span(values) || is.character(values)) return(values)
   if (is.numeric(values) && !is.object(values)) return(as.numeric(values))
   abort_input(c("Time column {.val {name}} is of class {.cls {class(values)}}.",
-                i = paste("Give text, numbers, {.cls POSIXct}, {.cls POSIXlt}, {.cls Date} or {.cls difftime}; most other",
-                          "classes become {.cls POSIXct} by {.fun as.POSIXct}, lengths of time hours by",
+                i = paste("Give text, numbers, {.cls POSIXct}, {.cls POSIXlt}, {.cls Date} or {.cls difftime}; most",
+                          "other classes become {.cls POSIXct} by {.fun as.POSIXct}, lengths of time hours by",
                           "{.code as.numeric(x, \"hours\")}.")), call = call)
 }
 
@@ -64,7 +64,7 @@ settled_format <- function(values, name, format, zone, call) {
   if (is_pattern(format) || !plain) return(format)
   numbers <- if (is.character(values)) text_numbers(clean_text(values)) else values
   if (is.null(numbers)) {
-    if (isTRUE(format %in% c("dmy", "mdy"))) return(format)
+    if (said_order(format)) return(format)
     return(day_order(stamp_parts(clean_text(values), name, call), name, call))
   }
   if (is.null(format)) return(number_format(numbers, name, zone, call))

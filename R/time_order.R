@@ -28,7 +28,8 @@ check_years <- function(time, values, name, call) {
   year <- as.POSIXlt(time, tz = "UTC")$year + 1900
   bad <- which(year < 1000 | year > 2999)
   if (!length(bad)) return(invisible())
-  abort_input(c("Time column {.val {name}}: row {bad[1]} holds {.val {format(values[bad[1]])}}, in the year {year[bad[1]]}.",
+  abort_input(c(paste("Time column {.val {name}}: row {bad[1]} holds {.val {format(values[bad[1]])}}, in the year",
+                      "{year[bad[1]]}."),
                 i = paste("Read a year of two digits by {.val %y} of {.fun strptime}, not by {.val %Y}; a simulated",
                           "year far from ours is best given in hours.")), call = call)
 }
