@@ -27,7 +27,7 @@ comparable <- function(column, value, ordered, clock) {
   if (is.factor(value)) value <- as.character(value)
   if (is_record_time(column, value, clock)) {
     value <- if (is_moment(value)) value else as_text(value)
-    return(time_pair(clock$time, value, clock$format, clock$zone))
+    return(time_pair(clock$time, value, own_format(clock$format, column, value), clock$zone))
   }
   if (is_moment(column) || is_moment(value)) return(moment_pair(column, value, clock))
   if (is_span(column)) column <- as.numeric(unclass(column))
@@ -52,6 +52,12 @@ is_record_time <- function(column, value, clock) {
   is.numeric(value) && is_pattern(clock$format)
 }
 
+# The order of day and month in a column is not that of a text with dots, if the column has none.
+own_format <- function(format, column, value) {
+  dotted <- function(x) any(grepl("^\\d+\\.", x))
+  if (said_order(format) && dotted(value) && !dotted(column)) NULL else format
+}
+
 # Seconds since 1970, or hours where no date is known.
 time_pair <- function(time, value, format, zone) {
   if (is.character(value)) value <- read_moments(value, time, format, zone)
@@ -70,7 +76,8 @@ moment_pair <- function(column, value, clock) {
   time <- pair[[which(moment)]]
   text <- pair[[which(!moment)]]
   if (!is.character(text)) {
-    stop("a time is compared with ", seen(text), "; write a time in quotes, such as \"2013-09-02 00:00\"", call. = FALSE)
+    stop("a time is compared with ", seen(text), "; write a time in quotes, such as \"2013-09-02 00:00\"",
+         call. = FALSE)
   }
   format <- if (identical(time, clock$time)) clock$format
   pair[[which(!moment)]] <- read_moments(text, time, format, clock_zone(time, clock))
@@ -81,8 +88,8 @@ clock_zone <- function(time, clock) {
   if (inherits(time, "Date")) return("UTC")
   zone <- clock$zone %||% attr(time, "tzone")[1] %||% ""
   if (nzchar(zone)) return(zone)
-  stop("the times of the column name no zone, so that a text is another time on each machine; say `time_zone`, such as ",
-       "\"UTC\"", call. = FALSE)
+  stop("the times of the column name no zone, so that a text is another time on each machine; say `time_zone`, such ",
+       "as \"UTC\"", call. = FALSE)
 }
 
 # Two texts have an order only if they are numbers, times of day or times.
@@ -94,7 +101,8 @@ ordered_texts <- function(column, value, clock) {
   column <- clean_text(column)
   tryCatch({
     format <- settled_format(column, "text", NULL, clock$zone, NULL)
-    time_pair(parse_time(column, "text", format, clock$zone, NULL), value, format, clock$zone)
+    time <- parse_time(column, "text", format, clock$zone, NULL)
+    time_pair(time, value, own_format(format, column, value), clock$zone)
   }, amiss_error_input = function(e) {
     first <- column[!is.na(column)][1]
     stop(dQuote(first, FALSE), " and ", dQuote(value[1], FALSE), " are compared by their order, but they are no times ",

@@ -45,14 +45,14 @@ order_hint <- function(time, hours, steps) {
   again <- mean(duplicated(hours))
   if (all(steps >= 0) && again <= 0.05) return("Keep one row for each time.")
   if (all(steps >= 0)) {
-    return(paste("Do not delete rows: if the stamps are rounded, give them to the second; if several series stand below",
-                 "one another, make each a column."))
+    return(paste("Do not delete rows: if the stamps are rounded, give them to the second; if several series stand",
+                 "below one another, make each a column."))
   }
   # An instant has one place. A count may begin again, and then a few rows go back.
   if (again == 0 && (dated || mean(steps < 0) > 0.1 && diff(range(hours)) > 24)) return("Sort the rows by time.")
   paste("Do not sort the rows:",
-        if (dated) paste("clocks were set back (for the end of daylight saving give local text and {.arg time_zone}, or",
-                         "UTC), a clock of 12 hours lacks AM and PM, or several series stand below one another.")
+        if (dated) paste("clocks were set back (for the end of daylight saving give local text and {.arg time_zone},",
+                         "or UTC), a clock of 12 hours lacks AM and PM, or several series stand below one another.")
         else paste("a count or a time of day begins again. Give each row its date, or add to each part what had",
                    "passed before it."))
 }
