@@ -3,11 +3,11 @@ study_fields <- list(
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
   optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
-               "fill_gaps_h", "runs", "seed", "control", "title", "records"))
+               "fill_gaps_h", "separator", "decimal", "runs", "seed", "control", "title", "records"))
 
 # What each of several records may have of its own.
 record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h", "calibrate", "validate",
-                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h")
+                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h", "separator", "decimal")
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
@@ -174,7 +174,7 @@ naming_record <- function(name, code, call = rlang::caller_env()) {
 }
 
 study_measurements <- function(study, files) {
-  data <- study_data(files[["data"]])
+  data <- study_data(study, files[["data"]])
   rows <- function(field) {
     if (!is.null(study[[field]])) structure(list(text = study[[field]]), class = "amiss_row_condition")
   }
@@ -248,16 +248,14 @@ require_trust <- function(files, folder, trust, call = rlang::caller_env()) {
                  class = c("amiss_error_trust", "amiss_error_input", "amiss_error"), call = short_call(call))
 }
 
-study_data <- function(path, call = rlang::caller_env()) {
+study_data <- function(study, path, call = rlang::caller_env()) {
   if (is_code(c(data = path))) {
     data <- source_value(path, "data", call)
     check_input(checkmate::check_data_frame(data), "data", "Let the R file end with a data frame.", call = call)
     return(data)
   }
-  text <- read_utf8(path, "data", call)
-  tryCatch(utils::read.csv(text = text, stringsAsFactors = FALSE, check.names = FALSE), error = function(e) {
-    abort_input(c("The data file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
-  })
+  conditions <- boundary_terms(as.character(unlist(study$boundary)), call)$name
+  read_table_file(path, c(study$time, study$target, conditions), study$separator, study$decimal, call)
 }
 
 # `files`: those of each record.
