@@ -30,9 +30,9 @@ plain_column <- function(text) {
 
 # The decimal marks by which all numbers of a column can be read.
 column_marks <- function(text) {
-  text <- text[!text %in% missing_words & grepl("^[-+.,0-9]*[0-9]", text) & grepl("[.,]", text)]
-  text <- joined_thousands(text)
-  names(number_forms)[vapply(number_forms, function(form) length(text) > 0 && all(grepl(form, text, perl = TRUE)), NA)]
+  text <- joined_thousands(text[grepl("^[-+.,0-9]*[0-9]", text) & grepl("[.,]", text)])
+  fits <- function(form) length(text) > 0 && all(grepl(form, text, perl = TRUE))
+  names(number_forms)[vapply(number_forms, fits, NA)]
 }
 
 # The mark of the whole file. Between commas only fields in quotes hold a comma: one that could separate thousands does.
@@ -45,8 +45,8 @@ file_decimal <- function(columns, marks, separator, refuse) {
     if (is.na(row)) next
     other <- grep(",", columns[[comma[1]]], fixed = TRUE)[1]
     refuse("Row ", other, " of the column ", comma[1], " holds ", columns[[comma[1]]][other], ", with a comma before ",
-           "decimals, and row ", row, " of ", name, " holds ", columns[[name]][row], ", with a point. Say `decimal` in ",
-           "the study: \",\" makes points separate thousands, \".\" commas.")
+           "decimals, and row ", row, " of ", name, " holds ", columns[[name]][row], ", with a point. Say `decimal` ",
+           "in the study: \",\" makes points separate thousands, \".\" commas.")
   }
   ","
 }

@@ -10,9 +10,14 @@
 #' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text in one
 #' format: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without), `30.08.2013 00:10`,
 #' `30/08/2013 00:10` or `08/30/2013 12:10 AM` (where the whole column tells day from month), the stamps of EnergyPlus
-#' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. Numbers of 1e8 and more
-#' are Unix time in seconds or milliseconds, which is told. A `Date` is its beginning, 00:00 UTC: for daily values that
-#' are dated by their day give `date + 1`. What stays open is an error, and `time_format` settles it.
+#' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. A `Date` is its
+#' beginning, 00:00 UTC: for daily values that are dated by their day give `date + 1`.
+#'
+#' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Unix time, digits of a date such as 201308300010,
+#' and days that Excel, MATLAB or astronomers count are recognised, with a message, if they cannot be hours. Numbers
+#' that could be several things are an error that names the `time_format` of each: daily digits of two-digit years,
+#' whole days of Excel, steps of 5, 10, 60 or 600, a column called `day` or `seconds`. What stays open is an error, and
+#' `time_format` settles it.
 #'
 #' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when daylight saving ends,
 #' the column's order tells the first from the second; a time that its beginning leaves out is an error. Text that steps
@@ -42,12 +47,16 @@
 #' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that say which rows
 #'   calibrate and which validate. Without both all rows calibrate; without `calibrate`, all but those that validate;
 #'   without `validate`, none validate. At least 20 rows must calibrate. Rows of neither use still drive the simulator.
+#'   In text the record's time may be called `time`. Texts in quotes are compared with times as times, in the format of
+#'   their column or as ISO 8601 and in `time_zone` (`"time >= '2013-09-02'"`), with numbers as numbers.
 #' @param warmup Hours at the start of each segment that are left out, so that the simulator's unknown initial
 #'   state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
 #' @param time_format What the time column holds, if it does not tell itself: of text `"dmy"` or `"mdy"`; of numbers
-#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` or `"unix"` (`warmup`, `average` and `fill_gaps` stay in hours: 5 s
-#'   are `5 / 3600`); of either a format of [strptime()] (`"%Y%m%d%H"`).
+#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` (`warmup`, `average` and `fill_gaps` stay in hours: 5 s are
+#'   `5 / 3600`), `"unix"` (since 1970, in seconds, milliseconds, microseconds or nanoseconds), or days counted from a
+#'   date: `"excel"` (41516 is 30 August 2013), `"matlab"`, `"julian"`, `"mjd"` (modified Julian), `"unix_days"` (since
+#'   1970); of either a format of [strptime()] (`"%Y%m%d%H"`).
 #' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in: `"UTC"`, or a name
 #'   such as `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular

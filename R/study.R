@@ -27,20 +27,20 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'
 #' *Several records.* `records` maps the name of each record to the fields that it has of its own, of `data`, `time`,
 #' `target`, `boundary`, `model`, `noise_sd`, `average_h`, `calibrate`, `validate`, `warmup_h`, `unit`, `time_format`,
-#' `time_zone` and `fill_gaps_h`; those outside are for all that do not say otherwise. The value of a `model` may also
-#' be a list of simulators by the names of the records ([outputs_of()]). A catalogue that is a function gets the list of
-#' measurements. The loop is then that of [upgrade_model()] over several records.
+#' `time_zone`, `fill_gaps_h`, `separator` and `decimal`; those outside are for all that do not say otherwise. The value
+#' of a `model` may also be a list of simulators by the names of the records ([outputs_of()]). A catalogue that is a
+#' function gets the list of measurements. The loop is then that of [upgrade_model()] over several records.
 #'
-#' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
-#' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`,
-#' `average_h`, `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]), `calibrate`,
-#' `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in [upgrade_model()] or
-#' [compare_models()]). R files are evaluated in their own folder.
+#' The other fields are `study` (name), `data` (a table, see *Tables*, or an R file whose value is a data frame),
+#' `time`, `target`, `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target),
+#' `noise_sd`, `average_h`, `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]),
+#' `separator`, `decimal` (of the table), `calibrate`, `validate` (conditions in the columns of the data), `runs`,
+#' `seed` and `control` (as in [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
 #'
 #' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical.
 #' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets,
-#' the four operations of arithmetic and `%in% c(...)`. One that begins with `!` needs quotes around it:
-#' `validate: '!(hour > 72)'`.
+#' the four operations of arithmetic and `%in% c(...)`. Texts are compared as in [measurements()]. One that begins
+#' with `!` needs quotes around it: `validate: '!(hour > 72)'`.
 #'
 #' `study`, `data`, `time`, `target` and `boundary` are needed, and `model` with `catalogue`, or `models`. Without the
 #' others `title` is that of `study`, `runs` 150, `method` `paper`, `average_h` the step of the data, `warmup_h` and
@@ -55,6 +55,16 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' [upgrade_model()]), what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`),
 #' `refinements`, `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of
 #' the command `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
+#'
+#' @section Tables:
+#' The table in `data` is a text file. Its header is the line that holds `time`, `target` and `boundary`; what stands
+#' above it is left out, as are lines that begin with `#` and rows of units below the header. Fields are separated by
+#' commas, semicolons, tabs, bars or spaces, whichever separates the names in the header; `separator` says it if that
+#' fails (`comma`, `semicolon`, `tab`, `bar`, `space`, or the sign itself). Decimals may have a comma; if columns
+#' disagree, `decimal` says `","` or `"."`, and the other sign then separates thousands. Exponents may be `E` or `D`.
+#' Empty fields and words such as `NA`, `NaN` and `null` are missing values. A column without a name gets that of its
+#' place, such as `column_1`. A row with more or fewer fields than the header has names is an error. Text that is not
+#' UTF-8 is read as UTF-16 or Windows-1252, with a message.
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It

@@ -59,7 +59,7 @@ is_comment <- function(lines) grepl("^\\s*#", lines)
 
 split_line <- function(line, separator) {
   fields <- suppressWarnings(scan(text = line, what = "", sep = separator, quote = "\"", quiet = TRUE,
-                                  na.strings = character(), comment.char = ""))
+                                  na.strings = character(), comment.char = "", encoding = "UTF-8"))
   trimws(fields)
 }
 
@@ -83,8 +83,8 @@ body_fields <- function(body, header, refuse) {
   open <- function(w) refuse("A quotation mark is opened and not closed, perhaps in line ",
                              body$number[c(which(is.na(ends)), 1)[1]], ".")
   columns <- tryCatch(scan(text = body$text, what = rep(list(""), width), sep = header$separator, quote = "\"",
-                           quiet = TRUE, fill = TRUE, multi.line = FALSE, na.strings = character(), comment.char = ""),
-                      warning = open)
+                           quiet = TRUE, fill = TRUE, multi.line = FALSE, na.strings = character(), comment.char = "",
+                           encoding = "UTF-8"), warning = open)
   columns <- lapply(columns, trimws)
   over <- Reduce(`|`, lapply(columns[-seq_len(length(names))], nzchar), rep(FALSE, length(counts)))
   # Nothing may stand after a last separator, unless what stands first could be a number for each row.

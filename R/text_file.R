@@ -14,7 +14,7 @@ read_utf8 <- function(path, field, call = rlang::caller_env()) {
   text
 }
 
-# The same of a table, which spreadsheets and loggers also write in UTF-16 and Windows-1252 (of which Latin-1 is a part).
+# The same of a table, which spreadsheets and loggers also write in UTF-16, and in Windows-1252, which holds Latin-1.
 read_any_text <- function(path, field, call = rlang::caller_env()) {
   bytes <- file_bytes(path, field, call)
   from <- if (identical(utils::head(bytes, 2), as.raw(c(0xff, 0xfe)))) "UTF-16LE"
