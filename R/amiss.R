@@ -33,7 +33,7 @@ amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, contro
   } else {
     record_measurements(data, noise_sd)
   }
-  if (is.data.frame(runs)) runs <- as.matrix(runs)
+  runs <- as_number_matrix(runs)
   check_input(checkmate::check_matrix(runs, "numeric"), "runs")
   made <- ensemble(design, runs, parameters, m)
   calibrate_refined(made, m, rounds = 0, control = control, seed = seed, threads = threads)
@@ -42,10 +42,12 @@ amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, contro
 record_measurements <- function(data, noise_sd, call = rlang::caller_env()) {
   check_input(checkmate::check_data_frame(data, min.rows = 10, min.cols = 3), "data",
               "Its columns are time, target and boundary conditions; or give {.fun measurements}.", call = call)
+  data <- plain_table(as.list(data), nrow(data))
   names <- names(data)
   if (is.null(noise_sd)) {
     require_numeric(data, names[2], call)
-    noise_sd <- difference_sd(time_hours(read_time(data[[1]], names[1], call = call)), data[[2]])
+    time <- suppressMessages(read_time(data[[1]], names[1], call = call), classes = "amiss_message_time")
+    noise_sd <- difference_sd(time_hours(time), data[[2]])
     cli::cli_inform(c("The noise of {.val {names[2]}} is taken as {signif(noise_sd, 3)}, from second differences.",
                       i = "Give {.arg noise_sd} where it is known."),
                     class = "amiss_message_noise")

@@ -71,6 +71,7 @@ read_numbers <- function(path, call) {
   if (!file.exists(path)) abort_input("The file {.file {path}} does not exist.", call = call)
   first <- scan(path, "", sep = ",", nlines = 1, quiet = TRUE, strip.white = TRUE)
   named <- anyNA(suppressWarnings(as.numeric(first[first != "NA"])))
+  check_field_counts(path, call)
   read <- function() utils::read.csv(path, header = named, check.names = FALSE, strip.white = TRUE)
   table <- tryCatch(read(), error = function(e) {
     abort_input(c("The file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
@@ -85,6 +86,15 @@ read_numbers <- function(path, call) {
   table <- as.matrix(table)
   dimnames(table) <- list(NULL, if (named) colnames(table))
   table
+}
+
+# R would take the first field of rows that are longer than the line of names for the name of the row.
+check_field_counts <- function(path, call) {
+  counts <- utils::count.fields(path, ",", quote = "\"", comment.char = "")
+  bad <- which(counts != counts[1])[1]
+  if (is.na(bad)) return(invisible())
+  abort_input(c("The file {.file {path}} has {counts[bad]} field{?s} in line {bad} and {counts[1]} in line 1.",
+                i = "Give each row as many fields, and each column a name or none of them."), call = call)
 }
 
 check_calibro_steps <- function(tables, files, call = rlang::caller_env()) {

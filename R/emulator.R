@@ -278,7 +278,7 @@ tidy.amiss_emulator <- function(x, ...) {
 #' @export
 predict.amiss_emulator <- function(object, newdata, ...) {
   rlang::check_dots_empty()
-  if (is.data.frame(newdata)) newdata <- as.matrix(newdata)
+  newdata <- as_number_matrix(newdata)
   check_input(checkmate::check_matrix(newdata, "numeric", any.missing = FALSE, min.rows = 1), "newdata")
   absent <- setdiff(names(object$parameters), colnames(newdata))
   if (length(absent)) abort_input("{.arg newdata} lacks {cli::qty(absent)}column{?s} {.val {absent}}.")

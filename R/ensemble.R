@@ -75,7 +75,7 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' head(predict(fit, use = "validate"))
 #' @export
 ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL, time = NULL) {
-  if (is.data.frame(design)) design <- as.matrix(design)
+  design <- as_number_matrix(design)
   check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"),
               "design")
   check_all_finite(design, "design")
@@ -104,7 +104,7 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
 }
 
 check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
-  if (is.data.frame(outputs)) outputs <- as.matrix(outputs)
+  outputs <- as_number_matrix(outputs)
   check_input(checkmate::check_matrix(outputs, "numeric", min.rows = 1), name, call = call)
   storage.mode(outputs) <- "double"
   if (runs != ncol(outputs)) {

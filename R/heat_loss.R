@@ -19,7 +19,7 @@
 heat_loss_coefficient <- function(simulator, values, drivers = numeric(), outside = 10, inside = 30) {
   check_zone(simulator, "simulator")
   if (is.numeric(values) && is.null(dim(values))) values <- t(values)
-  if (is.data.frame(values)) values <- as.matrix(values)
+  values <- as_number_matrix(values)
   check_input(checkmate::check_matrix(values, "numeric", any.missing = FALSE, min.rows = 1), "values")
   check_all_finite(values, "values")
   check_values(colnames(values), names(zone_parameters(simulator)), rlang::current_env())

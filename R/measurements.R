@@ -10,9 +10,14 @@
 #' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text in one
 #' format: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without), `30.08.2013 00:10`,
 #' `30/08/2013 00:10` or `08/30/2013 12:10 AM` (where the whole column tells day from month), the stamps of EnergyPlus
-#' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. Numbers of 1e8 and more
-#' are Unix time in seconds or milliseconds, which is told. A `Date` is its beginning, 00:00 UTC: for daily values that
-#' are dated by their day give `date + 1`. What stays open is an error, and `time_format` settles it.
+#' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. A `Date` is its
+#' beginning, 00:00 UTC: for daily values that are dated by their day give `date + 1`.
+#'
+#' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Unix time, digits of a date such as 201308300010,
+#' and days that Excel, MATLAB or astronomers count are recognised, with a message, if they cannot be hours. Numbers
+#' that could be several things are an error that names the `time_format` of each: daily digits of two-digit years,
+#' whole days of Excel, steps of 5, 10, 60 or 600, a column called `day` or `seconds`. What stays open is an error, and
+#' `time_format` settles it.
 #'
 #' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when daylight saving ends,
 #' the column's order tells the first from the second; a time that its beginning leaves out is an error. Text that steps
@@ -59,12 +64,16 @@
 #' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that say which rows
 #'   calibrate and which validate. Without both all rows calibrate; without `calibrate`, all but those that validate;
 #'   without `validate`, none validate. At least 20 rows must calibrate. Rows of neither use still drive the simulator.
+#'   In text the record's time may be called `time`. Texts in quotes are compared with times as times, in the format of
+#'   their column or as ISO 8601 and in `time_zone` (`"time >= '2013-09-02'"`), with numbers as numbers.
 #' @param warmup Hours at the start of each segment that are left out, so that the simulator's unknown initial
 #'   state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
 #' @param time_format What the time column holds, if it does not tell itself: of text `"dmy"` or `"mdy"`; of numbers
-#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` or `"unix"` (`warmup`, `average` and `fill_gaps` stay in hours: 5 s
-#'   are `5 / 3600`); of either a format of [strptime()] (`"%Y%m%d%H"`).
+#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` (`warmup`, `average` and `fill_gaps` stay in hours: 5 s are
+#'   `5 / 3600`), `"unix"` (since 1970, in seconds, milliseconds, microseconds or nanoseconds), or days counted from a
+#'   date: `"excel"` (41516 is 30 August 2013), `"matlab"`, `"julian"`, `"mjd"` (modified Julian), `"unix_days"` (since
+#'   1970); of either a format of [strptime()] (`"%Y%m%d%H"`).
 #' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in: `"UTC"`, or a name
 #'   such as `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular
@@ -108,7 +117,10 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
       c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
                   i = "Leave it out of {.arg boundary}."))
   }
-  stamps <- read_time(data[[time]], time, table$format, time_zone)
+  reading <- time_reading(data[[time]], time, table$format, time_zone)
+  stamps <- reading$time
+  clock <- condition_clock(data[[time]], reading, time_zone)
+  columns_known <- with_time(data, stamps)
   data <- with_switches(data, terms$name)
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, TRUE)], c(time, target))
   require_numeric(data, c(target, terms$name))
@@ -122,8 +134,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                         "{which(is.infinite(y))[1]}."),
                   i = "Mark a missing value as NA: it is then left out."))
   }
-  if (is.character(calibrate)) calibrate <- eval_rows(calibrate, data, "calibrate")
-  if (is.character(validate)) validate <- eval_rows(validate, data, "validate")
+  calibrate <- chosen_rows(calibrate, columns_known, clock, "calibrate")
+  validate <- chosen_rows(validate, columns_known, clock, "validate")
   calibrate <- rows_flag(calibrate, nrow(data), "calibrate", default = is.null(validate) | !isTRUE(any(validate)))
   if (is.null(calibrate)) calibrate <- !validate
   validate <- rows_flag(validate, nrow(data), "validate", default = FALSE)
@@ -176,7 +188,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                  hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
-                 time_format = table$format, time_zone = time_zone, constant = constant, findings = findings,
+                 time_format = reading$format, time_zone = time_zone, constant = constant, findings = findings,
                  faulty = faulty_steps(findings, target, coarse$block, grid$row)),
             class = "amiss_measurements")
 }
@@ -267,16 +279,38 @@ require_complete <- function(drivers, analysed, time, row = seq_along(time), cal
   }
 }
 
-eval_rows <- function(text, data, what, call = rlang::caller_env()) {
+# What conditions may name: the columns, and the record's time as `time` if none is called so.
+with_time <- function(data, stamps) {
+  if (!"time" %in% names(data)) data$time <- stamps
+  data
+}
+
+# The rows that an argument chooses: a condition of a study file, R code as text, or logical values as they are.
+chosen_rows <- function(rows, data, clock, what, call = rlang::caller_env()) {
+  if (inherits(rows, "amiss_row_condition")) row_condition(rows$text, data, what, clock, call)
+  else if (is.character(rows)) eval_rows(rows, data, what, clock, call)
+  else rows
+}
+
+eval_rows <- function(text, data, what, clock, call = rlang::caller_env()) {
   check_input(checkmate::check_string(text, min.chars = 1), what, "One expression in the columns of the data.",
               call = call)
-  rows <- tryCatch(eval(str2lang(text), data, baseenv()),
-                   error = function(e) abort_input(
-                     c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
-                                                     i = paste("Write an expression in the columns, for example",
-                                                               "{.code phase == \"rolbs\"}.")),
-                                                     call = call))
-  rows
+  refuse <- function(e) {
+    abort_input(c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
+                  i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."), call = call)
+  }
+  scope <- list2env(comparisons(clock), parent = baseenv())
+  in_zone(clock$zone %||% attr(clock$time, "tzone")[1],
+          tryCatch(eval(str2lang(text), as.list(data), scope), error = refuse))
+}
+
+# Code to which times that say no zone are in this one.
+in_zone <- function(zone, code) {
+  if (is.null(zone) || !nzchar(zone)) return(code)
+  before <- Sys.getenv("TZ", NA)
+  on.exit(if (is.na(before)) Sys.unsetenv("TZ") else Sys.setenv(TZ = before))
+  Sys.setenv(TZ = zone)
+  code
 }
 
 rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {

@@ -26,7 +26,7 @@ outputs_of <- function(simulator, outputs) {
     one <- simulator
     one$name <- paste0(simulator$name, ", ", output)
     one$f <- function(values, drivers, info) {
-      run <- as.matrix(recall(values, drivers, info))
+      run <- as.matrix(plain_numbers(recall(values, drivers, info)))
       if (!output %in% colnames(run)) {
         stop("it returned the columns ", paste(colnames(run), collapse = ", "), ", not ", output, call. = FALSE)
       }

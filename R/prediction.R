@@ -113,6 +113,7 @@ prediction_record <- function(m, newdata, call = rlang::caller_env()) {
 # All rows have the use "new". `y` marks the rows to simulate; `observed` is the target, NA where it is not known.
 new_record <- function(m, data, call = rlang::caller_env()) {
   terms <- list(name = m$conditions, circular = tabulate(m$condition, length(m$conditions)) == 2)
+  data <- plain_table(as.list(data), nrow(data))
   require_columns(data, c("time", terms$name), call)
   data <- with_switches(data, terms$name)
   require_numeric(data, c(terms$name, intersect(m$target, names(data))), call)

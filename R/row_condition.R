@@ -6,7 +6,7 @@ row_operators <- list(
   "+" = 2, "-" = 1:2, "*" = 2, "/" = 2, "%in%" = 2)
 
 # The rows that a condition chooses: one TRUE or FALSE for each.
-row_condition <- function(text, data, what, call = rlang::caller_env()) {
+row_condition <- function(text, data, what, clock = NULL, call = rlang::caller_env()) {
   if (is.null(text)) return(NULL)
   hint <- "Write one condition in the columns, for example {.code phase == \"rolbs\"}."
   check_input(checkmate::check_string(text, min.chars = 1), what, hint, call = call)
@@ -23,7 +23,7 @@ row_condition <- function(text, data, what, call = rlang::caller_env()) {
                             "and {.code {names(row_operators)}}.")),
                 call = call)
   }
-  rows <- tryCatch(suppressWarnings(row_value(parsed[[1]], data, refuse)), error = function(e) {
+  rows <- tryCatch(suppressWarnings(row_value(parsed[[1]], data, refuse, comparisons(clock))), error = function(e) {
     if (inherits(e, "amiss_error")) stop(e)
     abort_input(c("{.arg {what}} = {.val {text}} has no value: {conditionMessage(e)}.", i = hint), call = call)
   })
@@ -32,7 +32,7 @@ row_condition <- function(text, data, what, call = rlang::caller_env()) {
   rows
 }
 
-row_value <- function(part, data, refuse) {
+row_value <- function(part, data, refuse, operators) {
   if (is.symbol(part)) {
     # The parser keeps the bytes of a name, and in other locales than UTF-8 forgets what they are.
     name <- as.character(part)
@@ -46,16 +46,16 @@ row_value <- function(part, data, refuse) {
   name <- if (is.symbol(part[[1]])) as.character(part[[1]]) else ""
   if (!(length(part) - 1) %in% row_operators[[name]] || !is.null(names(part))) refuse(part, "is not allowed")
   values <- if (name == "%in%") {
-    list(row_value(part[[2]], data, refuse), row_set(part[[3]], refuse))
+    list(row_value(part[[2]], data, refuse, operators), row_set(part[[3]], refuse))
   } else {
-    lapply(as.list(part)[-1], row_value, data, refuse)
+    lapply(as.list(part)[-1], row_value, data, refuse, operators)
   }
-  do.call(get(name, baseenv()), values)
+  do.call(operators[[name]] %||% get(name, baseenv()), values)
 }
 
 # The right side of %in%: c() of numbers or texts.
 row_set <- function(part, refuse) {
   listed <- is.call(part) && identical(part[[1]], quote(c)) && is.null(names(part)) && length(part) > 1
   if (!listed || length(all.vars(part))) refuse(part, "is not c() of numbers or texts")
-  unlist(lapply(as.list(part)[-1], row_value, data = list(), refuse))
+  unlist(lapply(as.list(part)[-1], row_value, data = list(), refuse, list()))
 }

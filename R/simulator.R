@@ -278,7 +278,7 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
       stopped[[as.character(m)]] <- conditionMessage(out)
       next
     }
-    if (is.logical(out) && all(is.na(out))) out <- as.numeric(out)
+    out <- if (is.logical(out) && all(is.na(out))) as.numeric(out) else plain_numbers(out)
     check_run(out, nrow(drivers), simulator, point, m)
     runs[, m] <- out
   }

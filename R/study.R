@@ -3,11 +3,11 @@ study_fields <- list(
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
   optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
-               "fill_gaps_h", "runs", "seed", "control", "title", "records"))
+               "fill_gaps_h", "separator", "decimal", "runs", "seed", "control", "title", "records"))
 
 # What each of several records may have of its own.
 record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h", "calibrate", "validate",
-                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h")
+                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h", "separator", "decimal")
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
@@ -27,20 +27,20 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'
 #' *Several records.* `records` maps the name of each record to the fields that it has of its own, of `data`, `time`,
 #' `target`, `boundary`, `model`, `noise_sd`, `average_h`, `calibrate`, `validate`, `warmup_h`, `unit`, `time_format`,
-#' `time_zone` and `fill_gaps_h`; those outside are for all that do not say otherwise. The value of a `model` may also
-#' be a list of simulators by the names of the records ([outputs_of()]). A catalogue that is a function gets the list of
-#' measurements. The loop is then that of [upgrade_model()] over several records.
+#' `time_zone`, `fill_gaps_h`, `separator` and `decimal`; those outside are for all that do not say otherwise. The value
+#' of a `model` may also be a list of simulators by the names of the records ([outputs_of()]). A catalogue that is a
+#' function gets the list of measurements. The loop is then that of [upgrade_model()] over several records.
 #'
-#' The other fields are `study` (name), `data` (CSV file, or an R file whose value is a data frame), `time`, `target`,
-#' `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target), `noise_sd`,
-#' `average_h`, `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]), `calibrate`,
-#' `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in [upgrade_model()] or
-#' [compare_models()]). R files are evaluated in their own folder.
+#' The other fields are `study` (name), `data` (a table, see *Tables*, or an R file whose value is a data frame),
+#' `time`, `target`, `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target),
+#' `noise_sd`, `average_h`, `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]),
+#' `separator`, `decimal` (of the table), `calibrate`, `validate` (conditions in the columns of the data), `runs`,
+#' `seed` and `control` (as in [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
 #'
 #' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical.
 #' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets,
-#' the four operations of arithmetic and `%in% c(...)`. One that begins with `!` needs quotes around it:
-#' `validate: '!(hour > 72)'`.
+#' the four operations of arithmetic and `%in% c(...)`. Texts are compared as in [measurements()]. One that begins
+#' with `!` needs quotes around it: `validate: '!(hour > 72)'`.
 #'
 #' `study`, `data`, `time`, `target` and `boundary` are needed, and `model` with `catalogue`, or `models`. Without the
 #' others `title` is that of `study`, `runs` 150, `method` `paper`, `average_h` the step of the data, `warmup_h` and
@@ -55,6 +55,16 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' [upgrade_model()]), what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`),
 #' `refinements`, `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of
 #' the command `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
+#'
+#' @section Tables:
+#' The table in `data` is a text file. Its header is the line that holds `time`, `target` and `boundary`; what stands
+#' above it is left out, as are lines that begin with `#` and rows of units below the header. Fields are separated by
+#' commas, semicolons, tabs, bars or spaces, whichever separates the names in the header; `separator` says it if that
+#' fails (`comma`, `semicolon`, `tab`, `bar`, `space`, or the sign itself). Decimals may have a comma; if columns
+#' disagree, `decimal` says `","` or `"."`, and the other sign then separates thousands. Exponents may be `E` or `D`.
+#' Empty fields and words such as `NA`, `NaN` and `null` are missing values. A column without a name gets that of its
+#' place, such as `column_1`. A row with more or fewer fields than the header has names is an error. Text that is not
+#' UTF-8 is read as UTF-16 or Windows-1252, with a message.
 #'
 #' @param path The YAML file.
 #' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It
@@ -174,8 +184,10 @@ naming_record <- function(name, code, call = rlang::caller_env()) {
 }
 
 study_measurements <- function(study, files) {
-  data <- study_data(files[["data"]])
-  rows <- function(field) row_condition(study[[field]], data, field)
+  data <- study_data(study, files[["data"]])
+  rows <- function(field) {
+    if (!is.null(study[[field]])) structure(list(text = study[[field]]), class = "amiss_row_condition")
+  }
   measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
                noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
                validate = rows("validate"),
@@ -246,16 +258,14 @@ require_trust <- function(files, folder, trust, call = rlang::caller_env()) {
                  class = c("amiss_error_trust", "amiss_error_input", "amiss_error"), call = short_call(call))
 }
 
-study_data <- function(path, call = rlang::caller_env()) {
+study_data <- function(study, path, call = rlang::caller_env()) {
   if (is_code(c(data = path))) {
     data <- source_value(path, "data", call)
     check_input(checkmate::check_data_frame(data), "data", "Let the R file end with a data frame.", call = call)
     return(data)
   }
-  text <- read_utf8(path, "data", call)
-  tryCatch(utils::read.csv(text = text, stringsAsFactors = FALSE, check.names = FALSE), error = function(e) {
-    abort_input(c("The data file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
-  })
+  conditions <- boundary_terms(as.character(unlist(study$boundary)), call)$name
+  read_table_file(path, c(study$time, study$target, conditions), study$separator, study$decimal, call)
 }
 
 # `files`: those of each record.

@@ -71,27 +71,3 @@ check_study_size <- function(study, refuse) {
   }
   walk(study, 1)
 }
-
-# The text of a regular file, marked as UTF-8, without a byte-order mark.
-read_utf8 <- function(path, field, call = rlang::caller_env()) {
-  if (!fs::is_file(path, follow = TRUE)) {
-    abort_input(c("The {.field {field}} file {.file {path}} is not a regular file.",
-                  i = "Name a file that can be read from its start to its end."),
-                call = call)
-  }
-  bytes <- tryCatch(suppressWarnings(readBin(path, "raw", file.size(path))), error = function(e) {
-    abort_input(c("The {.field {field}} file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
-  })
-  mark <- as.raw(c(0xef, 0xbb, 0xbf))
-  if (identical(utils::head(bytes, 3), mark)) bytes <- bytes[-(1:3)]
-  line_of <- function(byte) 1 + sum(bytes[seq_len(byte)] == as.raw(10))
-  invalid <- function(line) {
-    abort_input(c("The {.field {field}} file {.file {path}} is not UTF-8 text: line {line}.",
-                  i = "Save it with the encoding UTF-8."), call = call)
-  }
-  if (any(bytes == as.raw(0))) invalid(line_of(which(bytes == as.raw(0))[1]))
-  text <- rawToChar(bytes)
-  if (!validUTF8(text)) invalid(which(!validUTF8(strsplit(text, "\n", fixed = TRUE, useBytes = TRUE)[[1]]))[1])
-  Encoding(text) <- "UTF-8"
-  text
-}

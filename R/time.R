@@ -2,58 +2,39 @@
 # (hours) where it is not.
 
 time_units <- c(seconds = 1 / 3600, minutes = 1 / 60, hours = 1, days = 24)
+# The number that each way to count days gives 1 January 1970.
+serial_days <- c(excel = 25569, matlab = 719529, julian = 2440587.5, mjd = 40587, unix_days = 0)
+number_formats <- c(names(time_units), "unix", names(serial_days))
 day_orders <- c("ymd", "dmy", "mdy")
-
-read_time <- function(values, name, format = NULL, zone = NULL, call = rlang::caller_env()) {
-  check_time_options(format, zone, call)
-  time <- parse_time(values, name, format, zone, call)
-  check_time(time, values, name, call)
-  time
-}
 
 # Hours, since 1970 in UTC where the date is known.
 time_hours <- function(time) as.numeric(time) / if (is.numeric(time)) 1 else 3600
 
-check_time_options <- function(format, zone, call) {
-  check_input(checkmate::check_string(format, null.ok = TRUE), "time_format", call = call)
-  known <- c(day_orders, names(time_units), "unix")
-  if (!is.null(format) && !format %in% known && !is_pattern(format)) {
-    abort_input(c("{.arg time_format} = {.val {format}} is not known.",
-                  i = "Give one of {.val {known}}, or a format of {.fun strptime} such as {.val %d.%m.%Y %H:%M}."),
-                  call = call)
-  }
-  check_input(checkmate::check_string(zone, null.ok = TRUE), "time_zone", call = call)
-  if (!is.null(zone) && !zone %in% zone_names()) {
-    abort_input(c("{.arg time_zone} = {.val {zone}} is not known.",
-                  i = paste("Give {.val UTC} or a name such as {.val Europe/Berlin} ({.fun OlsonNames} lists them);",
-                            "for one hour ahead of UTC all year {.val Etc/GMT-1}, with that sign.")),
-                  call = call)
-  }
-}
-
-# Listed once for a session: each time OlsonNames() walks through a tree of folders.
-zone_names <- local({
-  names <- NULL
-  function() {
-    if (is.null(names)) names <<- OlsonNames()
-    names
-  }
-})
-
 is_pattern <- function(format) !is.null(format) && grepl("%", format, fixed = TRUE)
 
+# The parts of a date that a pattern does not read.
+pattern_lacks <- function(format) {
+  parts <- c(year = "%[OE]?[YyFDcxsG]", month = "%[OE]?[mbBhjFDcxs]", day = "%[OE]?[dejFDcxs]")
+  names(parts)[!vapply(parts, grepl, NA, format)]
+}
+
+# `format`: as time_format() settles it.
 parse_time <- function(values, name, format, zone, call) {
-  if (is.factor(values)) values <- as.character(values)
   if (inherits(values, "POSIXt")) return(on_clock(as.POSIXct(values), zone))
   if (inherits(values, "Date")) return(utc(86400 * as.numeric(values)))
-  if (inherits(values, "difftime")) return(as.numeric(values, units = "hours"))
+  if (is_span(values)) return(span_hours(values))
   if (is.character(values)) return(parse_text(values, name, format, zone, call))
-  if (!is.numeric(values) || is.object(values)) {
-    abort_input(c("Time column {.val {name}} is of class {.cls {class(values)}}.",
-                  i = "Give text, numbers, {.cls POSIXct}, {.cls POSIXlt} or {.cls Date}."), call = call)
-  }
-  if (is_pattern(format)) parse_text(base::format(values, scientific = FALSE, trim = TRUE), name, format, zone, call)
-  else parse_numbers(as.numeric(values), name, format, zone, call)
+  if (is_pattern(format)) return(pattern_time(stamp_text(values, format), name, format, zone, call))
+  parse_numbers(values, name, format %||% "hours", zone, call)
+}
+
+# Lengths of time: difftime, hms and the times of day of data.table.
+is_span <- function(values) inherits(values, c("difftime", "ITime"))
+
+# By the unit that the values say: hms has methods of its own that do not convert.
+span_hours <- function(values) {
+  unit <- if (inherits(values, "ITime")) "secs" else attr(values, "units")
+  as.numeric(unclass(values)) * c(secs = 1 / 3600, mins = 1 / 60, hours = 1, days = 24, weeks = 168)[[unit]]
 }
 
 utc <- function(seconds) as.POSIXct(seconds, origin = "1970-01-01", tz = "UTC")
@@ -64,46 +45,67 @@ on_clock <- function(time, zone) {
   time
 }
 
-# Numbers that are too large for hours (1e8 hours are 11 000 years) count the seconds or milliseconds of Unix.
 parse_numbers <- function(numbers, name, format, zone, call) {
-  if (!is.null(format) && !format %in% c(names(time_units), "unix")) {
-    abort_input(
-      c("Time column {.val {name}} holds numbers, which {.arg time_format} = {.val {format}} does not go with.",
-                  i = paste("For numbers it is one of {.val {c(names(time_units), 'unix')}}, or a format of",
-                            "{.fun strptime} such as {.val %Y%m%d%H}.")),
-                call = call)
-  }
-  if (is.null(format)) format <- number_format(numbers, name, zone, call)
-  if (format == "unix") on_clock(unix_time(numbers), zone %||% "UTC") else numbers * time_units[[format]]
+  if (format %in% names(time_units)) return(numbers * time_units[[format]])
+  if (format == "unix") return(on_clock(utc(unix_seconds(numbers)), zone %||% "UTC"))
+  seconds <- serial_seconds(numbers, format)
+  if (format %in% c("excel", "matlab")) local_time(seconds, format(numbers, digits = 15), name, zone, call)
+  else on_clock(utc(seconds), zone %||% "UTC")
 }
 
-number_format <- function(numbers, name, zone, call) {
-  size <- range(abs(numbers[is.finite(numbers)]), 0.5)[2]
-  if (size < 1e8) return("hours")
-  first <- numbers[is.finite(numbers)][1]
-  if (!(size < 1e10 || size >= 1e12 && size < 1e13)) {
-    abort_input(c(paste("Time column {.val {name}} holds numbers that are neither hours nor Unix time, such as",
-                        "{format(first, scientific = FALSE)}."),
-                  i = "Say by {.arg time_format} what they are, for example {.val %Y%m%d%H%M}."), call = call)
-  }
-  shown <- format(on_clock(unix_time(first), zone %||% "UTC"), "%Y-%m-%d %H:%M:%S %Z")
-  cli::cli_inform(
-    c("Time column {.val {name}} is read as Unix time, from {shown}: its numbers are too large for hours.",
-                    i = paste("{.code time_format = \"unix\"} settles it; digits of a date need a format such as",
-                              "{.val %Y%m%d%H}.")),
-                  class = "amiss_message_time")
-  "unix"
+# Seconds, milliseconds, microseconds or nanoseconds, by their size.
+unix_seconds <- function(numbers) {
+  size <- max(abs(numbers), 0, na.rm = TRUE)
+  numbers / 1000^findInterval(size, c(1e11, 1e14, 1e17))
 }
 
-unix_time <- function(numbers) utc(if (any(numbers >= 1e11, na.rm = TRUE)) numbers / 1000 else numbers)
+# Fractions of a day lack digits: times are the roundest ones that the digits given allow.
+serial_seconds <- function(numbers, format) {
+  seconds <- 86400 * (numbers - serial_days[[format]])
+  digits <- Find(function(d) all(round(numbers, d) == numbers, na.rm = TRUE), 3:9, nomatch = 10)
+  open <- 86400 * 0.5 * 10^-digits + 1e-3
+  for (unit in c(3600, 1800, 900, 600, 300, 60, 1)) {
+    rounded <- unit * round(seconds / unit)
+    if (all(abs(rounded - seconds) <= open, na.rm = TRUE)) return(rounded)
+  }
+  round(seconds, 3)
+}
+
+# Digits as text, with the zeros in front that numbers lose.
+stamp_text <- function(numbers, format) {
+  text <- base::format(numbers, scientific = FALSE, trim = TRUE, digits = 15)
+  width <- stamp_width(format)
+  whole <- which(numbers == round(numbers))
+  if (!is.na(width)) text[whole] <- sprintf("%0*.0f", width, numbers[whole])
+  text[is.na(numbers)] <- NA
+  text
+}
+
+# How many digits there are in a format of digits alone, such as %Y%m%d; NA for others.
+stamp_width <- function(format) {
+  if (!grepl("^(%[YymdHMSj])+$", format)) return(NA_integer_)
+  letters <- strsplit(gsub("%", "", format, fixed = TRUE), "")[[1]]
+  sum(ifelse(letters == "Y", 4L, ifelse(letters == "j", 3L, 2L)))
+}
 
 parse_text <- function(text, name, format, zone, call) {
+  text <- clean_text(text)
+  if (is_pattern(format)) return(pattern_time(text, name, format, zone, call))
+  numbers <- text_numbers(text)
+  if (is.null(numbers)) stamps_time(text, name, format, zone, call)
+  else parse_numbers(numbers, name, if (isTRUE(format %in% number_formats)) format else "hours", zone, call)
+}
+
+clean_text <- function(text) {
   text <- trimws(text)
   text[!nzchar(text)] <- NA
-  if (is_pattern(format)) return(pattern_time(text, name, format, zone, call))
+  text
+}
+
+# NULL if a text is no number.
+text_numbers <- function(text) {
   numbers <- suppressWarnings(as.numeric(text))
-  if (identical(is.na(numbers), is.na(text))) return(parse_numbers(numbers, name, format, zone, call))
-  stamps_time(text, name, format, zone, call)
+  if (identical(is.na(numbers), is.na(text))) numbers
 }
 
 require_read <- function(unread, text, name, call) {
@@ -115,9 +117,28 @@ require_read <- function(unread, text, name, call) {
               call = call)
 }
 
+# Months begin on their first day, where strptime() would take the day of today.
+pattern_seconds <- function(text, format) {
+  if (identical(pattern_lacks(format), "day")) {
+    text <- paste(text, 1)
+    format <- paste(format, "%d")
+  }
+  as.numeric(as.POSIXct(strptime(text, format, tz = "UTC")))
+}
+
 pattern_time <- function(text, name, format, zone, call) {
-  seconds <- as.numeric(as.POSIXct(strptime(text, format, tz = "UTC")))
+  seconds <- pattern_seconds(text, format)
+  width <- stamp_width(format)
+  if (!is.na(width)) seconds[which(nchar(text) != width)] <- NA
   require_read(is.na(seconds), text, name, call)
+  # strptime() reads the beginning of a text alone: an end of its own shows what is left.
+  rest <- which(is.na(pattern_seconds(paste0(text, "|"), paste0(format, "|"))) & !is.na(text))
+  if (length(rest)) {
+    abort_input(c(paste("Time column {.val {name}}: {.arg time_format} = {.val {format}} reads only the beginning of",
+                        "{.val {text[rest[1]]}} in row {rest[1]}."),
+                  i = paste("Give a format of all of it ({.val %OS} for seconds with a fraction, {.val %Y} for a year",
+                            "of four digits); ISO 8601 needs none.")), call = call)
+  }
   if (grepl("%z", format, fixed = TRUE)) on_clock(utc(seconds), zone) else local_time(seconds, text, name, zone, call)
 }
 
@@ -128,17 +149,13 @@ clock_form <- paste0("(?:(?:T|,?\\s+)(\\d{1,2}):(\\d{2})(?::(\\d{2}(?:[.,]\\d+)?
                      "\\s*(Z|UTC|GMT|[+-]\\d{2}(?::?\\d{2})?)?)?")
 
 stamps_time <- function(text, name, format, zone, call) {
-  forms <- paste0("^", date_forms, clock_form, "$")
-  stands <- vapply(forms, function(form) sum(grepl(form, text, perl = TRUE)), 0)
-  k <- which.max(stands)
-  parts <- captures(forms[k], text)
-  require_read(is.na(parts[, 1]), text, name, call)
+  stamps <- stamp_parts(text, name, call)
+  parts <- stamps$parts
   clock <- parts[, ncol(parts) - 4:0, drop = FALSE]
   seconds <- clock_seconds(clock)
-  date <- switch(names(date_forms)[k], ymd = parts[, 1:3, drop = FALSE],
-                 no_year = cbind(NA, parts[, 1:2, drop = FALSE]),
-                 ordered_date(parts[, 1:4, drop = FALSE], name, format, call))
-  if (names(date_forms)[k] == "no_year") {
+  date <- switch(stamps$form, ymd = parts[, 1:3, drop = FALSE], no_year = cbind(NA, parts[, 1:2, drop = FALSE]),
+                 ordered_date(parts, if (said_order(format)) format else day_order(stamps, name, call)))
+  if (stamps$form == "no_year") {
     hours <- hours_of_year(date, seconds)
     require_read(is.na(hours), text, name, call)
     return(hours)
@@ -154,6 +171,16 @@ stamps_time <- function(text, name, format, zone, call) {
                   i = "State it in all rows or in none."), call = call)
   }
   local_time(seconds, text, name, zone, call)
+}
+
+# The parts of stamps in the form that most of them have: list(form, parts).
+stamp_parts <- function(text, name, call) {
+  forms <- paste0("^", date_forms, clock_form, "$")
+  stands <- vapply(forms, function(form) sum(grepl(form, text, perl = TRUE)), 0)
+  k <- which.max(stands)
+  parts <- captures(forms[k], text)
+  require_read(is.na(parts[, 1]), text, name, call)
+  list(form = names(date_forms)[k], parts = parts)
 }
 
 # The groups of a pattern: a matrix of text, NA where a row does not match, "" where a group is not there.
@@ -187,19 +214,26 @@ offset_seconds <- function(offset) {
 # Days since 1970 of year, month and day; NA where there is no such day.
 day_number <- function(date) as.numeric(as.Date(paste(date[, 1], date[, 2], date[, 3]), format = "%Y %m %d"))
 
-# Year, month and day of a column such as 01/02/2020. Dots are day first; else the column itself decides: there is no
-# 13th month, and days follow each other.
-ordered_date <- function(parts, name, format, call) {
+said_order <- function(format) isTRUE(format %in% c("dmy", "mdy"))
+
+# Year, month and day of a column such as 01/02/2020.
+ordered_date <- function(parts, order) {
   year <- ifelse(nchar(parts[, 4]) == 2, paste0("20", parts[, 4]), parts[, 4])
-  as_dmy <- cbind(year, parts[, 3], parts[, 1])
-  as_mdy <- cbind(year, parts[, 1], parts[, 3])
-  if (identical(format, "mdy")) return(as_mdy)
-  if (identical(format, "dmy") || all(parts[, 2] == ".", na.rm = TRUE)) return(as_dmy)
-  days <- list(day_number(as_dmy), day_number(as_mdy))
+  if (order == "mdy") cbind(year, parts[, 1], parts[, 3]) else cbind(year, parts[, 3], parts[, 1])
+}
+
+# "dmy" or "mdy", or NULL for stamps that need neither. Dots are day first; else the column itself decides: there is no
+# 13th month, and days follow each other.
+day_order <- function(stamps, name, call) {
+  if (stamps$form %in% c("ymd", "no_year")) return(NULL)
+  parts <- stamps$parts
+  if (all(parts[, 2] == ".", na.rm = TRUE)) return("dmy")
+  orders <- c("dmy", "mdy")
   given <- !is.na(parts[, 1])
-  possible <- !vapply(days, function(d) anyNA(d[given]), NA)
-  if (all(possible)) possible <- vapply(days, function(d) all(diff(d[given]) %in% 0:1), NA)
-  if (sum(possible) == 1) return(if (possible[1]) as_dmy else as_mdy)
+  days <- lapply(orders, function(order) day_number(ordered_date(parts, order))[given])
+  possible <- !vapply(days, anyNA, NA)
+  if (all(possible)) possible <- vapply(days, function(d) all(diff(d) %in% 0:1), NA)
+  if (sum(possible) == 1) return(orders[possible])
   first <- which(given)[1]
   date <- paste(parts[first, c(1, 2, 3, 2, 4)], collapse = "")
   abort_input(c(paste("Time column {.val {name}}: whether the day or the month comes first in {.val {date}}",
@@ -279,13 +313,14 @@ changing_zones <- c("Europe/Berlin", "Europe/London", "Europe/Helsinki", "Americ
 require_even_clock <- function(local, text, name, call) {
   steps <- diff(local)
   step <- stats::median(steps, na.rm = TRUE)
-  jumps <- which(abs(abs(steps - step) - 3600) < 0.01 * step)
+  near <- min(0.01 * step, 900)
+  jumps <- which(abs(abs(steps - step) - 3600) < near)
   if (!length(jumps)) return(invisible())
   explained <- vapply(changing_zones, function(zone) {
     from <- zone_readings(local[jumps], zone)
     to <- zone_readings(local[jumps + 1], zone)
     ways <- cbind(to$first - from$first, to$second - from$second, to$first - from$second, to$second - from$first)
-    rowSums(abs(ways - step) < 0.01 * step, na.rm = TRUE) > 0
+    rowSums(abs(ways - step) < near, na.rm = TRUE) > 0
   }, logical(length(jumps)))
   explained <- matrix(explained, length(jumps), dimnames = list(NULL, changing_zones))
   if (!any(explained)) return(invisible())
@@ -298,29 +333,4 @@ require_even_clock <- function(local, text, name, call) {
                 i = paste("If it is local, give its zone, such as {.code time_zone = \"{likely[1]}\"}{others}; if it",
                           "is not, {.code time_zone = \"UTC\"}.")),
               call = call)
-}
-
-check_time <- function(time, values, name, call) {
-  hours <- time_hours(time)
-  if (any(is.infinite(hours)))
-    abort_input("Time column {.val {name}} has an infinite value in row {which(is.infinite(hours))[1]}.", call = call)
-  if (anyNA(hours)) {
-    abort_input(c(paste("Time column {.val {name}} has {sum(is.na(hours))} missing value{?s}; the first is in row",
-                        "{which(is.na(hours))[1]}."),
-                  i = "Every row needs its time; delete rows without one."), call = call)
-  }
-  twice <- which(duplicated(hours))
-  if (length(twice)) {
-    abort_input(c(paste("Time column {.val {name}} has {length(twice)} duplicated time stamp{?s}; the first is",
-                        "{.val {format(values[twice[1]])}} in row {twice[1]}."),
-                  i = paste("Keep one row for each time. The end of daylight saving does this to local time: give its",
-                            "text and {.arg time_zone}, or UTC.")),
-                call = call)
-  }
-  back <- which(diff(hours) < 0)
-  if (length(back)) {
-    abort_input(c(paste("Time column {.val {name}} goes back in row {back[1] + 1}:",
-                        "{.val {format(values[back[1] + 1])}} after {.val {format(values[back[1]])}}."),
-                  i = "Sort the rows by time."), call = call)
-  }
 }

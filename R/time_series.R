@@ -10,10 +10,17 @@ time_table <- function(data, time, format, call = rlang::caller_env()) {
   check_input(checkmate::check_data_frame(data), "data", call = call)
   if (inherits(data, "tbl_ts")) time <- time %||% as.character(attr(data, "index"))
   check_input(checkmate::check_string(time), "time", "Name the column that holds the time.", call = call)
-  # Of the table only: other classes take columns in their own way.
-  list(data = structure(as.list(data), class = "data.frame", row.names = .set_row_names(nrow(data))), time = time,
-       format = format)
+  list(data = plain_table(as.list(data), nrow(data)), time = time, format = format)
 }
+
+# The table only, of plain numbers, each column with a name: other classes take columns in their own way.
+plain_table <- function(columns, rows) {
+  names(columns) <- filled_names(names(columns))
+  plain_numbers(structure(columns, class = "data.frame", row.names = .set_row_names(rows)))
+}
+
+# A column without a name, such as an index that was written with the table, is named by its place.
+filled_names <- function(names) ifelse(is.na(names) | !nzchar(names), paste0("column_", seq_along(names)), names)
 
 with_index <- function(values, index, time, format, call) {
   time <- time %||% "time"
@@ -26,10 +33,9 @@ with_index <- function(values, index, time, format, call) {
                   i = "Leave {.arg time} out, or give another name for the index."), call = call)
   }
   if (stats::is.ts(index)) index <- as.numeric(index)
-  data <- as.data.frame(unclass(values), check.names = FALSE)[columns]
-  data[[time]] <- index
-  rownames(data) <- NULL
-  list(data = data, time = time, format = format)
+  data <- c(as.list(as.data.frame(unclass(values))), list(index))
+  names(data) <- c(columns, time)
+  list(data = plain_table(data, length(index)), time = time, format = format)
 }
 
 # A series of 24 values a cycle, or a multiple of that, counts days; what others count is not known.

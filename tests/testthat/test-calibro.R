@@ -67,3 +67,11 @@ test_that("tables that do not fit are refused", {
   unlink(file.path(folder, "obs.csv"))
   refused(folder, "obs.csv.*does not exist")
 })
+
+test_that("a row with more fields than the line of names is refused", {
+  folder <- write_folder(seq(-1, 1, 0.5), matrix(0, 48, 5))
+  for (lines in list(c("Te,Gv", paste(1:48, 1:48, 1:48, sep = ",")), c("Te,Gv", rep("1,2", 46), "1", "1,2"))) {
+    writeLines(lines, file.path(folder, "bc.csv"))
+    expect_error(read_calibro(folder), "bc.csv.* in line .* in line 1", class = "amiss_error_input")
+  }
+})

@@ -35,3 +35,13 @@ test_that("a data frame needs its time named", {
   expect_error(record(data.frame(when = stamps, values())), "time.*cannot be used", class = "amiss_error_input")
   expect_error(record(values()), "data.*cannot be used", class = "amiss_error_input")
 })
+
+test_that("columns that stand twice are refused, and those without a name get one", {
+  table <- data.frame(time = stamps, values())
+  twice <- function(data, ...) expect_error(record(data, ...), "Te.*more than once", class = "amiss_error_input")
+  twice(stats::setNames(cbind(table, 1), c(names(table), "Te")), "time")
+  m <- record(stats::setNames(cbind(1:240, table), c("", names(table))), "time")
+  expect_identical(colnames(m$raw$drivers), c("column_1", "Te", "Gv"))
+  skip_if_not_installed("zoo")
+  twice(zoo::zoo(cbind(values(), Te = 1), stamps))
+})

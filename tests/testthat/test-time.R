@@ -27,7 +27,7 @@ test_that("one time is read the same from all its forms", {
     expect_equal(as.numeric(read(format(stamps, pattern), format = pattern)), as.numeric(stamps))
   digits <- as.numeric(format(stamps, "%Y%m%d%H%M"))
   expect_equal(as.numeric(read(digits, format = "%Y%m%d%H%M")), as.numeric(stamps))
-  refused("neither hours nor Unix time", digits)
+  expect_equal(as.numeric(read(digits)), as.numeric(stamps))
 })
 
 test_that("midnight, days alone and fractions of seconds are read", {
@@ -53,6 +53,8 @@ test_that("numbers are hours unless they are said, or too large, to be", {
   expect_equal(format(read(1.6e9, zone = "Europe/Berlin"), "%H:%M"), "14:26")
   refused("holds numbers.*dmy", 1:3, format = "dmy")
   refused("class", I(list(1, 2)))
+  expect_identical(read(structure(c(1800, 5400), units = "secs", class = c("hms", "difftime"))), c(0.5, 1.5))
+  expect_identical(read(structure(c(1800L, 5400L), class = "ITime")), c(0.5, 1.5))
   refused("class.*factor|class.*yearmon", structure(2020.5, class = "yearmon"))
 })
 
