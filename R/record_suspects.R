@@ -235,19 +235,24 @@ start_suspects <- function(case) {
   lapply(times, function(time) {
     decay <- vapply(long, function(part) ifelse(parts == part, exp(-since / time), 0), case$y)
     found <- left_with(case, extra = decay)
+    if (!is_clear_amount(found, case)) return(NULL)
     suspect("start", case$measurements$target, found, length(long) + 1, time = time, amount = found$amounts)
   })
 }
+
+# What the noise could not hide.
+is_clear_amount <- function(found, case) max(abs(found$amounts)) >= rules$clear_amount * case$noise
 
 step_suspects <- function(case) {
   at_row <- function(at) {
     found <- left_with(case, extra = as.numeric(seq_along(case$y) >= at))
     suspect("step_change", case$measurements$target, found, 2, at = at, amount = found$amounts)
   }
-  coarse <- lapply(places(case, 50), at_row)
-  best <- coarse[[which.min(vapply(coarse, function(s) sum(s$left^2), 0))]]$at
+  places <- places(case, 50)
+  best <- places[which.min(vapply(places, function(at) sum(at_row(at)$left^2), 0))]
   width <- ceiling(length(case$y) / 50)
-  c(coarse, lapply(intersect(best + (-width):width, seq_along(case$y)[-1]), at_row))
+  tried <- lapply(union(places, intersect(best + (-width):width, seq_along(case$y)[-1])), at_row)
+  Filter(function(s) is_clear_amount(list(amounts = s$amount), case), tried)
 }
 
 # ---- conditions at the end of a range, or in coarse steps

@@ -169,6 +169,8 @@ rule_table <- list(
                      "noise of half a step makes the error of rounding independent of the signal", "bench/records.R"),
   excess_error = rule(1.05, "variance of the noise", "error from which a fault of the record is looked for",
                       "what is smaller calls for no cause", "bench/records.R"),
+  clear_amount = rule(2, "noise", "least step of a sensor, or error of a start, that is suspected",
+                      "slow errors of a hidden effect look like a smaller step", "bench/records.R"),
   excess_gone = rule(0.5, "share", "of the error beyond the noise that a fault of the record must explain",
                      "the fault that made the error explains most of it", "bench/records.R"),
   decisive = rule(2, "decades", "log10 Bayes factor that a mechanism must earn",
