@@ -321,7 +321,7 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
   doubts <- length(doubt_sentences(x))
   told <- c(evidence_sentences(x), utils::head(disagreement_sentences(x), 1),
             if (doubts) paste0("Doubts: ", doubts, "; summary() tells them."))
-  cli::cli_bullets(stats::setNames(gsub("([{}])", "\\1\\1", told), rep("*", length(told))))
+  say_bullets(told)
   cli::cli_bullets(c(">" = "next: {.fun summary}, {.fun tidy}, {.fun plot} or {.fun report}"))
 })
 

@@ -272,8 +272,7 @@ print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
     cli::cli_bullets(c("*" = if (length(named)) "{name}: driven by {.field {named}}"
                              else "{name}: no boundary condition is significant"))
   }
-  said <- group_words(x)
-  cli::cli_bullets(stats::setNames(said, rep("!", length(said))))
+  say_bullets(group_words(x), "!")
 })
 
 #' @export

@@ -157,14 +157,8 @@ figures_of.amiss_upgrade <- function(x) {
   c(setdiff(figure_names, record_figure_names), of_records)
 }
 
-# Writes every figure as a PNG; returns the paths.
-save_figures <- function(x, folder, width = canvas_width, dpi = 120) {
-  vapply(figures_of(x), function(which) {
-    path <- file.path(folder, paste0(gsub("[^[:alnum:]_.-]+", "_", which), ".png"))
-    save_figure(ggplot2::autoplot(x, which), path, width, dpi)
-    path
-  }, "")
-}
+# Names of the files of figures.
+figure_files <- function(which) paste0(file_stem(which), ".png")
 
 # `ragg` finds fonts in the same way on every machine, and letters that a font lacks in another.
 save_figure <- function(figure, path, width = canvas_width, dpi = 120) {

@@ -163,8 +163,7 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
 #' @export
 print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Simulator} {.val {x$name}} (an R function) with {length(x$parameters)} free parameter{?s}")
-  cli::cli_bullets(stats::setNames(vapply(utils::head(x$parameters, 10), format, ""),
-                                   rep("*", min(10, length(x$parameters)))))
+  say_bullets(vapply(utils::head(x$parameters, 10), format, ""))
   cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
 

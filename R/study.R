@@ -61,7 +61,8 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   is filled only when all is computed; until then its folder `stages` holds the finished models, and the same call
 #'   goes on from there if it was interrupted, as long as the code of the study's R files is the same. What has these
 #'   names before, such as earlier results, is moved into a folder `earlier-` with the time. One run at a time can use
-#'   the folder.
+#'   the folder. If the report or a figure cannot be made, a warning (`amiss_warning_missing`) says which and why; the
+#'   others are written, and the same call makes what is missing.
 #' @param seed Overrides the seed of the file; with neither R's generator draws one, which is kept with the stages.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
@@ -102,8 +103,8 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
   result$title <- study$title
   result$wall_s <- elapsed() - started
   if (!is.null(out)) {
-    write_study(result, out, quiet)
-    remove_stages(file.path(out, "stages"))
+    missing <- write_study(result, out, quiet)
+    if (!length(missing)) remove_stages(file.path(out, "stages"))
   }
   invisible(result)
 }

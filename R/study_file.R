@@ -74,7 +74,7 @@ check_study_size <- function(study, refuse) {
 
 # The text of a regular file, marked as UTF-8, without a byte-order mark.
 read_utf8 <- function(path, field, call = rlang::caller_env()) {
-  if (!fs::is_file(path, follow = TRUE)) {
+  if (!is_regular_file(path)) {
     abort_input(c("The {.field {field}} file {.file {path}} is not a regular file.",
                   i = "Name a file that can be read from its start to its end."),
                 call = call)

@@ -74,7 +74,7 @@ test_that("failed runs are NaN, told with directory and stderr; the others are k
                class = "amiss_error_input")
   skip_on_cran()  # second tier: tools/test --quick
   fails(only("while (1) x = x"), "did not end within 0.5 s", time_limit = 0.5)
-  fails(only("print \"1,nonsense\""), "not numeric")
+  fails(only("print \"1,nonsense\""), "line 6 .*\"nonsense\" in the column Ti")
   fails(only("print \"1,20\""), "49 rows, where 48")
   fails(only("getline; getline"), "46 rows, where 48")
 })
