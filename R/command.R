@@ -58,6 +58,7 @@ read_command <- function(words, parser) {
   if (length(names) != 2) stop("one study file is needed, not ", length(names) - 1)
   if (is.null(asked$out)) stop("'--out DIR' is needed")
   if (!file.exists(names[2])) stop("the study file '", names[2], "' does not exist")
+  if (!is_regular_file(names[2])) stop("the study file '", names[2], "' is not a regular file")
   asked$study <- names[2]
   asked$threads <- whole_number(asked$threads, "threads", 1, 1024)
   if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0, .Machine$integer.max)

@@ -37,7 +37,8 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in [upgrade_model()] or
 #' [compare_models()]). R files are evaluated in their own folder.
 #'
-#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical.
+#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical, and numbers
+#' are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text).
 #' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets,
 #' the four operations of arithmetic and `%in% c(...)`. One that begins with `!` needs quotes around it:
 #' `validate: '!(hour > 72)'`.
@@ -135,7 +136,7 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
 
 # The fields of each record, checked; of a study without `records` its own.
 study_records <- function(study, path, call = rlang::caller_env()) {
-  if (is.null(study$records)) {
+  if (!is.list(study) || !checkmate::test_named(study, "unique") || is.null(study$records)) {
     check_study_fields(study, path, call = call)
     return(list(study))
   }
@@ -192,8 +193,10 @@ check_study_control <- function(study, call = rlang::caller_env()) {
 
 # `of`: the record in words, if the fields are of one of several.
 check_study_fields <- function(study, path, of = "", call = rlang::caller_env()) {
-  if (!is.list(study) || is.null(names(study)))
-    abort_input("The study file {.file {path}} holds no fields.", call = call)
+  if (!is.list(study) || !checkmate::test_named(study, "unique")) {
+    abort_input(c("The study file {.file {path}} is no mapping of fields to values.",
+                  i = "Write a line for each field, as {.code target: Ti}, each field once."), call = call)
+  }
   unknown <- setdiff(names(study), unlist(study_fields))
   if (length(unknown)) {
     abort_input(c("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",
