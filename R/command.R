@@ -32,12 +32,13 @@ run_command <- function(words) {
   }
   before <- options(amiss.allow_large = asked$large || isTRUE(getOption("amiss.allow_large")))
   on.exit(options(before))
-  tryCatch({
+  missing <- FALSE
+  tryCatch(withCallingHandlers({
     result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads, quiet = asked$quiet,
                         trust = asked$trust)
     if (!asked$quiet) print(result)
-    0
-  }, error = function(e) {
+    as.numeric(missing)
+  }, amiss_warning_missing = function(w) missing <<- TRUE), error = function(e) {
     message("amiss: ", conditionMessage(e))
     1
   }, interrupt = function(e) {

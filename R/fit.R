@@ -96,6 +96,7 @@ changed <- function(options, defaults) {
 #' @rdname fit
 #' @export
 glance.amiss_fit <- function(x, ...) {
+  check_parts(x, "x")
   rlang::check_dots_empty()
   decades <- c(x$log_evidence, x$interval) / log(10)
   data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
@@ -106,6 +107,7 @@ glance.amiss_fit <- function(x, ...) {
 #' @rdname fit
 #' @export
 augment.amiss_fit <- function(x, data = NULL, newdata = NULL, ...) {
+  check_parts(x, "x")
   if (!is.null(data)) {
     abort_input(c("{.arg data} is not used: the record is part of the fit.", i = "Another record is {.arg newdata}."))
   }

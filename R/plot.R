@@ -96,6 +96,7 @@ autoplot.amiss_discrepancy <- function(object, ...) {
 #' @export
 autoplot.amiss_calibration <- function(object, ...) {
   rlang::check_dots_empty()
+  check_parts(object, "object")
   figure_parameters(list("the model" = object))
 }
 
@@ -119,6 +120,7 @@ draw <- function(figure) {
 }
 
 upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
+  check_parts(upgrade, "object", call = call)
   if (is_several(upgrade$measurements)) {
     names <- names(upgrade$measurements$records)
     if (checkmate::test_choice(which, record_figure_names)) which <- paste(which, "of", names[1])

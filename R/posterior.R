@@ -105,6 +105,7 @@ vcov.amiss_fit <- function(object, ...) {
 #' @rdname posterior
 #' @export
 tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
+  check_parts(x, "x")
   rlang::check_dots_empty()
   check_level(conf.level, "conf.level")
   ends <- stats::confint(x, level = conf.level)

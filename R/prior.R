@@ -203,7 +203,8 @@ distinct_labels <- function(parameters) {
   label <- vapply(parameters, `[[`, "", "label")
   name <- names(parameters)
   label[!nzchar(trimws(label))] <- name[!nzchar(trimws(label))]
-  unclear <- duplicated(label) | duplicated(label, fromLast = TRUE) | label != name & label %in% name
+  shared <- duplicated(label) | duplicated(label, fromLast = TRUE)
+  unclear <- label != name & (shared | label %in% name)
   label[unclear] <- paste0(label[unclear], " (", name[unclear], ")")
   stats::setNames(make.unique(label, " "), name)
 }

@@ -104,6 +104,23 @@ test_that("no element, attribute or script of a report comes from data, and all 
   }
 })
 
+test_that("parameters of one label, and a label that is another's name, come through figures and report", {
+  skip_if_not_installed("rmarkdown")
+  skip_if_not(rmarkdown::pandoc_available("2.0"), "pandoc is not installed")
+  words <- c("Te", "Gv", "Ti", "p", "q", "r", "K", "room", "K", "gain", "K", "gain", "model", "sun", "Sun.", "K", "p",
+             "title")
+  at <- 0
+  upgrade <- hostile_upgrade(function() {
+    at <<- at + 1
+    words[at]
+  })
+  expect_setequal(tidy(upgrade)$label, c("gain (p)", "gain (q)", "p (r)"))
+  quick_figures()
+  file <- withr::local_tempfile(fileext = ".html")
+  report(upgrade, file)
+  expect_match(paste(readLines(file), collapse = " "), "<td>p (r)</td>", fixed = TRUE)
+})
+
 # Strings of signs, letters and spaces.
 random_strings <- function(n) {
   withr::with_seed(1, vapply(seq_len(n), function(i) {
