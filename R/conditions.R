@@ -31,7 +31,7 @@ check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) 
   check <- substitute(verdict)
   checks <- is.call(check) && is.call(check[[1]]) && identical(check[[1]][[2]], quote(checkmate))
   frame <- parent.frame()
-  value <- if (checks) present(eval(check[[2]], frame), name, call)
+  value <- if (checks) present(eval(check[[2]], frame), call)
   if (checks && is.character(value)) check_readable(value, name, call)
   if (isTRUE(verdict) && checks && as.character(check[[1]][[3]]) %in% number_checks) verdict <- plain_number(value)
   if (isTRUE(verdict)) return(invisible(TRUE))
@@ -39,24 +39,24 @@ check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) 
   abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)), call = call)
 }
 
-# The value of an argument, or an error that says which is missing.
-present <- function(value, name, call) {
+# A value, or an error that names the argument that it needs and that was not given.
+present <- function(value, call = rlang::caller_env()) {
   withCallingHandlers(value, error = function(e) {
-    if (is_missing_error(e)) abort_input("{.arg {name}} is missing: it has no default.", call = call)
+    name <- missing_argument(e)
+    if (!is.null(name)) abort_input("{.arg {name}} is missing: it has no default.", call = call)
   })
 }
 
 # Arguments without a default, in the order of their function.
-check_present <- function(..., call = rlang::caller_env()) {
-  names <- vapply(rlang::ensyms(...), rlang::as_string, "")
-  for (i in seq_along(names)) present(...elt(i), names[i], call)
-}
+check_present <- function(..., call = rlang::caller_env()) present(list(...), call)
 
-# R has no class for it before version 4.3; the message is in the session's language.
-is_missing_error <- function(e) {
+# Of R's own error, which has no class before version 4.3 and is in the session's language; NULL of any other.
+missing_argument <- function(e) {
   words <- strsplit(gettext("argument \"%s\" is missing, with no default", domain = "R"), "%s", fixed = TRUE)[[1]]
   said <- conditionMessage(e)
-  inherits(e, "missingArgError") || startsWith(said, words[1]) && endsWith(said, words[2])
+  if (startsWith(said, words[1]) && endsWith(said, words[2])) {
+    substr(said, nchar(words[1]) + 1, nchar(said) - nchar(words[2]))
+  }
 }
 
 # Text whose bytes are characters in its encoding.

@@ -58,6 +58,7 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
                               name = "program", size_limit = 1000) {
   check_input(checkmate::check_character(command, any.missing = FALSE, min.len = 1), "command")
   check_input(checkmate::check_string(command[1], min.chars = 1), "command[1]", "Name the program.")
+  check_present(output)
   if (!is.function(output)) {
     check_input(checkmate::check_character(output, len = 2, any.missing = FALSE), "output")
     check_input(checkmate::check_names(names(output), permutation.of = c("file", "column")), "output",
@@ -106,6 +107,7 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
 #' })
 #' @export
 with_template <- function(simulator, templates, ..., boundary = character()) {
+  check_present(simulator, templates)
   check_object(simulator, "amiss_program_simulator", "simulator",
               "Make one with {.fun program_simulator}.")
   check_columns_named(boundary)

@@ -317,7 +317,7 @@ check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()
 }
 
 check_simulator <- function(simulator, call = rlang::caller_env()) {
-  present(simulator, "simulator", call)
+  present(simulator, call)
   known <- function(class) !is.null(utils::getS3method("simulate_runs", class, optional = TRUE))
   if (!any(vapply(class(simulator), known, NA))) {
     abort_input(c("{.arg simulator} is of class {.cls {class(simulator)}}, which is no simulator.",
