@@ -1,4 +1,4 @@
-# The command line of exec/amiss. Exit status: 0 done, 1 failed, 2 bad usage.
+# The command line of exec/amiss. Exit status: 0 done, 1 failed or not whole, 2 bad usage.
 
 command_parser <- function() {
   option <- function(name, help, ...) optparse::make_option(paste0("--", name), help = help, ...)

@@ -168,6 +168,7 @@ print.summary.amiss_fit <- function(x, ...) {
     more <- nrow(x$parameters) - nrow(shown)
     if (more) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
     then <- if (is.null(x$reach)) "its {.code index} of the boundary conditions" else "{.fun attribute_discrepancy}"
-    cli::cli_bullets(c("*" = as_said(x$reach), "*" = as_said(x$check), ">" = paste("next: {.fun predict}, {.fun confint} or", then)))
+    cli::cli_bullets(c("*" = as_said(x$reach), "*" = as_said(x$check),
+                       ">" = paste("next: {.fun predict}, {.fun confint} or", then)))
   })
 }

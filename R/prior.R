@@ -174,8 +174,8 @@ print.amiss_prior <- function(x, ...) {
 #' @param name Name of the parameter.
 #' @param prior Its [prior].
 #' @param unit Its unit, for people.
-#' @param label One short phrase for people; the name if not given. A label that two parameters of a model share, or that
-#'   is the name of another, is shown with the parameter's name behind it.
+#' @param label One short phrase for people; the name if not given. A label that two parameters of a model share, or
+#'   that is the name of another, is shown with the parameter's name behind it.
 #' @return An object of class `amiss_free`.
 #' @examples
 #' free("k_insulation", uniform(0.03, 0.05), unit = "W/mK")

@@ -5,13 +5,14 @@
 #' there, without a shell, and its output is read. In templates and in the arguments of the command, `{{name}}` stands
 #' for the value of the parameter `name`. A file without a placeholder is copied byte for byte.
 #'
-#' The output is a CSV with one line of names and a line of numbers for each row of the drivers, a point before decimals.
-#' Exponents as Fortran writes them (`1.5D-03`, `1.5-103`) are numbers, too. Anything else (`****`, a decimal comma, a row of
-#' units, a line with one field more or less than there are names) makes the run fail: the warning says line and value.
+#' The output is a CSV with one line of names and a line of numbers for each row of the drivers, a point before
+#' decimals. Exponents as Fortran writes them (`1.5D-03`, `1.5-103`) are numbers, too. Anything else (`****`, a decimal
+#' comma, a row of units, a line with one field more or less than there are names) makes the run fail: the warning says
+#' line and value.
 #'
-#' A run ends with the process that was started: what it leaves behind in the background is stopped, as is everything of
-#' a run that takes longer than `time_limit`, reading its output included, or writes more than `size_limit`. If R itself
-#' is killed, the program is stopped, and the next call removes what was left of its run.
+#' A run ends with the process that was started: what it leaves behind in the background is stopped, as is everything
+#' of a run that takes longer than `time_limit`, reading its output included, or writes more than `size_limit`. If R
+#' itself is killed, the program is stopped, and the next call removes what was left of its run.
 #'
 #' The drivers' file has the columns `time` (the record's: ISO 8601 in UTC, or its hours), `hours` since the start of
 #' the segment, both at the end of each interval, and the columns named in `boundary`.
@@ -21,24 +22,25 @@
 #' file, and write one row for each of its rows.
 #'
 #' A run that succeeds is kept in `cache` at once and never made twice: its key is what it reads (templates, command,
-#' drivers, contents of the files that the command names, `version`) and how its output is read. What was kept is checked
-#' when it is read, and made again if it is not whole. What else the program reads, such as a library of its own, does not count: give another `version` when it changes. A run that fails (exit
-#' status, time limit, unreadable output, too few rows, values that are not finite) is `NaN`, told in a warning with its
-#' directory, which is kept, and the last lines of its stderr; it is tried again at the next call. Runs are made in
-#' parallel as [future::plan()] says.
+#' drivers, contents of the files that the command names, `version`) and how its output is read. What was kept is
+#' checked when it is read, and made again if it is not whole. What else the program reads, such as a library of its
+#' own, does not count: give another `version` when it changes. A run that fails (exit status, time limit, unreadable
+#' output, too few rows, values that are not finite) is `NaN`, told in a warning with its directory, which is kept, and
+#' the last lines of its stderr; it is tried again at the next call. Runs are made in parallel as [future::plan()]
+#' says.
 #'
 #' @param command The program and its arguments, as a character vector. Words that name an existing file become absolute
 #'   paths, but for the names of `templates`, `drivers` and the file of `output`: those are in the run's directory.
 #' @param ... The parameters, each made by [free()].
 #' @param output Where the output is: `c(file = "out.csv", column = "Ti")` of a CSV in the run's directory (`stdout.txt`
 #'   for what the program prints), or a function of that directory that returns one number per row of the drivers.
-#' @param templates Named list: file in the run's directory = path of its template, or its text in [I()]. A name may hold
-#'   folders (`"inputs/model.txt"`), and does not lead out of the run's directory.
+#' @param templates Named list: file in the run's directory = path of its template, or its text in [I()]. A name may
+#'   hold folders (`"inputs/model.txt"`), and does not lead out of the run's directory.
 #' @param boundary Names of the driver columns that the program needs.
 #' @param drivers Name of the drivers' file.
 #' @param time_limit Seconds for one run.
-#' @param size_limit Megabytes that one run may write. Of a run that fails, files over one megabyte are kept without their
-#'   middle.
+#' @param size_limit Megabytes that one run may write. Of a run that fails, files over one megabyte are kept without
+#'   their middle.
 #' @param retries How often a failed run is tried again at once.
 #' @param cache Directory of the finished runs, and of the directories of failed ones.
 #' @param version Anything that tells versions of the program apart.

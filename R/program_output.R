@@ -22,11 +22,13 @@ output_lines <- function(path, file, rows) {
   if (!is_regular_file(path)) stop(file, " is no regular file")
   most <- longest_line + 1e5 * rows
   if (file.size(path) > most) {
-    stop(file, " has ", round(file.size(path) / 1e6), " MB, more than the ", round(most / 1e6), " MB for ", rows, " rows")
+    stop(file, " has ", round(file.size(path) / 1e6), " MB, more than the ", round(most / 1e6), " MB for ",
+         rows, " rows")
   }
   bytes <- file_bytes(path)
   ends <- c(0, which(bytes == as.raw(10)), length(bytes))
-  if (any(bytes == as.raw(0))) stop(file, " is no text: line ", sum(ends < which(bytes == as.raw(0))[1]), " holds a zero byte")
+  zero <- which(bytes == as.raw(0))
+  if (length(zero)) stop(file, " is no text: line ", sum(ends < zero[1]), " holds a zero byte")
   if (max(diff(ends)) > longest_line) stop("line ", which.max(diff(ends)), " of ", file, " is longer than 1 MB")
   lines <- strsplit(rawToChar(bytes), "\r?\n", perl = TRUE, useBytes = TRUE)[[1]]
   Encoding(lines) <- if (all(validUTF8(lines))) "UTF-8" else "latin1"

@@ -102,7 +102,9 @@ wait_for <- function(process, ends, simulator, folder) {
   }
 }
 
-stop_late <- function(time_limit) stop("it did not end within ", time_limit, " s, or its output could not be read in time")
+stop_late <- function(time_limit) {
+  stop("it did not end within ", time_limit, " s, or its output could not be read in time")
+}
 
 # Evaluates R code that may not go on after a time.
 until <- function(ends, time_limit, code) {

@@ -96,7 +96,8 @@ html_figure <- function(figure, alt) {
   }
   cat("\n```{=html}\n<picture><source media=\"screen and (max-width: 620px)\" srcset=\"",
       drawn(narrow, narrow_canvas, 170), "\">",
-      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_attribute(alt), "\"></picture>\n```\n", sep = "")
+      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_attribute(alt), "\"></picture>\n```\n",
+      sep = "")
 }
 
 # The style of a fragment goes with it, as others' documents know nothing of it.

@@ -37,11 +37,10 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' `validate` (conditions in the columns of the data), `runs`, `seed` and `control` (as in [upgrade_model()] or
 #' [compare_models()]). R files are evaluated in their own folder.
 #'
-#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical, and numbers
-#' are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text).
-#' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets,
-#' the four operations of arithmetic and `%in% c(...)`. One that begins with `!` needs quotes around it:
-#' `validate: '!(hour > 72)'`.
+#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical, and
+#' numbers are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text). Conditions are no R code: they may hold
+#' columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, the four operations of arithmetic and `%in%
+#' c(...)`. One that begins with `!` needs quotes around it: `validate: '!(hour > 72)'`.
 #'
 #' `study`, `data`, `time`, `target` and `boundary` are needed, and `model` with `catalogue`, or `models`. Without the
 #' others `title` is that of `study`, `runs` 150, `method` `paper`, `average_h` the step of the data, `warmup_h` and

@@ -432,7 +432,8 @@ test_that("a likelihood that is seldom undefined is told of", {
 # What is told if a function is called without one of its arguments.
 told_without <- function(f, argument, call) {
   told <- tryCatch(do.call(getExportedValue("amiss", f), call[names(call) != argument], quote = TRUE), error = identity)
-  if (!inherits(told, "amiss_error_input") || !grepl(argument, conditionMessage(told))) paste(f, argument, class(told)[1])
+  named <- inherits(told, "amiss_error_input") && grepl(argument, conditionMessage(told))
+  if (!named) paste(f, argument, class(told)[1])
 }
 
 test_that("an argument that is missing is named", {

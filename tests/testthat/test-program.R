@@ -133,7 +133,8 @@ shell_run <- function(..., cache = withr::local_tempdir(.local_envir = parent.fr
                       output = c(file = "stdout.txt", column = "Ti"), time_limit = 200) {
   skip_on_os("windows")
   program <- program_simulator(c("sh", "script.sh"), free("a", uniform(0, 2)), output = output, cache = cache,
-                               templates = list(script.sh = I(c(..., "# {{a}}"))), time_limit = time_limit, size_limit = 10)
+                               templates = list(script.sh = I(c(..., "# {{a}}"))), time_limit = time_limit,
+                               size_limit = 10)
   told <- NULL
   runs <- withCallingHandlers(simulate_runs(program, cbind(a = 1), matrix(0, rows, 0), 1), warning = function(w) {
     told <<- gsub("\\s+", " ", conditionMessage(w))
@@ -208,7 +209,8 @@ test_that("what is kept of runs is checked, and made again where it is bad", {
     another = function(file) file.copy(files[2], file, overwrite = TRUE))
   for (how in names(spoil)) {
     spoil[[how]](files[1])
-    expect_message(again <- simulate_runs(program, rc_values, rc_drivers, 1), "done again", class = "amiss_message_kept")
+    expect_message(again <- simulate_runs(program, rc_values, rc_drivers, 1), "done again",
+                   class = "amiss_message_kept")
     expect_identical(again, runs, info = how)
   }
   expect_length(readLines(log), 3 + length(spoil))
@@ -231,7 +233,9 @@ test_that("templates stay in the run's directory, each with a file of its own", 
   text <- I("x")
   bad <- c("../../x.txt", "..", ".", "a/", "/tmp/x", "a/../../b", "a//b", "./a", "~/x", "C:/x", "..\\x", "a\nb", "",
            "drivers.csv", "stdout.txt", "stderr.txt/x", strrep("a", 300))
-  for (name in bad) expect_error(do.call(with, stats::setNames(list(text), name)), class = "amiss_error_input", info = name)
+  for (name in bad) {
+    expect_error(do.call(with, stats::setNames(list(text), name)), class = "amiss_error_input", info = name)
+  }
   expect_error(with(a = text, "a/b" = text), "\"a\"|'a'", class = "amiss_error_input")
   expect_named(with("a/b.txt" = text, "a/c d.txt" = text, .x = text, "..y" = text)$templates)
   output <- function(file) program_simulator(c("cat", "{{a}}"), free("a", uniform(0, 1)), cache = tempfile(),
@@ -249,7 +253,7 @@ test_that("a file without a placeholder is copied byte for byte, and text of any
   writeBin(c(charToRaw("T in "), as.raw(0xb0), charToRaw("C = {{a}}\n")), at("latin1"))
   program <- program_simulator(c("sh", "-c", "exit 1"), free("a", uniform(0, 1)), cache = at("cache"),
                                output = c(file = "o.csv", column = "b"),
-                               templates = as.list(c(binary = at("binary"), "in/text" = at("text"), latin1 = at("latin1"))))
+                               templates = list(binary = at("binary"), "in/text" = at("text"), latin1 = at("latin1")))
   expect_warning(simulate_runs(program, cbind(a = 0.5), matrix(0, 3, 0), 1), "exit status 1")
   copied <- function(name) file_bytes(file.path(dir(at("cache"), "^failed", full.names = TRUE), name))
   expect_identical(copied("binary"), file_bytes(at("binary")))

@@ -8,7 +8,8 @@ hostile <- c(
   "<!-- part: words -->", "::: {.a}", "---\ntitle: x\n---", "`r probe(13)`", "```{r}\nprobe(14)\n```",
   "\\input{/etc/probe} $\\x$ %", "&lt;b&gt; &#60;i&#62; &amp", "{probe(17)} {.val x}", "</style></title></body>",
   "\u202e\u2028\u0007\u001b[31m\u00e9\u4e2d", "ends in \\", "a|b||c", "{{x}} %s %d", "../../probe", "//<![CDATA[ ]]>",
-  "#a .b\n## d", "@import url(probe); .a{b:c}", "javascript:probe()", "1. a", "a\n: b", "-- ... ---", "(@a) [^1]: x", "  ")
+  "#a .b\n## d", "@import url(probe); .a{b:c}", "javascript:probe()", "1. a", "a\n: b", "-- ... ---",
+  "(@a) [^1]: x", "  ")
 
 # A run of hostile strings, each another one.
 hostile_source <- function(first) {
@@ -147,7 +148,8 @@ test_that("any text comes out of markdown, an element and an attribute as it wen
 })
 
 test_that("names of figures become names of files, each its own and none outside the folder", {
-  names <- c("fit of north", paste("fit of", c("../../x", "a/b", "a_b", "a\\b", "..", "\u00e9\nx", strrep("long ", 99))))
+  records <- c("../../x", "a/b", "a_b", "a\\b", "..", "\u00e9\nx", strrep("long ", 99))
+  names <- c("fit of north", paste("fit of", records))
   files <- figure_files(names)
   expect_identical(files[1], "fit_of_north.png")
   expect_false(anyDuplicated(files) > 0)

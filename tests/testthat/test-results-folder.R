@@ -55,7 +55,8 @@ test_that("what cannot be made is missed, and told; the result is there", {
   expect_named(missing, c("figures/gain.png", "report.html"))
   expect_equal(readRDS(file.path(out, "result.rds")), 1:3)
   there <- dir(out, recursive = TRUE)
-  expect_setequal(grep("^earlier", there, value = TRUE, invert = TRUE), c("result.rds", "result.json", "figures/fit.png"))
+  expect_setequal(grep("^earlier", there, value = TRUE, invert = TRUE),
+                  c("result.rds", "result.json", "figures/fit.png"))
   # What was there before has been moved as a whole: the old report does not stand beside the new result.
   expect_length(grep("^earlier", there), 5)
 })

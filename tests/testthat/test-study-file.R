@@ -54,7 +54,10 @@ test_that("a path that leads to no file with an end is refused, over any number 
   at <- function(name) file.path(folder, name)
   system2("mkfifo", shQuote(at("pipe")))
   writeLines("a: 1", at("file"))
-  link <- function(to, names) for (name in names) to <- { file.symlink(to, at(name)); at(name) }
+  link <- function(to, names) for (name in names) {
+    file.symlink(to, at(name))
+    to <- at(name)
+  }
   link(at("pipe"), c("p1", "p2", "p3"))
   link("/dev/stdin", c("s1", "s2"))
   link("/dev/zero", c("z1", "z2"))
