@@ -148,6 +148,6 @@ fill_ais_control <- function(control, what = "control", call = rlang::caller_env
 print.amiss_ais <- function(x, ...) on_stdout(x, {
   cli::cli_text(paste("{.strong Posterior} of {ncol(x$draws)} parameter{?s}: log evidence {round(x$log_evidence, 2)}",
                       "[{round(x$interval[1], 2)}, {round(x$interval[2], 2)}] ({x$estimator})"))
-  cli::cli_bullets(c("*" = "{x$evaluations} likelihood values, {round(x$ess)} effective draws", "*" = x$verdict,
-                     ">" = "next: {.code $draws} with {.code $weights}"))
+  cli::cli_bullets(c("*" = "{x$evaluations} likelihood values, {round(x$ess)} effective draws",
+                     "*" = as_said(x$verdict), ">" = "next: {.code $draws} with {.code $weights}"))
 })

@@ -161,7 +161,7 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
   say_table(x$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")])
   named <- significant_conditions(x$table)
   cli::cli_bullets(c("*" = if (length(named)) "driven by {.field {named}}" else "no boundary condition is significant",
-                     stats::setNames(group_words(x), rep("!", length(group_words(x)))),
+                     stats::setNames(as_said(group_words(x)), rep("!", length(group_words(x)))),
                      ">" = "next: {.fun upgrade_model} with a {.fun catalogue}"))
 })
 

@@ -69,6 +69,7 @@ calibro_files <- list(obs = "obs.csv", bc = "bc.csv", inputs = "inputs.csv", sim
 # A table of numbers with or without a line of names.
 read_numbers <- function(path, call) {
   if (!file.exists(path)) abort_input("The file {.file {path}} does not exist.", call = call)
+  if (!is_regular_file(path)) abort_input("{.file {path}} is not a regular file.", call = call)
   first <- scan(path, "", sep = ",", nlines = 1, quiet = TRUE, strip.white = TRUE)
   named <- anyNA(suppressWarnings(as.numeric(first[first != "NA"])))
   check_field_counts(path, call)

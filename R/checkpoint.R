@@ -51,10 +51,11 @@ check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
               call = call)
 }
 
-# NULL if there is none, or none that is whole and of this key.
-read_kept <- function(file, id) {
+# NULL if there is none, or none that is whole, of this key and valid.
+read_kept <- function(file, id, valid = function(value) TRUE) {
   if (!file.exists(file)) return(NULL)
-  kept <- tryCatch(suppressWarnings(unpack(readRDS(file), id)), error = function(e) NULL)
+  kept <- tryCatch(suppressWarnings(if (is_regular_file(file)) unpack(readRDS(file), id)), error = function(e) NULL)
+  if (!is.null(kept) && !valid(kept$value)) kept <- NULL
   if (is.null(kept))
     cli::cli_inform(
       c("!" = "The kept file {.file {file}} is damaged or not from this package; its work is done again."),
@@ -74,20 +75,26 @@ unpack <- function(packed, id) {
   if (whole) list(value = unserialize(packed$bytes))
 }
 
-# Written under a name of its own, read back, then renamed: under its name a file is whole.
 keep_value <- function(value, file, id, write = saveRDS) {
+  if (!store_value(value, file, id, write)) tell_unkept(dirname(file))
+}
+
+tell_unkept <- function(folder) {
+  cli::cli_inform(c("!" = "What is finished could not be kept in {.file {folder}}; the work goes on without it.",
+                    i = "Is the disk full?"), class = "amiss_message_kept")
+}
+
+# Written under a name of its own, read back, then renamed: under its name a file is whole. Whether this was done.
+store_value <- function(value, file, id, write = saveRDS) {
   folder <- dirname(file)
   dir.create(folder, recursive = TRUE, showWarnings = FALSE)
   part <- tempfile("amiss-part-", folder)
   on.exit(unlink(part))
   packed <- pack(value, id)
-  done <- tryCatch(suppressWarnings({
+  tryCatch(suppressWarnings({
     write(packed, part)
     identical(readRDS(part), packed) && file.rename(part, file)
   }), error = function(e) FALSE)
-  if (!done)
-    cli::cli_inform(c("!" = "A finished model could not be kept in {.file {folder}}; the run goes on without it.",
-                      i = "Is the disk full?"), class = "amiss_message_kept")
 }
 
 # Removes what a keeper made in a folder, and the folder if nothing else is in it.

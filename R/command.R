@@ -1,4 +1,4 @@
-# The command line of exec/amiss. Exit status: 0 done, 1 failed, 2 bad usage.
+# The command line of exec/amiss. Exit status: 0 done, 1 failed or not whole, 2 bad usage.
 
 command_parser <- function() {
   option <- function(name, help, ...) optparse::make_option(paste0("--", name), help = help, ...)
@@ -32,12 +32,13 @@ run_command <- function(words) {
   }
   before <- options(amiss.allow_large = asked$large || isTRUE(getOption("amiss.allow_large")))
   on.exit(options(before))
-  tryCatch({
+  missing <- FALSE
+  tryCatch(withCallingHandlers({
     result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads, quiet = asked$quiet,
                         trust = asked$trust)
     if (!asked$quiet) print(result)
-    0
-  }, error = function(e) {
+    as.numeric(missing)
+  }, amiss_warning_missing = function(w) missing <<- TRUE), error = function(e) {
     message("amiss: ", conditionMessage(e))
     1
   }, interrupt = function(e) {
@@ -58,6 +59,7 @@ read_command <- function(words, parser) {
   if (length(names) != 2) stop("one study file is needed, not ", length(names) - 1)
   if (is.null(asked$out)) stop("'--out DIR' is needed")
   if (!file.exists(names[2])) stop("the study file '", names[2], "' does not exist")
+  if (!is_regular_file(names[2])) stop("the study file '", names[2], "' is not a regular file")
   asked$study <- names[2]
   asked$threads <- whole_number(asked$threads, "threads", 1, 1024)
   if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0, .Machine$integer.max)

@@ -321,7 +321,7 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
   doubts <- length(doubt_sentences(x))
   told <- c(evidence_sentences(x), utils::head(disagreement_sentences(x), 1),
             if (doubts) paste0("Doubts: ", doubts, "; summary() tells them."))
-  cli::cli_bullets(stats::setNames(gsub("([{}])", "\\1\\1", told), rep("*", length(told))))
+  say_bullets(told)
   cli::cli_bullets(c(">" = "next: {.fun summary}, {.fun tidy}, {.fun plot} or {.fun report}"))
 })
 
@@ -347,6 +347,7 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
 #' tidy(comparison, "criteria")
 #' @export
 tidy.amiss_comparison <- function(x, what = "evidence", ...) {
+  check_parts(x, "x")
   rlang::check_dots_empty()
   check_input(checkmate::check_choice(what, names(x$tables)), "what")
   x$tables[[what]]
@@ -355,6 +356,7 @@ tidy.amiss_comparison <- function(x, what = "evidence", ...) {
 #' @rdname tidy.amiss_comparison
 #' @export
 glance.amiss_comparison <- function(x, ...) {
+  check_parts(x, "x")
   rlang::check_dots_empty()
   best <- x$tables$evidence[which.min(x$tables$evidence$rank), ]
   data.frame(best[c("model", "log10_evidence", "lower95", "upper95", "against", "log10_bf", "word", "probability",

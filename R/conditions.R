@@ -30,11 +30,42 @@ warn_result <- function(message, class = character(), .envir = parent.frame()) {
 check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) {
   check <- substitute(verdict)
   checks <- is.call(check) && is.call(check[[1]]) && identical(check[[1]][[2]], quote(checkmate))
-  value <- if (checks) eval(check[[2]], parent.frame())
+  frame <- parent.frame()
+  value <- if (checks) present(eval(check[[2]], frame), call)
+  if (checks && is.character(value)) check_readable(value, name, call)
   if (isTRUE(verdict) && checks && as.character(check[[1]][[3]]) %in% number_checks) verdict <- plain_number(value)
   if (isTRUE(verdict)) return(invisible(TRUE))
   told <- if (checks) value_words(value)
   abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)), call = call)
+}
+
+# A value, or an error that names the argument that it needs and that was not given.
+present <- function(value, call = rlang::caller_env()) {
+  withCallingHandlers(value, error = function(e) {
+    name <- missing_argument(e)
+    if (!is.null(name)) abort_input("{.arg {name}} is missing: it has no default.", call = call)
+  })
+}
+
+# Arguments without a default, in the order of their function.
+check_present <- function(..., call = rlang::caller_env()) present(list(...), call)
+
+# Of R's own error, which has no class before version 4.3 and is in the session's language; NULL of any other.
+missing_argument <- function(e) {
+  words <- strsplit(gettext("argument \"%s\" is missing, with no default", domain = "R"), "%s", fixed = TRUE)[[1]]
+  said <- conditionMessage(e)
+  if (startsWith(said, words[1]) && endsWith(said, words[2])) {
+    substr(said, nchar(words[1]) + 1, nchar(said) - nchar(words[2]))
+  }
+}
+
+# Text whose bytes are characters in its encoding.
+check_readable <- function(text, name, call) {
+  bad <- which(Encoding(text) == "bytes" | !validEnc(text))
+  if (length(bad)) {
+    abort_input(c("{.arg {name}} cannot be used: {.val {one_line(text[bad[1]])}} holds bytes that are no characters.",
+                  i = "Say its encoding, as {.code iconv(x, \"latin1\", \"UTF-8\")} does."), call = call)
+  }
 }
 
 # What the objects of the package are made of; another number, as an object read from a file may have, is refused.
@@ -42,11 +73,39 @@ format_version <- 3L
 
 check_object <- function(x, classes, name, hint = NULL, call = rlang::caller_env()) {
   check_input(checkmate::check_multi_class(x, classes), name, hint, call)
+  check_parts(x, name, hint, call)
   version <- if (is.list(x)) unclass(x)[["format_version"]]
   if (is.null(version) || identical(version, format_version)) return(invisible(TRUE))
   abort_input(c("{.arg {name}} was made by another version of the package.",
                 x = "Its format is {.val {version}}; this version reads {.val {format_version}}.",
                 i = "Make it again with this version."), call = call)
+}
+
+# Parts without which an object of a class was not made by the package.
+object_parts <- list(
+  amiss_prior = c("family", "parameters", "lower", "upper"),
+  amiss_free = c("name", "prior", "unit", "label"),
+  amiss_measurements = c("format_version", "target", "unit", "noise_sd", "y", "use", "raw", "conditions"),
+  amiss_ensemble = c("format_version", "parameters", "values", "outputs"),
+  amiss_emulator = c("format_version", "parameters", "basis", "processes"),
+  amiss_fit = c("format_version", "measurements", "rows", "values", "weights", "posterior"),
+  amiss_calibration = c("format_version", "measurements", "rows", "values", "weights", "posterior"),
+  amiss_component = c("type", "name"),
+  amiss_joint = c("format_version", "records", "parameters"),
+  amiss_upgrade = c("format_version", "models", "candidates", "measurements"),
+  amiss_comparison = c("format_version", "method", "models", "tables", "measurements"),
+  amiss_function_simulator = c("format_version", "name", "f", "parameters", "boundary"),
+  amiss_program_simulator = c("format_version", "name", "command", "parameters", "boundary"),
+  amiss_zone = "components",
+  amiss_mechanism = c("name", "edit", "boundary", "sentence"))
+
+check_parts <- function(x, name, hint = NULL, call = rlang::caller_env()) {
+  needed <- unlist(object_parts[intersect(class(x), names(object_parts))])
+  absent <- setdiff(needed, if (is.list(x)) names(x))
+  if (length(absent)) {
+    abort_input(c(paste("{.arg {name}} has the class {.cls {class(x)}}, but is not whole: it has no",
+                        "{.field {absent}}."), i = hint %||% "Make it with the package's own function."), call = call)
+  }
 }
 
 # For checkmate dates, times and empty texts are numbers, too.

@@ -75,6 +75,7 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' head(predict(fit, use = "validate"))
 #' @export
 ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL, time = NULL) {
+  check_present(design, outputs)
   design <- as_number_matrix(design)
   check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"),
               "design")

@@ -96,6 +96,7 @@ changed <- function(options, defaults) {
 #' @rdname fit
 #' @export
 glance.amiss_fit <- function(x, ...) {
+  check_parts(x, "x")
   rlang::check_dots_empty()
   decades <- c(x$log_evidence, x$interval) / log(10)
   data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
@@ -106,6 +107,7 @@ glance.amiss_fit <- function(x, ...) {
 #' @rdname fit
 #' @export
 augment.amiss_fit <- function(x, data = NULL, newdata = NULL, ...) {
+  check_parts(x, "x")
   if (!is.null(data)) {
     abort_input(c("{.arg data} is not used: the record is part of the fit.", i = "Another record is {.arg newdata}."))
   }
@@ -166,6 +168,7 @@ print.summary.amiss_fit <- function(x, ...) {
     more <- nrow(x$parameters) - nrow(shown)
     if (more) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
     then <- if (is.null(x$reach)) "its {.code index} of the boundary conditions" else "{.fun attribute_discrepancy}"
-    cli::cli_bullets(c("*" = x$reach, "*" = x$check, ">" = paste("next: {.fun predict}, {.fun confint} or", then)))
+    cli::cli_bullets(c("*" = as_said(x$reach), "*" = as_said(x$check),
+                       ">" = paste("next: {.fun predict}, {.fun confint} or", then)))
   })
 }

@@ -162,6 +162,7 @@ logLik.amiss_joint <- function(object, ...) logLik.amiss_fit(object, ...)
 # Of the emulators the largest numbers; `sigma` is in units of the noise.
 #' @export
 glance.amiss_joint <- function(x, ...) {
+  check_parts(x, "x")
   rlang::check_dots_empty()
   decades <- c(x$log_evidence, x$interval) / log(10)
   each <- lapply(unname(x$records), generics::glance)
@@ -176,6 +177,7 @@ glance.amiss_joint <- function(x, ...) {
 # Records need not share conditions nor clocks: a list by record.
 #' @export
 augment.amiss_joint <- function(x, data = NULL, newdata = NULL, ...) {
+  check_parts(x, "x")
   lapply(stats::setNames(nm = names(x$records)), function(name) {
     generics::augment(x$records[[name]], data = data[[name]], newdata = newdata[[name]], ...)
   })
@@ -213,6 +215,7 @@ calibrated_record.amiss_joint <- function(fit) lapply(fit$records, calibrated_re
 # Which conditions drive the discrepancies: of each record, and the same conditions in all that have them.
 #' @export
 attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, threads = 1) {
+  check_parts(fit, "fit")
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   fits <- fit$records
@@ -272,8 +275,7 @@ print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
     cli::cli_bullets(c("*" = if (length(named)) "{name}: driven by {.field {named}}"
                              else "{name}: no boundary condition is significant"))
   }
-  said <- group_words(x)
-  cli::cli_bullets(stats::setNames(said, rep("!", length(said))))
+  say_bullets(group_words(x), "!")
 })
 
 #' @export

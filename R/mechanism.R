@@ -29,6 +29,7 @@
 #' catalogue(sun, leaks)
 #' @export
 mechanism <- function(name, edit, boundary, sentence) {
+  check_present(name, edit, boundary, sentence)
   check_input(checkmate::check_string(name, min.chars = 1), "name")
   if (!inherits(edit, "amiss_ensemble")) {
     check_input(checkmate::check_function(edit, nargs = if (knows_record(edit)) 2 else 1), "edit")
@@ -48,6 +49,7 @@ catalogue <- function(...) {
     abort_input(c("Every entry of a catalogue must be a mechanism; number {other} is {seen(mechanisms[[other]])}.",
                   i = "Make each with {.fun mechanism}; of a list of them {.code do.call(catalogue, list)} makes one."))
   }
+  for (one in mechanisms) check_parts(one, "...")
   names(mechanisms) <- vapply(mechanisms, `[[`, "", "name")
   if (anyDuplicated(names(mechanisms)))
     abort_input("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}} stands twice in the catalogue.")

@@ -96,6 +96,7 @@ autoplot.amiss_discrepancy <- function(object, ...) {
 #' @export
 autoplot.amiss_calibration <- function(object, ...) {
   rlang::check_dots_empty()
+  check_parts(object, "object")
   figure_parameters(list("the model" = object))
 }
 
@@ -119,6 +120,7 @@ draw <- function(figure) {
 }
 
 upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
+  check_parts(upgrade, "object", call = call)
   if (is_several(upgrade$measurements)) {
     names <- names(upgrade$measurements$records)
     if (checkmate::test_choice(which, record_figure_names)) which <- paste(which, "of", names[1])
@@ -157,14 +159,8 @@ figures_of.amiss_upgrade <- function(x) {
   c(setdiff(figure_names, record_figure_names), of_records)
 }
 
-# Writes every figure as a PNG; returns the paths.
-save_figures <- function(x, folder, width = canvas_width, dpi = 120) {
-  vapply(figures_of(x), function(which) {
-    path <- file.path(folder, paste0(gsub("[^[:alnum:]_.-]+", "_", which), ".png"))
-    save_figure(ggplot2::autoplot(x, which), path, width, dpi)
-    path
-  }, "")
-}
+# Names of the files of figures.
+figure_files <- function(which) paste0(file_stem(which), ".png")
 
 # `ragg` finds fonts in the same way on every machine, and letters that a font lacks in another.
 save_figure <- function(figure, path, width = canvas_width, dpi = 120) {

@@ -105,11 +105,12 @@ vcov.amiss_fit <- function(object, ...) {
 #' @rdname posterior
 #' @export
 tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
+  check_parts(x, "x")
   rlang::check_dots_empty()
   check_level(conf.level, "conf.level")
   ends <- stats::confint(x, level = conf.level)
   declared <- drawn_parameters(x)[rownames(ends)]
-  data.frame(term = rownames(ends), label = vapply(declared, `[[`, "", "label"),
+  data.frame(term = rownames(ends), label = distinct_labels(declared),
              unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
              std.error = unname(sqrt(diag(stats::vcov(x)))),
              conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]),
@@ -186,7 +187,7 @@ parameter_rows <- function(fit) {
     limit <- prior_quantile(p$prior, u)
     if (is.finite(limit)) limit else prior_quantile(p$prior, fallback)
   }, 0)
-  cbind(table, label = vapply(declared, `[[`, "", "label"), prior_lower = side(0, 0.001), prior_upper = side(1, 0.999),
+  cbind(table, label = distinct_labels(declared), prior_lower = side(0, 0.001), prior_upper = side(1, 0.999),
         at_edge = unname(edge_of_prior(fit)[table$name]))
 }
 
@@ -207,8 +208,7 @@ say_parameters <- function(fit, most) {
   table <- parameter_table(fit)
   say_table(utils::head(table, most))
   if (nrow(table) > most) cli::cli_text("{nrow(table) - most} more parameter{?s}: see {.fun tidy}")
-  told <- mode_words(fit)
-  if (length(told)) cli::cli_bullets(stats::setNames(told, rep("!", length(told))))
+  say_bullets(mode_words(fit), "!")
 }
 
 # Modes of a parameter: parts of its draws that a gap keeps apart, list(lower95, upper95, share) each. A gap counts if

@@ -174,7 +174,8 @@ print.amiss_prior <- function(x, ...) {
 #' @param name Name of the parameter.
 #' @param prior Its [prior].
 #' @param unit Its unit, for people.
-#' @param label One short phrase for people; the name if not given.
+#' @param label One short phrase for people; the name if not given. A label that two parameters of a model share, or
+#'   that is the name of another, is shown with the parameter's name behind it.
 #' @return An object of class `amiss_free`.
 #' @examples
 #' free("k_insulation", uniform(0.03, 0.05), unit = "W/mK")
@@ -195,6 +196,17 @@ format.amiss_free <- function(x, ...) paste0("free(", x$name, ": ", format(x$pri
 print.amiss_free <- function(x, ...) {
   cat(format(x), "\n", sep = "")
   invisible(x)
+}
+
+# Labels that tell parameters apart: one that two share, or that is the name of another, has its own name behind it.
+distinct_labels <- function(parameters) {
+  label <- vapply(parameters, `[[`, "", "label")
+  name <- names(parameters)
+  label[!nzchar(trimws(label))] <- name[!nzchar(trimws(label))]
+  shared <- duplicated(label) | duplicated(label, fromLast = TRUE)
+  unclear <- label != name & (shared | label %in% name)
+  label[unclear] <- paste0(label[unclear], " (", name[unclear], ")")
+  stats::setNames(make.unique(label, " "), name)
 }
 
 to_normal <- function(unit) stats::qnorm(pmin(pmax(unit, 1e-15), 1 - 1e-15))

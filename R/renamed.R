@@ -38,7 +38,7 @@ rename_parameters <- function(simulator, ...) {
 #' @export
 print.amiss_renamed <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Simulator} with parameters that go by other names:")
-  cli::cli_bullets(stats::setNames(paste(names(x$to), "is", x$to), rep("*", length(x$to))))
+  say_bullets(paste(names(x$to), "is", x$to))
   cli::cli_bullets(c(">" = "next: {.fun simulate_jointly}"))
 })
 

@@ -1,16 +1,25 @@
 # What the templates are written with. Each of these writes markdown, and HTML where the document becomes HTML.
+# Text from data comes in through one function for each place: markdown_text(), html_text(), html_attribute(), and
+# file_stem() for the name of a file.
 
-# Text as it is: nothing in it is markup, but 10^3 is set as a power. Entities, as pandoc reads them after everything
-# that could be markup: a colon makes a bare address a link, a number with a point at the beginning makes a list.
+# Text as it is: nothing in it is markup, but 10^3 is set as a power. All signs of ASCII become entities, which pandoc
+# reads after everything that could be markup.
 markdown_text <- function(x) {
-  plain <- gsub("&", "&#38;", trimws(gsub("[[:space:]]+", " ", x)), fixed = TRUE)
-  for (sign in strsplit("\\`*_{}[]$^~|@<>:()\"'+=-!", "")[[1]]) {
-    plain <- gsub(sign, sprintf("&#%d;", utf8ToInt(sign)), plain, fixed = TRUE)
-  }
-  plain <- sub("^#", "&#35;", sub("^([0-9A-Za-z]+)\\.", "\\1&#46;", plain))
+  plain <- trimws(one_line(x))
+  signs <- gregexpr("[!-/:-@[-`{-~]", plain, perl = TRUE)
+  regmatches(plain, signs) <- lapply(regmatches(plain, signs), function(sign) {
+    sprintf("&#%d;", vapply(sign, utf8ToInt, 0L))
+  })
   plain <- gsub("10&#94;((&#45;)?[0-9]+)", "10^\\1^", plain)
-  gsub("([0-9]) %", "\\1\u00a0%", plain)
+  gsub("([0-9]) &#37;", "\\1\u00a0&#37;", plain)
 }
+
+# Text of an element of HTML, and of an attribute in quotes. Three backticks would end the raw block that holds it.
+html_text <- function(x) without_backticks(htmltools::htmlEscape(one_line(x)))
+
+html_attribute <- function(x) without_backticks(htmltools::htmlEscape(one_line(x), attribute = TRUE))
+
+without_backticks <- function(html) gsub("`", "&#96;", html, fixed = TRUE)
 
 markdown_items <- function(x) if (length(x)) cat("\n", paste0("- ", markdown_text(x), "\n\n"), sep = "")
 
@@ -62,20 +71,15 @@ report_tiles <- function(value, words) {
   cat("\n```{=html}\n<div class=\"big\">", tiles, "</div>\n```\n", sep = "")
 }
 
-# Three backticks would end the raw block that holds it.
-html_text <- function(x) {
-  gsub("`", "&#96;", htmltools::htmlEscape(gsub("[[:space:]]+", " ", as.character(x))), fixed = TRUE)
-}
-
 narrow_canvas <- 4.2  # inches: of a figure on a phone
 
 # A figure of the result by its name, or one made already. In HTML it is drawn twice, also for a narrow
 # page, where letters of the wide one were too small.
 report_figure <- function(x, which) {
   figure <- if (inherits(x, "ggplot")) x else ggplot2::autoplot(x, which)
-  alt <- paste0(which, ": ", gsub("[[:space:]]+", " ", figure$labels$title))
+  alt <- paste0(which, ": ", figure$labels$title)
   if (knitr::is_html_output()) return(html_figure(figure, alt))
-  file <- knitr::fig_path(".png", number = which)
+  file <- knitr::fig_path(".png", number = file_stem(which))
   dir.create(dirname(file), recursive = TRUE, showWarnings = FALSE)
   save_figure(figure, file, dpi = 160)
   cat("\n![", markdown_text(alt), "](", file, "){width=85%}\\\n\n", sep = "")
@@ -92,7 +96,8 @@ html_figure <- function(figure, alt) {
   }
   cat("\n```{=html}\n<picture><source media=\"screen and (max-width: 620px)\" srcset=\"",
       drawn(narrow, narrow_canvas, 170), "\">",
-      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_text(alt), "\"></picture>\n```\n", sep = "")
+      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_attribute(alt), "\"></picture>\n```\n",
+      sep = "")
 }
 
 # The style of a fragment goes with it, as others' documents know nothing of it.

@@ -31,40 +31,72 @@ release_folder <- function(held) {
 }
 
 # Everything is made elsewhere and copied beside its place; then what has these names is moved aside as a whole and the
-# new moved in. Results of two runs never stand side by side.
-write_study <- function(result, out, quiet = FALSE) {
+# new moved in. Results of two runs never stand side by side. What cannot be made is left out; why, by its name, is the
+# value. Without result.rds, from which all else can be made, nothing is written.
+write_study <- function(result, out, quiet = FALSE, pieces = result_pieces(result), call = rlang::caller_env()) {
+  staging <- tempfile("amiss-new-", out)
   work <- tempfile("amiss-new-")
-  on.exit(unlink(work, recursive = TRUE))
-  dir.create(file.path(work, "figures"), recursive = TRUE)
-  save_figures(result, file.path(work, "figures"))
-  saveRDS(result, file.path(work, "result.rds"))
-  jsonlite::write_json(result_list(result), file.path(work, "result.json"), auto_unbox = TRUE, digits = NA,
-                       null = "null", na = "null", pretty = TRUE)
-  report(result, file.path(work, "report.html"))
-  staging <- copy_whole(work, out)
-  earlier <- intersect(dir(work), dir(out))
-  if (length(earlier)) {
-    aside <- tempfile(format(Sys.time(), "earlier-%Y-%m-%d-%H%M%S-"), out)
-    dir.create(aside)
-    move_files(earlier, out, aside)
-    if (!quiet) cli::cli_alert_info("What stood in {.file {out}} under the names of the results is in {.file {aside}}")
+  on.exit(unlink(c(staging, work), recursive = TRUE))
+  missing <- unlist(lapply(stats::setNames(nm = names(pieces)), function(name) {
+    make_piece(pieces[[name]], name, work, staging)
+  }))
+  if ("result.rds" %in% names(missing)) {
+    abort_input(c("The results could not be written into {.file {out}}: {missing[['result.rds']]}",
+                  i = "Is the disk full? What was computed is kept: the same call goes on from it."), call = call)
   }
-  move_files(dir(work), staging, out)
-  if (!quiet) cli::cli_alert_success("Written to {.file {out}}: report.html, figures/, result.rds, result.json")
+  set_aside(intersect(sub("/.*", "", names(pieces)), dir(out)), out, quiet)
+  written <- dir(staging)
+  move_files(written, staging, out)
+  if (!quiet) cli::cli_alert_success("Written to {.file {out}}: {written}")
+  if (length(missing)) warn_missing(missing, out)
+  missing
 }
 
-# A copy in the folder, under a name of its own, complete or refused.
-copy_whole <- function(work, out, copy = file.copy, call = rlang::caller_env()) {
-  sizes <- function(folder) file.size(file.path(folder, dir(work, recursive = TRUE)))
-  staging <- file.path(out, basename(work))
-  copied <- suppressWarnings(copy(work, out, recursive = TRUE))
-  if (!copied || !identical(sizes(staging), sizes(work))) {
-    unlink(staging, recursive = TRUE)
-    abort_input(c("The results could not be copied into {.file {out}}.",
-                  i = "Is the disk full? What was computed is kept: the same call goes on from it."),
-                call = call)
+# How each file of the results is made at a path, the first needed most.
+result_pieces <- function(result) {
+  which <- figures_of(result)
+  figures <- lapply(which, function(one) function(path) save_figure(ggplot2::autoplot(result, one), path))
+  c(list(result.rds = function(path) saveRDS(result, path),
+         result.json = function(path) {
+           jsonlite::write_json(result_list(result), path, auto_unbox = TRUE, digits = NA, null = "null", na = "null",
+                                pretty = TRUE)
+         },
+         report.html = function(path) report(result, path)),
+    stats::setNames(figures, file.path("figures", figure_files(which))))
+}
+
+# NULL if a file is made and stands whole in the folder beside its place, or why not.
+make_piece <- function(make, name, work, staging, copy = file.copy) {
+  made <- file.path(work, name)
+  for (folder in dirname(c(made, file.path(staging, name)))) {
+    dir.create(folder, recursive = TRUE, showWarnings = FALSE)
   }
-  staging
+  beside <- file.path(staging, name)
+  tryCatch({
+    make(made)
+    whole <- suppressWarnings(copy(made, beside)) && identical(file.size(made), file.size(beside))
+    if (whole && tools::file_ext(name) == "rds") readRDS(beside)
+    if (!whole) stop("it could not be copied as a whole")
+    NULL
+  }, error = function(e) {
+    unlink(beside)
+    cli::ansi_strip(conditionMessage(e))
+  })
+}
+
+set_aside <- function(names, out, quiet) {
+  if (!length(names)) return(invisible())
+  aside <- tempfile(format(Sys.time(), "earlier-%Y-%m-%d-%H%M%S-"), out)
+  dir.create(aside)
+  move_files(names, out, aside)
+  if (!quiet) cli::cli_alert_info("What stood in {.file {out}} under the names of the results is in {.file {aside}}")
+}
+
+warn_missing <- function(missing, out) {
+  warn_result(c("{length(missing)} file{?s} of the results could not be made: {.file {names(missing)}}.",
+                x = "{names(missing)[1]}: {missing[[1]]}",
+                i = "The result is whole in {.file {file.path(out, 'result.rds')}}: {.fun readRDS} reads it.",
+                i = "The same call makes the rest again, from what was computed."), class = "amiss_warning_missing")
 }
 
 move_files <- function(names, from, to, call = rlang::caller_env()) {

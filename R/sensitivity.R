@@ -61,7 +61,7 @@ sobol_indices <- function(x, points = 256, replicates = 16, by_time = FALSE, see
     stats::setNames(columns, paste0(order, c("", "_sampling", "_emulator")))
   }
   names <- names(emulator$parameters)
-  table <- data.frame(parameter = names, label = vapply(emulator$parameters, `[[`, "", "label"), with_errors("first"),
+  table <- data.frame(parameter = names, label = distinct_labels(emulator$parameters), with_errors("first"),
                       with_errors("total"), row.names = NULL)
   beside <- mean(vapply(replicated, `[[`, 0, "run_variance"))
   structure(list(format_version = format_version, table = table,

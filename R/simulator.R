@@ -150,6 +150,7 @@ check_columns_named <- function(boundary, call = rlang::caller_env()) {
 # Parameters made by free(), under their names.
 named_parameters <- function(parameters, call = rlang::caller_env()) {
   other <- Filter(function(x) !inherits(x, "amiss_free"), parameters)
+  for (one in parameters) if (inherits(one, "amiss_free")) check_parts(one, "...", call = call)
   if (!length(parameters) || length(other)) {
     abort_input(c("Every parameter must be made by {.fun free}; got {if (length(other)) seen(other[[1]]) else 'none'}.",
                   i = "For example {.code free(\"gain\", uniform(0, 2))}."), call = call)
@@ -163,8 +164,7 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
 #' @export
 print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Simulator} {.val {x$name}} (an R function) with {length(x$parameters)} free parameter{?s}")
-  cli::cli_bullets(stats::setNames(vapply(utils::head(x$parameters, 10), format, ""),
-                                   rep("*", min(10, length(x$parameters)))))
+  say_bullets(vapply(utils::head(x$parameters, 10), format, ""))
   cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
 
@@ -195,11 +195,17 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' simulate_runs(linear, cbind(gain = c(0.2, 0.4)), cbind(Te = c(4, 6, 5)), step_h = 1)
 #' @keywords internal
 #' @export
-free_parameters <- function(simulator) UseMethod("free_parameters")
+free_parameters <- function(simulator) {
+  check_simulator(simulator)
+  UseMethod("free_parameters")
+}
 
 #' @rdname free_parameters
 #' @export
-driver_names <- function(simulator) UseMethod("driver_names")
+driver_names <- function(simulator) {
+  check_simulator(simulator)
+  UseMethod("driver_names")
+}
 
 #' @rdname free_parameters
 #' @export
@@ -311,12 +317,14 @@ check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()
 }
 
 check_simulator <- function(simulator, call = rlang::caller_env()) {
+  present(simulator, call)
   known <- function(class) !is.null(utils::getS3method("simulate_runs", class, optional = TRUE))
   if (!any(vapply(class(simulator), known, NA))) {
     abort_input(c("{.arg simulator} is of class {.cls {class(simulator)}}, which is no simulator.",
                   i = "Make one with {.fun zone} or {.fun function_simulator}, or give runs with {.fun ensemble}."),
                   call = call)
   }
+  check_parts(simulator, "simulator", call = call)
 }
 
 # Runs of simulators in this session, by which a study says what it cost.

@@ -37,10 +37,11 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' `separator`, `decimal` (of the table), `calibrate`, `validate` (conditions in the columns of the data), `runs`,
 #' `seed` and `control` (as in [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
 #'
-#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical.
-#' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets,
-#' the four operations of arithmetic and `%in% c(...)`. Texts are compared as in [measurements()]. One that begins
-#' with `!` needs quotes around it: `validate: '!(hour > 72)'`.
+#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical, and
+#' numbers are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text). Conditions are no R code: they may hold
+#' columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, the four operations of arithmetic and `%in%
+#' c(...)`. Texts are compared as in [measurements()]. One that begins with `!` needs quotes around it: `validate:
+#' '!(hour > 72)'`.
 #'
 #' `study`, `data`, `time`, `target` and `boundary` are needed, and `model` with `catalogue`, or `models`. Without the
 #' others `title` is that of `study`, `runs` 150, `method` `paper`, `average_h` the step of the data, `warmup_h` and
@@ -71,7 +72,8 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   is filled only when all is computed; until then its folder `stages` holds the finished models, and the same call
 #'   goes on from there if it was interrupted, as long as the code of the study's R files is the same. What has these
 #'   names before, such as earlier results, is moved into a folder `earlier-` with the time. One run at a time can use
-#'   the folder.
+#'   the folder. If the report or a figure cannot be made, a warning (`amiss_warning_missing`) says which and why; the
+#'   others are written, and the same call makes what is missing.
 #' @param seed Overrides the seed of the file; with neither R's generator draws one, which is kept with the stages.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
@@ -112,8 +114,8 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
   result$title <- study$title
   result$wall_s <- elapsed() - started
   if (!is.null(out)) {
-    write_study(result, out, quiet)
-    remove_stages(file.path(out, "stages"))
+    missing <- write_study(result, out, quiet)
+    if (!length(missing)) remove_stages(file.path(out, "stages"))
   }
   invisible(result)
 }
@@ -144,7 +146,7 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
 
 # The fields of each record, checked; of a study without `records` its own.
 study_records <- function(study, path, call = rlang::caller_env()) {
-  if (is.null(study$records)) {
+  if (!is.list(study) || !checkmate::test_named(study, "unique") || is.null(study$records)) {
     check_study_fields(study, path, call = call)
     return(list(study))
   }
@@ -203,8 +205,10 @@ check_study_control <- function(study, call = rlang::caller_env()) {
 
 # `of`: the record in words, if the fields are of one of several.
 check_study_fields <- function(study, path, of = "", call = rlang::caller_env()) {
-  if (!is.list(study) || is.null(names(study)))
-    abort_input("The study file {.file {path}} holds no fields.", call = call)
+  if (!is.list(study) || !checkmate::test_named(study, "unique")) {
+    abort_input(c("The study file {.file {path}} is no mapping of fields to values.",
+                  i = "Write a line for each field, as {.code target: Ti}, each field once."), call = call)
+  }
   unknown <- setdiff(names(study), unlist(study_fields))
   if (length(unknown)) {
     abort_input(c("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",

@@ -21,7 +21,7 @@ read_study_file <- function(path, call = rlang::caller_env()) {
                     error = function(e) refuse(conditionMessage(e)), warning = function(w) refuse(conditionMessage(w)))
   if (length(tags)) refuse(paste("It has the tag", ls(tags)[1], "which is not known."))
   check_study_size(study, refuse)
-  joined_numbers(study)
+  joined_numbers(with_numbers(study, unquoted_numbers(text)))
 }
 
 # Numbers of one sequence, which the parser leaves in a list where some have a point and others have none.
@@ -41,15 +41,38 @@ check_study_text <- function(text, refuse) {
   }
 }
 
-# YAML 1.1 takes yes, no, on, off, y and n for logical; here they stay text, so that a column may be called y.
-plain_words <- list(
-  int = function(word) {
-    # Larger ones than R's integers stay numbers.
-    number <- suppressWarnings(as.integer(word))
-    if (is.na(number)) as.numeric(word) else number
-  },
-  "bool#yes" = function(word) if (tolower(word) == "true") TRUE else word,
-  "bool#no" = function(word) if (tolower(word) == "false") FALSE else word)
+# A number as YAML 1.2 has it: 1e-3 is one, and 017 is seventeen.
+number_pattern <- "[-+]?(?:[0-9]+(?:[.][0-9]*)?|[.][0-9]+)(?:[eE][-+]?[0-9]+)?"
+
+# The number that a word is, an integer if it has neither point nor exponent and R's integers hold it; or the word.
+number_of <- function(word) {
+  if (!grepl(paste0("^(", number_pattern, "|0x[0-9a-fA-F]+)$"), word, perl = TRUE)) return(word)
+  number <- as.numeric(word)
+  whole <- grepl("^([-+]?[0-9]+|0x.*)$", word) && abs(number) <= .Machine$integer.max
+  if (whole) as.integer(number) else number
+}
+
+# The parser reads YAML 1.1. There yes, no, on, off, y and n are logical, 017 is octal and 1:30 is ninety; here words
+# stay text, so that a column may be called y, and numbers are those of YAML 1.2.
+plain_words <- c(
+  sapply(c("int", "int#oct", "int#hex", "int#base60", "float", "float#fix", "float#exp", "float#base60"),
+         function(kind) number_of),
+  list("bool#yes" = function(word) if (tolower(word) == "true") TRUE else word,
+       "bool#no" = function(word) if (tolower(word) == "false") FALSE else word))
+
+# Numbers that are text for the parser, as far as they stand in the text without quotes.
+unquoted_numbers <- function(text) {
+  found <- regmatches(text, gregexpr(paste0("(?m)(?<=[\\s,\\[{:-])", number_pattern, "(?=\\s*(?:[],}]|\\s#|$))"), text,
+                                     perl = TRUE))[[1]]
+  Filter(function(word) is.character(yaml::yaml.load(word, eval.expr = FALSE, handlers = plain_words)), unique(found))
+}
+
+with_numbers <- function(x, words) {
+  if (is.list(x)) return(lapply(x, with_numbers, words))
+  if (!is.character(x) || !any(x %in% words)) return(x)
+  read <- lapply(x, function(one) if (one %in% words) number_of(one) else one)
+  if (length(read) == 1) read[[1]] else read
+}
 
 # The parser drops tags that it does not know. A handler for every word that could be one notes those that are.
 noted_tags <- function(text, tags) {

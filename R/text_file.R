@@ -2,7 +2,7 @@
 
 # The text of a regular file, marked as UTF-8, without a byte-order mark.
 read_utf8 <- function(path, field, call = rlang::caller_env()) {
-  bytes <- file_bytes(path, field, call)
+  bytes <- checked_bytes(path, field, call)
   invalid <- function(line) {
     abort_input(c("The {.field {field}} file {.file {path}} is not UTF-8 text: line {line}.",
                   i = "Save it with the encoding UTF-8."), call = call)
@@ -16,7 +16,7 @@ read_utf8 <- function(path, field, call = rlang::caller_env()) {
 
 # The same of a table, which spreadsheets and loggers also write in UTF-16, and in Windows-1252, which holds Latin-1.
 read_any_text <- function(path, field, call = rlang::caller_env()) {
-  bytes <- file_bytes(path, field, call)
+  bytes <- checked_bytes(path, field, call)
   from <- if (identical(utils::head(bytes, 2), as.raw(c(0xff, 0xfe)))) "UTF-16LE"
           else if (identical(utils::head(bytes, 2), as.raw(c(0xfe, 0xff)))) "UTF-16BE"
           else if (!any(bytes == as.raw(0)) && !validUTF8(rawToChar(bytes))) "windows-1252"
@@ -29,8 +29,8 @@ read_any_text <- function(path, field, call = rlang::caller_env()) {
 }
 
 # Without a byte-order mark of UTF-8.
-file_bytes <- function(path, field, call) {
-  if (!fs::is_file(path, follow = TRUE)) {
+checked_bytes <- function(path, field, call) {
+  if (!is_regular_file(path)) {
     abort_input(c("The {.field {field}} file {.file {path}} is not a regular file.",
                   i = "Name a file that can be read from its start to its end."),
                 call = call)

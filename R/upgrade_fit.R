@@ -1,5 +1,8 @@
 # An upgrade asked what a fitted model is asked: its last model answers.
-last_fit <- function(upgrade) upgrade$models[[length(upgrade$models)]]$fit
+last_fit <- function(upgrade) {
+  check_parts(upgrade, "x", call = NULL)
+  upgrade$models[[length(upgrade$models)]]$fit
+}
 
 #' @rdname posterior
 #' @export
@@ -44,6 +47,7 @@ augment.amiss_upgrade <- function(x, data = NULL, newdata = NULL, ...) {
 #' @rdname fit
 #' @export
 glance.amiss_upgrade <- function(x, ...) {
+  check_parts(x, "x")
   g <- x$gain
   data.frame(generics::glance(last_fit(x), ...), adopted = length(x$models) - 1L,
              named_cause = x$named_cause$mechanism %||% NA_character_, log10_bf = g$log10_bf,

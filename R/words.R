@@ -1,5 +1,22 @@
 # Numbers, units and lists as text.
 
+# Any text as one line of UTF-8: what is no character, or steers a printer, is not shown.
+one_line <- function(x) {
+  x <- paste(x)
+  Encoding(x[Encoding(x) == "bytes"]) <- "unknown"
+  x <- iconv(enc2utf8(x), "UTF-8", "UTF-8", sub = "?")
+  gsub("(*UTF)[\\s\\x{00}-\\x{1f}\\x{7f}-\\x{9f}\\x{2028}\\x{2029}\\x{fffe}\\x{ffff}]+", " ", x, perl = TRUE)
+}
+
+# The name of a file, without its extension, of any text: of a new name where signs had to be left out or it is long.
+file_stem <- function(x) {
+  x <- one_line(x)
+  stem <- substr(gsub("[^[:alnum:]_.-]+", "_", x), 1, 80)
+  changed <- stem != gsub(" ", "_", x, fixed = TRUE)
+  stem[changed] <- paste0(stem[changed], "-", substr(vapply(x[changed], rlang::hash, ""), 1, 8))
+  stem
+}
+
 listed <- function(x, last = "and", none = "nothing") {
   if (!length(x)) none else if (length(x) == 1) x else paste(paste(x[-length(x)], collapse = ", "), last, x[length(x)])
 }

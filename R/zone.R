@@ -76,12 +76,14 @@ NULL
 new_component <- function(type, name, fields, call = rlang::caller_env()) {
   check_input(checkmate::check_string(name, min.chars = 1), "name", call = call)
   if (name == "zone") abort_input("A component cannot be named {.val zone}: that is the zone itself.", call = call)
+  present(fields, call)
   check_component(structure(c(list(type = type, name = name), fields), class = "amiss_component"), call)
 }
 
 #' @rdname zone_components
 #' @export
 zone_layer <- function(thickness, conductivity, capacity) {
+  check_present(thickness, conductivity, capacity)
   x <- structure(list(thickness = thickness, conductivity = conductivity, capacity = capacity), class = "amiss_layer")
   check_fields(x, zone_fields$layer, "layer", rlang::current_env())
 }
@@ -167,12 +169,13 @@ new_zone <- function(components, extra, call = rlang::caller_env()) {
                   i = "Give for example {.fn zone_wall}, {.fn zone_window}, {.fn zone_heater}."),
                 call = call)
   }
+  for (one in components) check_parts(one, "...", call = call)
   names(components) <- vapply(components, `[[`, "", "name")
   twice <- unique(names(components)[duplicated(names(components))])
   if (length(twice) > 0) {
     abort_input(c("Every component needs a name of its own; used more than once: {.val {twice}}."), call = call)
   }
-  x <- c(list(components = components), extra)
+  x <- c(list(components = components), present(extra, call))
   check_fields(x, zone_fields$zone, "zone", call)
   structure(x, class = "amiss_zone")
 }

@@ -23,12 +23,14 @@ NULL
 #' @rdname zone_edits
 #' @export
 component <- function(zone, name) {
+  check_present(zone, name)
   check_zone(zone)
   find_component(zone, name, rlang::current_env())
 }
 
 find_component <- function(zone, name, call) {
   known <- names(zone$components)
+  if (is.character(name)) check_readable(name, "name", call)
   if (!checkmate::test_choice(name, known)) {
     abort_input(c("The zone has no component {.arg name} = {seen(name)}.", i = "Known components: {.val {known}}."),
                 call = call)
@@ -39,6 +41,7 @@ find_component <- function(zone, name, call) {
 #' @rdname zone_edits
 #' @export
 add_component <- function(zone, component) {
+  check_present(zone, component)
   check_zone(zone)
   zone$components <- new_zone(c(unname(zone$components), list(component)),
                               unclass(zone)[names(zone_fields$zone)])$components
@@ -48,6 +51,7 @@ add_component <- function(zone, component) {
 #' @rdname zone_edits
 #' @export
 drop_component <- function(zone, name) {
+  check_present(zone, name)
   check_zone(zone)
   find_component(zone, name, rlang::current_env())
   zone$components[[name]] <- NULL
@@ -57,6 +61,7 @@ drop_component <- function(zone, name) {
 #' @rdname zone_edits
 #' @export
 change_component <- function(zone, name, ...) {
+  check_present(zone, name)
   check_zone(zone)
   call <- rlang::current_env()
   changes <- list(...)

@@ -30,6 +30,7 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, threads = 1L, control = list(),
                           flux = NULL) {
   call <- rlang::current_env()
+  check_present(zone, drivers, step_s)
   parameters <- names(zone_parameters(zone))
   if (is.null(values)) values <- matrix(0, 1, 0)
   check_input(checkmate::check_matrix(values, mode = "numeric", any.missing = FALSE, min.rows = 1), "values")

@@ -31,6 +31,14 @@ bad_input_objects <- function() {
   bad_input$objects <- o
 }
 
+# An object that has the parts of its class, and nothing in them.
+seeming <- function(class) {
+  parts <- object_parts[[class]]
+  object <- structure(stats::setNames(vector("list", length(parts)), parts), class = class)
+  object$format_version <- format_version
+  object
+}
+
 # One call of every exported function with all its arguments, as good ones; `list()` stands for what is never used.
 valid_calls <- function() {
   o <- bad_input_objects()
@@ -46,7 +54,7 @@ valid_calls <- function() {
                  noise_sd = NULL, control = list(), seed = 1, threads = 1),
     attribute_discrepancy = list(fit = o$fit, control = list(), seed = 1, threads = 1),
     augment = list(x = o$fit, data = NULL, newdata = NULL),
-    autoplot = list(object = structure(list(), class = "amiss_upgrade"), which = "fit"),
+    autoplot = list(object = seeming("amiss_upgrade"), which = "fit"),
     bayes_factor = list(model = o$fit, reference = o$fit),
     beta_prior = list(shape1 = 1, shape2 = 1, lower = 0, upper = 1),
     bootstrap_noise = list(replicates = 50, detrend = FALSE, seed = 1),
@@ -92,15 +100,15 @@ valid_calls <- function() {
     program_simulator = list(command = c("awk", "{{gain}}"), o$gain, output = c(file = "a", column = "b"),
                              templates = list(),
                              boundary = "Te", drivers = "d.csv", time_limit = 1, retries = 0, cache = "runs",
-                             version = "", name = "p"),
+                             version = "", name = "p", size_limit = 10),
     read_calibro = list(folder = o$folder, parameters = NULL, relative = FALSE, step_h = 1, files = NULL),
     read_study = list(path = system.file("studies", "paper_synthetic.yml", package = "amiss"), quiet = TRUE,
                       trust = FALSE),
     refine_ensemble = list(ensemble = o$ensemble, fit = o$fit, runs = 10, threads = 1, quiet = TRUE),
     rename_parameters = list(simulator = o$function_simulator, gain = "other"),
-    report = list(x = structure(list(), class = "amiss_upgrade"), file = file.path(o$folder, "report.html"),
+    report = list(x = seeming("amiss_upgrade"), file = file.path(o$folder, "report.html"),
                   quiet = TRUE),
-    report_fragment = list(x = structure(list(), class = "amiss_upgrade"), parts = NULL, level = 2),
+    report_fragment = list(x = seeming("amiss_upgrade"), parts = NULL, level = 2),
     response_mechanism = list(boundary = "Gv", measurements = o$measurements, unit = "W/m2", gain = NULL,
                               time_constant = NULL, reference = NULL, name = "sun"),
     responses = list(measurements = o$measurements, units = character()),

@@ -44,7 +44,7 @@ rows_by_kind <- function() c(
           level = "share",
           seed = "seed", threads = "threads"),
   rows_of("program_simulator", command = "columns", boundary = "columns", drivers = "filled_string",
-          time_limit = "positive",
+          time_limit = "positive", size_limit = "positive",
           retries = c("count", "huge"), cache = "filled_string", name = "string"),
   rows_of("read_calibro", folder = "filled_string", relative = "flag", step_h = "positive"),
   rows_of("read_study", path = "filled_string", quiet = "flag", trust = "flag"),
@@ -429,4 +429,56 @@ test_that("a likelihood that is seldom undefined is told of", {
   seldom <- function(z) ifelse(z[, 1] > 0.97, NaN, -50 * (z[, 1] - 0.5)^2)
   expect_warning(ais(seldom, list(a = uniform(0, 1)), seed = 1), "not a number at .* points, which count as impossible",
                  class = "amiss_warning_result")
+})
+
+# What is told if a function is called without one of its arguments.
+told_without <- function(f, argument, call) {
+  told <- tryCatch(do.call(getExportedValue("amiss", f), call[names(call) != argument], quote = TRUE), error = identity)
+  named <- inherits(told, "amiss_error_input") && grepl(argument, conditionMessage(told))
+  if (!named) paste(f, argument, class(told)[1])
+}
+
+test_that("an argument that is missing is named", {
+  skip_on_cran()
+  # measurements(), and what dispatches on its first argument, stand apart.
+  own <- setdiff(names(valid_calls()), c("measurements", "tidy", "glance", "augment", "autoplot", "predict", "simulate",
+                                         "summary", "report_fragment", "attribute_discrepancy"))
+  wrong <- lapply(own, function(f) {
+    needed <- Filter(rlang::is_missing, formals(getExportedValue("amiss", f)))
+    call <- unclass(valid_calls()[[f]])
+    lapply(intersect(setdiff(names(needed), "..."), names(call)), told_without, f = f, call = call)
+  })
+  expect_null(unlist(wrong))
+})
+
+test_that("text of bytes is refused where a text is asked for", {
+  bytes <- "a\xff"
+  Encoding(bytes) <- "bytes"
+  for (bad in list(bytes, "a\xff")) {
+    expect_error(free(bad, uniform(0, 1)), "`name` .*no characters", class = "amiss_error_input")
+    expect_error(calibrate_paper(bad), class = "amiss_error_input")
+    expect_error(component(bad_input_objects()$room, bad), "no characters", class = "amiss_error_input")
+    expect_error(mechanism("a", identity, bad, "A."), "no characters", class = "amiss_error_input")
+  }
+  latin <- "\xe9"
+  Encoding(latin) <- "latin1"
+  expect_identical(free(latin, uniform(0, 1))$name, "\u00e9")
+})
+
+test_that("an object that only seems to be one is refused, and a real one is whole", {
+  o <- bad_input_objects()
+  for (fake in list(list(), list(format_version = 3L), 1)) {
+    seems <- function(class) structure(fake, class = class)
+    refused <- function(code) expect_error(code, "is not whole", class = "amiss_error_input")
+    refused(calibrate(seems("amiss_emulator"), o$measurements))
+    refused(train_emulator(seems("amiss_ensemble"), o$measurements))
+    refused(attribute_discrepancy(seems("amiss_calibration")))
+    refused(free("a", seems("amiss_prior")))
+    refused(function_simulator(function(values, drivers) 1, seems("amiss_free")))
+    refused(catalogue(seems("amiss_mechanism")))
+    refused(free_parameters(seems("amiss_function_simulator")))
+    refused(report(seems("amiss_upgrade"), tempfile(fileext = ".html")))
+    refused(glance(seems("amiss_fit")))
+  }
+  for (object in o) expect_null(check_parts(object, "x"))
 })

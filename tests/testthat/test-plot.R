@@ -66,10 +66,14 @@ test_that("stages have figures of their own", {
 
 test_that("figures are saved, one PNG each", {
   skip_on_cran()
-  folder <- withr::local_tempdir()
-  paths <- save_figures(small_upgrade(), folder, dpi = 40)
-  expect_setequal(basename(paths), paste0(figure_names, ".png"))
-  expect_true(all(file.size(paths) > 1000))
+  which <- figures_of(small_upgrade())
+  expect_identical(figure_files(which), paste0(figure_names, ".png"))
+  path <- withr::local_tempfile(fileext = ".png")
+  for (one in which) {
+    save_figure(ggplot2::autoplot(small_upgrade(), one), path, dpi = 40)
+    expect_gt(file.size(path), 1000)
+    unlink(path)
+  }
 })
 
 test_that("numbers are short and readable", {

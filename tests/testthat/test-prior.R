@@ -21,3 +21,13 @@ test_that("impossible priors are refused", {
   expect_error(triangular(0, 6, 5), "mode", class = "amiss_error_input")
   expect_error(free("a", 3), "prior", class = "amiss_error_input")
 })
+
+test_that("labels tell parameters apart", {
+  labels <- function(...) {
+    parameters <- named_parameters(lapply(list(...), function(x) free(x[1], uniform(0, 1), "", x[2])))
+    unname(distinct_labels(parameters))
+  }
+  expect_identical(labels(c("a", "a"), c("b", "gain"), c("c", "gain"), c("d", "a"), c("e", " ")),
+                   c("a", "gain (b)", "gain (c)", "a (d)", "e"))
+  expect_false(anyDuplicated(labels(c("a", "x"), c("b", "x"), c("c", "x (a)"))) > 0)
+})

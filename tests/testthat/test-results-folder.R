@@ -32,21 +32,73 @@ test_that("old and new results do not mix", {
   expect_false(file.exists(file.path(out, "figures", "mine.png")))
 })
 
-test_that("a copy that is cut short, as on a full disk, is refused and removed", {
-  folder <- withr::local_tempdir()
-  work <- file.path(folder, "work")
-  out <- file.path(folder, "out")
-  dir.create(work)
-  dir.create(out)
-  writeLines("all of it", file.path(work, "result.json"))
-  short <- function(from, to, ...) {
-    file.copy(from, to, ...)
-    cat("all", file = file.path(to, basename(from), "result.json"))
+# Results of three pieces, written into a folder; why some are missing.
+write_pieces <- function(out, ...) {
+  pieces <- list(result.rds = function(path) saveRDS(1:3, path), result.json = function(path) writeLines("3", path),
+                 "figures/fit.png" = function(path) writeLines("fit", path),
+                 "figures/gain.png" = function(path) writeLines("gain", path),
+                 report.html = function(path) writeLines("all of it", path))
+  write_study(NULL, out, quiet = TRUE, pieces = utils::modifyList(pieces, list(...)))
+}
+
+fails <- function(path) {
+  writeLines("half", path)
+  stop("no {pandoc} here")
+}
+
+test_that("what cannot be made is missed, and told; the result is there", {
+  out <- withr::local_tempdir()
+  expect_null(write_pieces(out))
+  told <- expect_warning(missing <- write_pieces(out, report.html = fails, "figures/gain.png" = fails),
+                         class = "amiss_warning_missing")
+  expect_match(conditionMessage(told), "2 files .*gain.png.*report.html.*no \\{pandoc\\} here.*result.rds")
+  expect_named(missing, c("figures/gain.png", "report.html"))
+  expect_equal(readRDS(file.path(out, "result.rds")), 1:3)
+  there <- dir(out, recursive = TRUE)
+  expect_setequal(grep("^earlier", there, value = TRUE, invert = TRUE),
+                  c("result.rds", "result.json", "figures/fit.png"))
+  # What was there before has been moved as a whole: the old report does not stand beside the new result.
+  expect_length(grep("^earlier", there), 5)
+})
+
+test_that("without room for the result nothing is written", {
+  out <- withr::local_tempdir()
+  expect_error(write_pieces(out, result.rds = fails), "could not be written.*pandoc", class = "amiss_error_input")
+  expect_error(write_pieces(out, result.rds = function(path) writeLines("cut", path)), "could not be written",
+               class = "amiss_error_input")
+  expect_length(dir(out, all.files = TRUE, no.. = TRUE), 0)
+})
+
+test_that("a copy that is cut short, as on a full disk, is missed and removed", {
+  work <- withr::local_tempdir()
+  beside <- withr::local_tempdir()
+  short <- function(from, to) {
+    cat("all", file = to)
     TRUE
   }
-  expect_error(copy_whole(work, out, copy = short), "could not be copied", class = "amiss_error_input")
-  expect_length(dir(out), 0)
-  expect_equal(readLines(file.path(copy_whole(work, out), "result.json")), "all of it")
+  make <- function(path) writeLines("all of it", path)
+  expect_match(make_piece(make, "a/report.html", work, beside, copy = short), "as a whole")
+  expect_length(dir(beside, recursive = TRUE), 0)
+  expect_null(make_piece(make, "a/report.html", work, beside))
+  expect_equal(readLines(file.path(beside, "a", "report.html")), "all of it")
+})
+
+test_that("a study whose report fails keeps its result and its stages, and the same call makes the rest", {
+  folder <- withr::local_tempdir()
+  out <- file.path(folder, "out")
+  study <- write_comparison_study(folder)
+  stand_in(report = function(...) stop("pandoc stopped"),
+           save_figure = function(figure, path, ...) writeLines("a figure", path))
+  words <- c("run", study, "--out", out, "--trust", "--quiet")
+  expect_warning(expect_equal(run_command(words), 1), "report.html.*pandoc stopped", class = "amiss_warning_missing")
+  kept <- jsonlite::read_json(file.path(out, "result.json"))
+  expect_s3_class(readRDS(file.path(out, "result.rds")), "amiss_comparison")
+  expect_length(dir(file.path(out, "stages")), 1)
+  stand_in(report = function(x, file, ...) writeLines("the report", file))
+  expect_equal(run_command(words), 0)
+  expect_identical(readLines(file.path(out, "report.html")), "the report")
+  expect_identical(jsonlite::read_json(file.path(out, "result.json"))$models, kept$models)
+  expect_false(dir.exists(file.path(out, "stages")))
 })
 
 test_that("a folder is used by one run at a time, and free when that is killed", {

@@ -37,6 +37,40 @@ test_that("numbers with a point and without make one sequence", {
   expect_identical(read$f, 5L)
 })
 
+test_that("numbers are those of YAML 1.2, and everything else is text", {
+  read <- read_lines("a: 1e-3", "b: [1e-3, 2, 0.5, 3E+2]", "c: 017", "d: [08, 010]", "e: 0x1F", "f: {g: -1E5} # 7e7",
+                     "h:", "  - 4e0", "  - .5", "i: 9999999999")
+  expect_identical(read[c("a", "b", "c", "e")], list(a = 1e-3, b = c(1e-3, 2, 0.5, 300), c = 17L, e = 31L))
+  expect_identical(read[c("d", "f", "h", "i")], list(d = c(8, 10), f = list(g = -1e5), h = c(4, 0.5), i = 9999999999))
+  text <- list(a = "1:30", b = "12:30:00", c = "1_000", d = "0o17", e = "1,5", f = "2024-01-01", g = "a 1e3", h = "1e4",
+               i = "017", j = "5", k = "6e6\n")
+  expect_identical(read_lines("a: 1:30", "b: 12:30:00", "c: 1_000", "d: 0o17", "e: 1,5", "f: 2024-01-01", "g: a 1e3",
+                              "h: '1e4'", "i: \"017\"", "j: '5'", "k: |", "  6e6", "l: 5")[letters[1:11]], text)
+})
+
+test_that("a path that leads to no file with an end is refused, over any number of links", {
+  skip_on_os("windows")
+  folder <- withr::local_tempdir()
+  at <- function(name) file.path(folder, name)
+  system2("mkfifo", shQuote(at("pipe")))
+  writeLines("a: 1", at("file"))
+  link <- function(to, names) for (name in names) {
+    file.symlink(to, at(name))
+    to <- at(name)
+  }
+  link(at("pipe"), c("p1", "p2", "p3"))
+  link("/dev/stdin", c("s1", "s2"))
+  link("/dev/zero", c("z1", "z2"))
+  link(at("file"), c("f1", "f2", "f3"))
+  file.symlink(at("loop2"), at("loop1"))
+  file.symlink(at("loop1"), at("loop2"))
+  endless <- c("/dev/stdin", "/dev/zero", at(c("pipe", "p1", "p3", "s1", "s2", "z2", "loop1")))
+  expect_identical(is_regular_file(c(endless, at(c("file", "f1", "f3", "absent")))),
+                   rep(c(FALSE, TRUE, FALSE), c(9, 3, 1)))
+  for (path in endless) expect_error(read_study_file(path), "not a regular file", class = "amiss_error_input")
+  expect_identical(read_study_file(at("f3")), list(a = 1L))
+})
+
 test_that("a study file is one document", {
   refuse_lines("several documents", "a: 1", "---", "b: 2")
   refuse_lines("several documents", "---", "a: 1", "...", "b: 2")
