@@ -145,12 +145,6 @@ template_of <- function(bytes) {
   if (filled) lines_of(bytes) else bytes
 }
 
-lines_of <- function(bytes) {
-  connection <- rawConnection(bytes)
-  on.exit(close(connection))
-  readLines(connection, warn = FALSE)
-}
-
 edited_lines <- function(edit, template, file, call) {
   if (is.raw(template) && any(template == as.raw(0))) {
     abort_input(c("Template {.val {file}} is binary: it has no lines that a function could change.",
@@ -190,7 +184,7 @@ placeholder <- "\\{\\{\\s*([^{}]*?)\\s*\\}\\}"
 
 placeholders <- function(text) {
   if (is.raw(text)) return(character())
-  found <- unlist(regmatches(text, gregexpr(placeholder, text, perl = TRUE, useBytes = TRUE)))
+  found <- as.character(unlist(regmatches(text, gregexpr(placeholder, text, perl = TRUE, useBytes = TRUE))))
   Encoding(found) <- "UTF-8"
   unique(sub(placeholder, "\\1", found, perl = TRUE))
 }
@@ -214,18 +208,6 @@ check_placeholders <- function(simulator, call = rlang::caller_env()) {
                   call = call)
   }
   simulator
-}
-
-# Byte by byte, as templates may be in any encoding.
-render <- function(text, values) {
-  if (is.raw(text)) return(text)
-  for (name in names(values)) {
-    quoted <- paste0("\\Q", gsub("\\E", "\\E\\\\E\\Q", enc2utf8(name), fixed = TRUE), "\\E")
-    text <- gsub(paste0("\\{\\{\\s*", quoted, "\\s*\\}\\}"), sprintf("%.15g", values[[name]]), text, perl = TRUE,
-                 useBytes = TRUE)
-  }
-  Encoding(text[Encoding(text) == "bytes"]) <- "unknown"
-  text
 }
 
 #' @export

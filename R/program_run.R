@@ -166,3 +166,23 @@ stop_with_session <- function(pid) {
   guard$shell$write_input(paste0(if (is.null(pid)) "none" else pid, "\n"))
   invisible()
 }
+
+# ---- templates
+
+# Byte by byte, as templates may be in any encoding.
+render <- function(text, values) {
+  if (is.raw(text)) return(text)
+  for (name in names(values)) {
+    quoted <- paste0("\\Q", gsub("\\E", "\\E\\\\E\\Q", enc2utf8(name), fixed = TRUE), "\\E")
+    text <- gsub(paste0("\\{\\{\\s*", quoted, "\\s*\\}\\}"), sprintf("%.15g", values[[name]]), text, perl = TRUE,
+                 useBytes = TRUE)
+  }
+  Encoding(text[Encoding(text) == "bytes"]) <- "unknown"
+  text
+}
+
+lines_of <- function(bytes) {
+  connection <- rawConnection(bytes)
+  on.exit(close(connection))
+  readLines(connection, warn = FALSE)
+}

@@ -446,6 +446,7 @@ test_that("an argument that is missing is named", {
   wrong <- lapply(own, function(f) {
     needed <- Filter(rlang::is_missing, formals(getExportedValue("amiss", f)))
     call <- unclass(valid_calls()[[f]])
+    call <- call[nzchar(names(call))]  # what has no name would take the place of what is missing
     lapply(intersect(setdiff(names(needed), "..."), names(call)), told_without, f = f, call = call)
   })
   expect_null(unlist(wrong))

@@ -23,6 +23,12 @@ rc_function <- function() {
 rc_values <- cbind(lag = c(3, 5, 8), gain = c(0.2, 0.5, 0.9))
 rc_drivers <- cbind(Te = 10 + 5 * sin(1:48 / 4))
 
+test_that("a command may have no arguments", {
+  made <- program_simulator("cat", free("a", uniform(0, 1)), output = c(file = "stdout.txt", column = "a"),
+                            templates = list("in.txt" = I("{{a}}")))
+  expect_identical(made$command, "cat")
+})
+
 test_that("a program gives what the same function gives, and no run is made twice", {
   log <- rc_log()
   program <- rc_program(log = log)
