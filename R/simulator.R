@@ -196,7 +196,8 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @keywords internal
 #' @export
 free_parameters <- function(simulator) {
-  check_simulator(simulator)
+  present(simulator)
+  if (!inherits(simulator, "amiss_ensemble")) check_simulator(simulator)
   UseMethod("free_parameters")
 }
 

@@ -29,7 +29,7 @@ expect_runs <- function(rows, promised) {
 test_that("what is hidden in 24 worlds is found", {
   if (!dir.exists(bench)) skip("bench/ is not part of the installed package")
   scope <- new.env()
-  for (part in c("worlds.R", "score.R")) sys.source(file.path(bench, part), scope)
+  for (part in c("worlds.R", "least_squares.R", "score.R")) sys.source(file.path(bench, part), scope)
   worlds <- hidden_worlds(scope)
   expect_gte(nrow(worlds), 24)
   rows <- parallel::mclapply(seq_len(nrow(worlds)), function(i) {
