@@ -260,16 +260,31 @@ widened_trial <- function(trial, present, bar, context) {
   trial
 }
 
-# If a step ends without a winner, though much of the error is left: all trials searched again, and the race.
+# If a step ends without a winner, though much of the error is left: trials searched again, the one nearest to the
+# record first, until one of them wins.
 second_look <- function(present, trials, context) {
-  for (name in names(trials)) {
-    if (is_spent(context) || !trials[[name]]$level %in% c("tried", "verified")) next
+  for (name in nearest_first(trials)) {
+    if (is_spent(context)) break
     bar <- needed_factor(trials, present, context)
     before <- trials[[name]]
     trials[[name]] <- staged(paste(name, "again"), widened_trial(before, present, bar, context))
     if (trials[[name]]$mode != before$mode) report_trial(trials[[name]], present, context)
+    is_near <- !is_refused(trials[[name]], present) &&
+      lower_bound(trials[[name]], present) > context$control$decisive
+    if (!is_near) next
+    trials <- race(present, trials, context)
+    if (has_winner(trials, present, context)) return(trials)
   }
   race(present, trials, context)
+}
+
+nearest_first <- function(trials) {
+  searched <- Filter(function(trial) trial$level %in% c("tried", "verified"), trials)
+  names(searched)[order(vapply(searched, least_error, 0))]
+}
+
+has_winner <- function(trials, present, context) {
+  may_be_adopted(best_trial(trial_table(trials, present, names(trials))), context$control)
 }
 
 # All trials on the present model and those in front verified: list(trials, present).
