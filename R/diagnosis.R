@@ -72,10 +72,11 @@ last_attribution <- function(upgrade) upgrade$models[[length(upgrade$models)]]$a
 # The verdict on the whole, after what the record itself has.
 diagnosis_verdict <- function(upgrade) {
   verdict <- mechanism_verdict(upgrade)
-  faults <- record_doubt_words(names(record_faults(upgrade)))
+  ids <- names(record_faults(upgrade))
+  faults <- record_doubt_words(ids)
   if (is.null(faults)) return(verdict)
   if (verdict$verdict != "likely") verdict$tag <- paste0(verdict$tag, "; ", faults)
-  verdict$headline <- paste0("Mend the record first: ", sub("the record itself", "it", faults), ". ", verdict$headline)
+  verdict$headline <- paste0("Mend the record first: ", record_doubt_words(ids, "it"), ". ", verdict$headline)
   verdict
 }
 

@@ -400,6 +400,6 @@ fault_words <- c(missing_code = "a code for missing values", far_outside = "valu
                  daylight = "clocks that differ", start = "a start that is not forgotten",
                  step_change = "a step of a sensor")
 
-record_doubt_words <- function(ids) {
-  if (length(ids)) paste("the record itself has", listed(unique(unname(fault_words[ids]))))
+record_doubt_words <- function(ids, subject = "the record itself") {
+  if (length(ids)) paste(subject, "has", listed(unique(unname(fault_words[ids]))))
 }
