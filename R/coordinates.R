@@ -61,49 +61,8 @@ within_limits <- function(mean, precision, limit) {
   pmin(pmax(z, -limit), limit)
 }
 
-# n draws of the same distribution, by hit and run from the most probable point: along the axes, so that it leaves a
-# corner of the limits, and along random directions, equal in all of them once the covariance is taken out, so that a
-# narrow ridge does not slow it.
+# n draws of the same distribution, from its most probable point.
 draws_within <- function(mean, covariance, limit, n, seed) {
-  p <- length(mean)
-  root <- t(chol(covariance))
-  z <- within_limits(mean, solve(covariance), limit)
-  white <- forwardsolve(root, z - mean)
-  axes <- forwardsolve(root, diag(p))
-  moves <- (n + burn_in) * 2 * p
-  random <- with_seed(seed, list(direction = matrix(stats::rnorm(moves * p / 2), p), u = stats::runif(moves)))
-  draws <- matrix(0, n + burn_in, p)
-  for (i in seq_len(moves)) {
-    direction <- if (i %% 2) axes[, (i %/% 2) %% p + 1] else random$direction[, i / 2]
-    direction <- direction / sqrt(sum(direction^2))
-    way <- as.numeric(root %*% direction)
-    ends <- rbind((-limit - z) / way, (limit - z) / way)
-    lower <- max(pmin(ends[1, ], ends[2, ]), -Inf, na.rm = TRUE)
-    upper <- min(pmax(ends[1, ], ends[2, ]), Inf, na.rm = TRUE)
-    step <- truncated_quantile(random$u[i], -sum(white * direction), 1, min(lower, 0), max(upper, 0))
-    z <- pmin(pmax(z + step * way, -limit), limit)
-    white <- white + step * direction
-    if (i %% (2 * p) == 0) draws[i / (2 * p), ] <- z
-  }
-  draws[-seq_len(burn_in), , drop = FALSE]
-}
-
-burn_in <- 50  # draws that the first point is forgotten in
-
-# Quantile of N(centre, sd^2) between two ends: by logarithms of probabilities outside them, and where R's quantile of
-# those is exact to few digits, by the exponential that the density there is.
-truncated_quantile <- function(u, centre, sd, lower, upper) {
-  ends <- stats::pnorm(c(lower, upper), centre, sd)
-  if (diff(ends) > 1e-10) {
-    return(min(max(stats::qnorm(ends[1] + u * diff(ends), centre, sd), lower), upper))
-  }
-  if (centre < lower) return(-truncated_quantile(1 - u, -centre, sd, -upper, -lower))
-  beyond <- (centre - upper) / sd
-  if (beyond < 30) {
-    log_p <- stats::pnorm(c(lower, upper), centre, sd, log.p = TRUE)
-    within <- log_p[2] + log(u + (1 - u) * exp(log_p[1] - log_p[2]))
-    return(min(max(stats::qnorm(within, centre, sd, log.p = TRUE), lower), upper))
-  }
-  inwards <- -log1p(-(1 - u) * (1 - exp(-(upper - lower) * beyond / sd))) * sd / beyond
-  max(upper - inwards, lower)
+  start <- within_limits(mean, solve(covariance), limit)
+  draws_within_(mean, covariance, rep_len(limit, length(mean)), start, n, seed)
 }

@@ -120,13 +120,17 @@ with_least <- function(model, context) {
   model
 }
 
-# The slopes there by differences: what the discrepancy keeps out of hangs on them.
+# The slopes there by differences, as what the discrepancy keeps out of hangs on them; and the search goes on as long as
+# they promise that it comes nearer to the record.
 with_exact_least <- function(model, context) {
   model <- with_least(model, context)
   if (isTRUE(model$least$exact)) return(model)
   found <- difference_slopes(model, model$least$at, context)
   model <- found$model
-  if (!is.null(found$slopes)) model$least[c("slopes", "exact")] <- list(found$slopes, TRUE)
+  if (is.null(found$slopes)) return(model)
+  search <- descend(begin_search(model, model$least$at, found$slopes, 0), context)
+  model <- search$model
+  model$least <- list(at = search$at, slopes = search$slopes, exact = TRUE)
   model
 }
 
@@ -170,8 +174,9 @@ record_setting <- function(model, k, context, ais) {
 # What the discrepancy of a record keeps out of, and where that is.
 local_moves <- function(model, k) {
   own <- model$own[[k]]
-  moves <- moves_of(model, model$least)
-  list(root = unname(moves[model$rows[[k]], own, drop = FALSE]), z = model$runs$z[model$least$at, own])
+  unit <- normal_units(model, model$least)[own]
+  slopes <- model$least$slopes[model$rows[[k]], own, drop = FALSE]
+  list(root = unname(sweep(slopes, 2, unit, "*")), z = model$runs$z[model$least$at, own], unit = unit)
 }
 
 # Runs inside the region or, if they are few, the nearest ones.

@@ -174,7 +174,7 @@ slopes_at <- function(fit, use, threads, record) {
   if (!all(is.finite(runs))) {
     abort_numerical("The simulator failed beside its best run at these rows.")
   }
-  sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, per_normal(z, flat) / step, "*")
+  sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, fit$emulator$moves$unit / step, "*")
 }
 
 # The vectors of an emulator's basis at other rows: the same combinations of its runs, without those that fail there.

@@ -135,7 +135,7 @@ tried_model <- function(model, present, bar, context) {
   for (round in seq_len(rules$trial_rounds)) {
     found <- posterior_of(model, context, trial_ais, border = rules$border)
     found <- check_by_runs(found$model, found$fits, rules$trial_check, context)
-    model <- with_fit(found$model, found$fits, "tried", round, context)
+    model <- with_fit(with_least(found$model, context), found$fits, "tried", round, context)
     model$taken <- taken_away(model, present, context)
     if (is_spent(context) || is_clear(model, present, bar)) break
   }
@@ -159,16 +159,25 @@ beside_unknown <- function(model, present) (model$fit$log_evidence - present$fit
 
 # What the log10 Bayes factor of a model may be at most, by its level; `leader` is the best model that is known.
 upper_bound <- function(model, present, leader = present) {
-  if (is_promising(model, leader)) return(Inf)
-  error <- sqrt(model$fit$standard_error^2 + present$fit$standard_error^2) / log(10)
-  log10_factor(model, present) + 3 * min(error, rules$worst_error) + trial_margin(model)
+  if (is_promising(model, present, leader)) return(Inf)
+  log10_factor(model, present) + doubt_of(model, present)
 }
 
-# A trial whose emulator runs refute, so that its evidence says little, though it is nearer to the record at its best
-# than the leader.
-is_promising <- function(model, leader) {
-  refuted <- !is_verified(model) && isFALSE(model$fit$check$passed)
-  refuted && least_error(model) < rules$promising_error * least_error(leader)
+# By how much its log10 Bayes factors may be off.
+doubt_of <- function(model, present) {
+  3 * min(factor_error(model, present), rules$worst_error) + trial_margin(model)
+}
+
+factor_error <- function(model, present) {
+  sqrt(model$fit$standard_error^2 + present$fit$standard_error^2) / log(10)
+}
+
+# A trial whose emulator runs refute, or about whose evidence they say nothing, though it is nearer to the record at its
+# best than the leader.
+is_promising <- function(model, present, leader = present) {
+  if (is_verified(model)) return(FALSE)
+  is_open <- isFALSE(model$fit$check$passed) || factor_error(model, present) > rules$worst_error
+  is_open && least_error(model) < rules$promising_error * least_error(leader)
 }
 
 least_error <- function(model) sqrt(mean(left_by_simulation(model$fit)^2))
@@ -202,13 +211,14 @@ next_to_verify <- function(trials, present, context) {
   if (length(near)) near[[which.min(vapply(near, least_error, 0))]]$mechanism
 }
 
-# Further runs of a model that runs have confirmed change neither.
+# Further runs of a model whose check has passed change neither.
 cannot_be_adopted <- function(model, present) {
-  (is_verified(model) || is_confirmed(model)) && is_refused(model, present)
+  (is_verified(model) || has_passed(model)) && is_refused(model, present)
 }
 
 is_refused <- function(model, present) {
-  error_ratio(model$fit, present$fit) > rules$fallen_error || speaks_against(beside_unknown(model, present))
+  at_most <- beside_unknown(model, present) + if (is_verified(model)) 0 else doubt_of(model, present)
+  error_ratio(model$fit, present$fit) > rules$fallen_error || speaks_against(at_most)
 }
 
 settled_trial <- function(model, present, bar, context) {

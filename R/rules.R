@@ -87,6 +87,8 @@ rule_table <- list(
                        "skewed tails reach further than a normal one's", "bench/parameter_coverage.R"),
   region_tries = rule(4, "tries", "how often a region follows its posterior without new runs",
                       "a posterior that still runs away asks for runs", "bench/seeds.R"),
+  open_draws = rule(400, "draws", "draws of what least squares leaves open, over which a model's moves are taken",
+                    "they are known to a few hundredths, and cost no run", "bench/seeds.R"),
   reach = rule(13, "variance of the noise", "movement of the simulator from which the discrepancy keeps out of it",
                "the simulation is then as near to the record as least squares", "bench/crude.R"),
   basis_error = rule(0.01, "noise", "what the basis of a local emulator may leave out",

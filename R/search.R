@@ -59,11 +59,23 @@ look <- function(search, context) {
   search
 }
 
-# How far a model moves at its run of least squares: its slopes there for a unit of the normal quantile of each
-# parameter (Plumlee 2017). They vanish where a parameter is pressed against the end of a flat prior: what it cannot do
-# any more, the discrepancy may. They hang on simulator and record alone.
-moves_of <- function(model, least) {
-  sweep(least$slopes, 2, per_normal(model$runs$z[least$at, ], model$flat), "*")
+# How far a model moves about its run of least squares: its slopes there for a unit of the normal quantile of each
+# parameter (Plumlee 2017), in the mean over what least squares leaves open, so that neighbours on a ridge move alike. A
+# parameter that is pressed against the end of a flat prior moves little: what it cannot do any more, the discrepancy
+# may. They hang on simulator and record alone.
+moves_of <- function(model, least) sweep(least$slopes, 2, normal_units(model, least), "*")
+
+normal_units <- function(model, least) {
+  open <- left_open(model, least)
+  draws <- draws_within(open$mean, open$covariance, model$limit, rules$open_draws, 1)
+  vapply(seq_len(ncol(draws)), function(j) sqrt(mean(per_normal(draws[, j], model$flat[j])^2)), 0)
+}
+
+# The parameters by least squares in units of the noise.
+left_open <- function(model, least) {
+  line <- list(output = model$runs$outputs[, least$at], slopes = least$slopes)
+  found <- squares_of_line(list(model = model, weighted = FALSE), model$runs$z[least$at, ], line)
+  list(mean = found$mean, covariance = solve(found$precision))
 }
 
 # What its optimum would gain.

@@ -58,14 +58,14 @@ as_tried <- function(row, trial) {
 # How far the evidence may be off beyond its standard error.
 trial_margin <- function(model) {
   if (is_verified(model)) 0
-  else if (is_confirmed(model)) rules$trial_margin
+  else if (has_passed(model)) rules$trial_margin
   else rules$trial_doubt * (1 + min(rules$worst_ratio, model$fit$check$ratio %||% 1))
 }
 
-is_confirmed <- function(model) {
-  check <- model$fit$check
-  isTRUE(check$passed) && isTRUE(check$effective >= rules$effective_trial)
-}
+has_passed <- function(model) isTRUE(model$fit$check$passed)
+
+# Whether its check says what its evidence is, too.
+is_confirmed <- function(model) has_passed(model) && isTRUE(model$fit$check$effective >= rules$effective_trial)
 
 # The simulation's own error in calibration over that of the fit `current`.
 error_ratio <- function(fit, current) {

@@ -178,6 +178,22 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// draws_within_
+Eigen::MatrixXd draws_within_(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& limit, const Eigen::VectorXd& start, int n, double seed);
+RcppExport SEXP _amiss_draws_within_(SEXP meanSEXP, SEXP covarianceSEXP, SEXP limitSEXP, SEXP startSEXP, SEXP nSEXP, SEXP seedSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type mean(meanSEXP);
+    Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type covariance(covarianceSEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type limit(limitSEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type start(startSEXP);
+    Rcpp::traits::input_parameter< int >::type n(nSEXP);
+    Rcpp::traits::input_parameter< double >::type seed(seedSEXP);
+    rcpp_result_gen = Rcpp::wrap(draws_within_(mean, covariance, limit, start, n, seed));
+    return rcpp_result_gen;
+END_RCPP
+}
 // response_evidence_
 Rcpp::List response_evidence_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& tangent, const Eigen::MatrixXd& responses, const Rcpp::List& ais, const Rcpp::List& context);
 RcppExport SEXP _amiss_response_evidence_(SEXP dataSEXP, SEXP priorsSEXP, SEXP tangentSEXP, SEXP responsesSEXP, SEXP aisSEXP, SEXP contextSEXP) {
@@ -297,6 +313,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_drop_conditions_", (DL_FUNC) &_amiss_drop_conditions_, 5},
     {"_amiss_tangent_posterior_", (DL_FUNC) &_amiss_tangent_posterior_, 8},
     {"_amiss_tangent_given_", (DL_FUNC) &_amiss_tangent_given_, 7},
+    {"_amiss_draws_within_", (DL_FUNC) &_amiss_draws_within_, 6},
     {"_amiss_response_evidence_", (DL_FUNC) &_amiss_response_evidence_, 6},
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},

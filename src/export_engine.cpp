@@ -14,6 +14,8 @@
 #include "engine/discrepancy/HistoryModel.hpp"
 #include "engine/emulator/Emulator.hpp"
 #include "engine/parallel/parallel_for.hpp"
+#include "engine/random/TruncatedNormal.hpp"
+#include "engine/random/purposes.hpp"
 
 using namespace amiss;  // NOLINT
 using Eigen::MatrixXd;
@@ -304,6 +306,15 @@ Rcpp::List tangent_given_(const Rcpp::List& data, const Rcpp::List& priors, cons
       tangent_given(make_history_data(data), make_history_priors(priors), make_points(points), x0, run,
                     slopes, convert::context(context));
   return Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
+}
+
+// Draws of a normal distribution between -limit and limit.
+// [[Rcpp::export]]
+Eigen::MatrixXd draws_within_(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
+                              const Eigen::VectorXd& limit, const Eigen::VectorXd& start, int n,
+                              double seed) {
+  Stream stream(static_cast<std::uint64_t>(seed), kWithinLimits, 0);
+  return draws_within(mean, covariance, limit, start, n, stream);
 }
 
 // Evidence of a calibration's tangent and of the responses (N x k) to a change of the simulator.

@@ -130,19 +130,6 @@ test_that("where no limit is near, draws have the mean and covariance asked for"
   expect_identical(draws, amiss:::draws_within(c(0.3, -0.5), covariance, c(4, 4), 20000, seed = 2))
 })
 
-test_that("quantiles far outside go on where the normal distribution function ends", {
-  u <- c(0.01, 0.3, 0.9)
-  quantile <- function(centre) vapply(u, amiss:::truncated_quantile, 0, centre, 1, -1, 1)
-  expect_false(is.unsorted(quantile(9)))
-  expect_false(is.unsorted(quantile(-9)))
-  # P(X <= x | X <= 1) at 7, 9 and 30 standard deviations from the end; -1 is far below.
-  for (centre in c(8, 10, 31)) {
-    tail <- function(x) exp(pnorm(x, centre, 1, log.p = TRUE) - pnorm(1, centre, 1, log.p = TRUE))
-    # Of the exponential that stands for it the second order is missing, 1 / beyond^2.
-    expect_equal(tail(quantile(centre)), u, tolerance = 2 / (centre - 1)^2)
-  }
-})
-
 # ---- slopes
 
 slopes_of_linear <- function(model) {

@@ -333,12 +333,15 @@ test_that("a trial's evidence may be off by what its runs leave open, a verified
   bound <- function(model) amiss:::upper_bound(model, present)
   expect_equal(bound(model_by_hand(3, se = 0.1)), 3 + 3 * 0.1)
   expect_equal(bound(tried_by_hand(3, se = 0)), 3 + rules$trial_margin)
-  expect_equal(bound(tried_by_hand(3, se = 0, effective = 0.5)), 3 + rules$trial_doubt * 1.1)
+  expect_equal(bound(tried_by_hand(3, se = 0.2, effective = 0.5)), 3 + 3 * 0.2 + rules$trial_margin)
   refuted <- tried_by_hand(3, se = 0, passed = FALSE, ratio = 2)
   expect_equal(bound(refuted), 3 + rules$trial_doubt * 3)
   # A run has half the error: what refutes the emulator cannot rule that out.
   promising <- tried_by_hand(-40, se = 0, passed = FALSE, ratio = 2, error = 0.5)
   expect_equal(bound(promising), Inf)
+  # Nor can a check that has passed, but leaves its evidence open.
+  expect_equal(bound(tried_by_hand(-40, se = 3, effective = 0.3, error = 0.5)), Inf)
+  expect_lt(bound(tried_by_hand(-40, se = 1, effective = 0.3, error = 0.5)), 0)
   # A leader that is as near to the record can.
   expect_lt(amiss:::upper_bound(promising, present, leader = model_by_hand(8, error = 0.5)), -20)
   unchecked <- tried_by_hand(3, se = 0)
@@ -377,10 +380,11 @@ test_that("a trial goes on while its runs leave open whether it can win", {
   present <- model_by_hand(0, se = 0, error = 1)
   clear <- function(..., bar = 2) amiss:::is_clear(tried_by_hand(...), present, bar)
   expect_true(clear(3))
-  expect_false(clear(3, effective = 0.5))
+  expect_false(clear(2.2, effective = 0.5))
+  expect_true(clear(3, effective = 0.5))
   expect_true(clear(-5, effective = 0.5))
   expect_true(clear(9, effective = 0.5))
-  expect_false(clear(9, effective = 0.5, bar = 8))
+  expect_false(clear(8.2, effective = 0.5, bar = 8))
 })
 
 test_that("the odds are of what was computed; what was not has no part in them", {

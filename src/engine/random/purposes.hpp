@@ -18,6 +18,7 @@ enum StreamPurpose : std::uint64_t {
   kCloser = 64,
   kTangentPoints = 61,  ///< these two with a constant seed: they are no part of the chance
   kRegionPoints = 63,
+  kWithinLimits = 65,
   kFictitious = 64,  ///< condition of the paper, a seed of its own
   kStage = 128,      ///< of the paper's kernel on a thinned record
 };
