@@ -9,6 +9,11 @@
 #' the draws or, where none comes close, annealing from that mixture) must not lie above the one reported. Groups or
 #' draws are added until the standard error is at most `precision`.
 #'
+#' *Modes.* Chains lose a mode that is much narrower than another, because it has little mass while they are warm. So
+#' climbs follow from points of the prior that do not lead to the draws. If they reach a peak without draws that holds
+#' two hundredths of the posterior or more, an importance sample of it joins the draws, and the verdict says so. A mode
+#' to which less than a thousandth of the prior leads is not seen (`bench/trusted.R`).
+#'
 #' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
 #'   log-likelihood of each point; `-Inf` where it is zero.
 #' @param priors Named list of [prior]s.
@@ -24,12 +29,15 @@
 #'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()] along the
 #'     parameters: they follow a curved posterior, at up to twice the cost). [ais()] makes them if it is given one;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
-#'   * `importance_draws` (1000; 0 leaves the second estimator out) and `max_components` (3) of the mixture.
+#'   * `importance_draws` (1000; 0 leaves the second estimator and the search for modes out) and `max_components` (3) of
+#'     the mixture.
 #' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95
 #'   %), `annealed` and `second` (estimate and standard error of each estimator), `ladder`, `evaluations`, `trusted`,
 #'   `verdict`.
 #' @source Neal (2001), Annealed importance sampling, Statistics and Computing 11, 125-139. Del Moral, Doucet and Jasra
 #'   (2006), Sequential Monte Carlo samplers, Journal of the Royal Statistical Society B 68, 411-436 (the pilot).
+#'   Rodriguez and Laio (2014), Clustering by fast search and find of density peaks, Science 344, 1492-1496 (where
+#'   climbs begin).
 #'   Hesterberg (1995), Weighted average importance sampling and defensive mixture distributions, Technometrics 37,
 #'   185-194. In full: `vignette("algorithm", "amiss")`, *Annealed importance sampling*.
 #' @examples
@@ -74,6 +82,12 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
   result <- call_engine(ais_(at_unit, if (!is.null(gradient)) slope_at_unit, length(priors), control,
                              engine_context(seed, 1)))
   tell_undefined(tally)
+  if (control$importance_draws != 0) {
+    result <- with_lost_modes(result, function(x) {
+      values <- as.numeric(attempt(log_likelihood, "log_likelihood", to_values(stats::pnorm(x))))
+      ifelse(is.na(values), -Inf, values)
+    }, seed)
+  }
   result$draws <- to_values(result$unit)
   result$unit <- NULL
   structure(c(list(format_version = format_version, seed = seed), result), class = "amiss_ais")

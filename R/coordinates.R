@@ -66,3 +66,8 @@ draws_within <- function(mean, covariance, limit, n, seed) {
   start <- within_limits(mean, solve(covariance), limit)
   draws_within_(mean, covariance, rep_len(limit, length(mean)), start, n, seed)
 }
+
+log_mean_exp <- function(x) {
+  top <- max(x)
+  if (is.finite(top)) top + log(mean(exp(x - top))) else top
+}

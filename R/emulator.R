@@ -153,6 +153,13 @@ check_runs_differ <- function(ensemble, call = rlang::caller_env()) {
     abort_input(c("All {ncol(y)} runs are the same: none of {.val {names(ensemble$parameters)}} acts on the output.",
                   i = "Check that the simulator uses its parameters."), call = call)
   }
+  check_runs_change(y, call)
+}
+
+check_runs_change <- function(outputs, call = rlang::caller_env()) {
+  if (!all(apply(outputs, 2, function(run) diff(range(run))) == 0)) return(invisible())
+  abort_input(c("The runs do not change over time: each of the {ncol(outputs)} is a constant.",
+                i = "The simulator of a time series uses the boundary conditions, or the time."), call = call)
 }
 
 fill_emulator_control <- function(control, what = "control", call = rlang::caller_env()) {

@@ -84,7 +84,7 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
   outputs <- check_runs(outputs, "outputs", nrow(design))
   if (!is.null(validation)) validation <- check_runs(validation, "validation", nrow(design))
   runs <- place_runs(outputs, validation, measurements, time)
-  check_enough_runs(nrow(design), ncol(design))
+  check_enough_runs(nrow(unique(design)), ncol(design), nrow(design))
   if (is.null(parameters)) {
     for (name in colnames(design)) check_varies(name, design[, name])
     parameters <- lapply(colnames(design), function(name) free(name, uniform(min(design[, name]), max(design[, name]))))
@@ -96,12 +96,28 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
   unit <- places_in_priors(values, parameters)
   made <- new_ensemble(parameters, unname(unit), values, runs$calibrate, NULL, NA,
                        hours = runs$hours, held_out = runs$held_out)
+  made <- without_repeats(made)
   uncovered <- uncovered_statement(made)
   if (!is.null(uncovered)) {
     warn_input(c("{toupper(substr(uncovered, 1, 1))}{substring(uncovered, 2)}.",
                  i = "The emulator extrapolates over the rest: add runs there or narrow the prior."))
   }
   made
+}
+
+# A run that is given again, point and output, says nothing new: left out, its twin would seem to be foreseen.
+without_repeats <- function(ensemble) {
+  again <- duplicated(cbind(ensemble$unit, t(ensemble$outputs)))
+  if (!any(again)) return(ensemble)
+  warn_input(c("{sum(again)} of {length(again)} runs stand{?s/} in {.arg design} and {.arg outputs} more than once.",
+               i = "Each counts once."))
+  ensemble$unit <- ensemble$unit[!again, , drop = FALSE]
+  ensemble$values <- ensemble$values[!again, , drop = FALSE]
+  ensemble$outputs <- ensemble$outputs[, !again, drop = FALSE]
+  if (!is.null(ensemble$held_out)) {
+    ensemble$held_out$outputs <- ensemble$held_out$outputs[, !again, drop = FALSE]
+  }
+  ensemble
 }
 
 check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
@@ -302,12 +318,15 @@ uncovered_statement <- function(ensemble) {
   paste("the runs cover only", paste(spans, collapse = ", "))
 }
 
-check_enough_runs <- function(runs, parameters, call = rlang::caller_env()) {
-  if (runs < max(5, parameters + 2)) {
-    abort_input(c(
-      "{runs} run{?s} {?is/are} too few for {parameters} parameter{?s}; at least {max(5, parameters + 2)} are needed.",
-      i = "Ten times the number of parameters is a good start."), call = call)
-  }
+# `runs`: at distinct points.
+check_enough_runs <- function(runs, parameters, given = runs, call = rlang::caller_env()) {
+  least <- max(5, parameters + 2)
+  if (runs >= least) return(invisible())
+  points <- if (given > runs) " at {runs} distinct point{?s}" else ""
+  own <- if (given > runs) ", each at a point of its own"
+  abort_input(c(paste0("{given} run{?s}", points, " {cli::qty(given)}{?is/are} too few for {parameters} ",
+                       "parameter{?s}; at least {least} are needed", own, "."),
+                i = "Ten times the number of parameters is a good start."), call = call)
 }
 
 unit_to_values <- function(unit, parameters) {

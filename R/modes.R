@@ -39,6 +39,7 @@ with_scouts <- function(model, context) {
   unit <- with_seed(context$seed, lhs::randomLHS(n, p))
   model <- with_runs(model, from_unit(unit, model$flat), context)$model
   check_some_succeeded(model)
+  for (rows in model$rows) check_runs_change(model$runs$outputs[rows, succeeded(model), drop = FALSE])
   model
 }
 

@@ -393,11 +393,6 @@ values_of <- function(model, outputs, z, history, moves, context) {
   values
 }
 
-log_mean_exp <- function(x) {
-  top <- max(x)
-  if (is.finite(top)) top + log(mean(exp(x - top))) else top
-}
-
 # The Gaussian that the tangents of several records make together of p parameters, whose prior N(0, I)
 # each of them holds: precisions add up, that of the prior counted once.
 joint_tangent <- function(tangents, own, p) {

@@ -58,3 +58,49 @@ test_that("bad likelihoods and priors are classed errors", {
     expect_error(ais(function(z) z[, 1], prior, bad, seed = 1), names(bad), class = "amiss_error_input")
   }
 })
+
+# Two normal modes of equal mass between -10 and 10 in d dimensions, the second `ratio` times narrower.
+two_modes <- function(d, sd, ratio) {
+  centre <- rep(c(5, -3, 4), length.out = d)
+  one <- function(x, at, sd) colSums(dnorm(t(x), at, sd, log = TRUE))
+  list(f = function(x) {
+         both <- cbind(one(x, centre, sd), one(x, -centre, sd / ratio)) + log(0.5)
+         top <- pmax(both[, 1], both[, 2])
+         top + log(rowSums(exp(both - top)))
+       }, is_first = function(x) (x %*% centre)[, 1] > 0, exact = -d * log(20),
+       priors = stats::setNames(rep(list(uniform(-10, 10)), d), paste0("z", seq_len(d))))
+}
+
+test_that("a mode that is narrower than another is found, and both have their mass", {
+  for (d in 2:3) {
+    case <- two_modes(d, 0.3, 5)
+    result <- ais(case$f, case$priors, seed = 1)
+    expect_true(result$trusted)
+    expect_match(result$verdict, "a search added a mode")
+    # Without it the evidence would be too low by log(2).
+    expect_lt(abs(result$log_evidence - case$exact), 4 * result$standard_error)
+    expect_equal(sum(result$weights[case$is_first(unname(result$draws))]), 0.5, tolerance = 0.1)
+    expect_equal(sum(result$weights), 1)
+    expect_equal(result$log_likelihood, case$f(unname(result$draws)), tolerance = 1e-6)
+  }
+})
+
+test_that("of a posterior whose logarithm is concave no point leads elsewhere but those above a draw", {
+  case <- conjugate(4, 0.2)
+  density <- function(x) case$f(x) - 0.5 * rowSums(x^2)
+  starts <- withr::with_seed(1, matrix(rnorm(4000), 1000))
+  drawn <- list(x = withr::with_seed(2, matrix(rnorm(400, 0, 0.2), 100)), weights = rep(0.01, 100))
+  aside <- amiss:::leads_elsewhere(density, starts, drawn, seed = 1)
+  expect_lt(length(aside$values), 20)
+  expect_gt(min(aside$values), min(density(drawn$x)))
+})
+
+test_that("the mass of a normal peak is its closed form, and of a slope there is none", {
+  root <- matrix(c(20, 0, 0, 7, 3, 0, -2, 5, 400), 3)
+  density <- function(x) -0.5 * colSums((root %*% (t(x) - c(1, -1, 0.5)))^2)
+  peak <- amiss:::peak_at(density, c(1, -1, 0.5), 0)
+  expect_true(peak$converged)
+  expect_equal(peak$log_mass, 1.5 * log(2 * pi) - log(det(root)), tolerance = 1e-6)
+  beside <- c(1.5, -1, 0.5)
+  expect_false(amiss:::peak_at(density, beside, density(rbind(beside)))$converged)
+})

@@ -129,6 +129,30 @@ test_that("bad runs are refused or left out with a word", {
                "No run lies where the prior", class = "amiss_error_input")
 })
 
+test_that("a run that is given again counts once", {
+  m <- linear_measurements()
+  e <- simulate_design(linear_simulator(), m, runs = 8, seed = 3)
+  twice <- c(1:8, 3, 3)
+  expect_warning(again <- ensemble(e$values[twice, ], e$outputs[, twice], e$parameters), "2 of 10 runs stand",
+                 class = "amiss_warning_input")
+  expect_equal(again$outputs, e$outputs)
+  # Another output at the same point is that of a stochastic simulator, and stays.
+  expect_silent(other <- ensemble(e$values[twice, ], cbind(e$outputs, e$outputs[, 3] + 0.1, e$outputs[, 3] - 0.1),
+                                  e$parameters))
+  expect_equal(ncol(other$outputs), 10)
+  two <- rep(1:2, 10)
+  expect_error(ensemble(e$values[two, ], e$outputs[, two], e$parameters), "20 runs at 2 distinct points are too few",
+               class = "amiss_error_input")
+})
+
+test_that("a simulator that is constant in time is refused, by an emulator and by a search", {
+  m <- linear_measurements()
+  constant <- function_simulator(function(v, d) rep(v[["a"]], nrow(d)), free("a", uniform(10, 30)), boundary = "Te")
+  runs <- simulate_design(constant, m, runs = 8, seed = 1)
+  expect_error(train_emulator(runs, m), "do not change over time", class = "amiss_error_input")
+  expect_error(calibrate_refined(runs, m, quiet = TRUE), "do not change over time", class = "amiss_error_input")
+})
+
 test_that("the design follows its seed and leaves R's generator alone", {
   m <- linear_measurements()
   set.seed(1)
