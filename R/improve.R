@@ -244,6 +244,11 @@ verify_model <- function(model, context, before = NULL, rounds = context$control
     checks <- if (is.null(before)) rules$first_check else rules$check_runs
     found <- check_by_runs(found$model, found$fits, checks, context)
     model <- found$model
+    if (round < rounds && misses_least(model, found$fits) && !is_spent(context)) {
+      model <- moved_to_least(model, context)
+      best <- before <- NULL
+      next
+    }
     settled <- has_settled(found$fits, before)
     found$score <- check_score(found$fits)
     if (settled || is.null(best) || found$score > best$score) best <- found
@@ -259,6 +264,23 @@ verify_model <- function(model, context, before = NULL, rounds = context$control
   best$model$runs <- model$runs
   if (!is.null(model$modes)) best$model$modes <- confirmed_modes(best$model, model$modes, best$fits)
   with_fit(best$model, best$fits, "verified", round, context)
+}
+
+# Whether the run of least squares lies outside the region and is more probable than the draws: their mode is another,
+# lower one. A model moves once.
+misses_least <- function(model, fits) {
+  at <- model$least$at
+  if (isTRUE(model$moved) || !length(model$checked$at) || straight_distance(model)[at] <= 1) return(FALSE)
+  value <- values_under(model, fits, c(at, model$checked$at))
+  isTRUE(value[1] > stats::median(rep(value[-1], model$checked$times)) + rules$mode_depth)
+}
+
+# The model at the mode that a search from there finds.
+moved_to_least <- function(model, context) {
+  search <- run_search(begin_search(model, model$least$at, model$least$slopes, 0), context)
+  model <- with_modes(search$model, list(search), context$seed)
+  model$moved <- TRUE
+  model
 }
 
 model_ais <- function(context) utils::modifyList(verified_ais, as.list(context$control$calibration$ais))

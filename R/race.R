@@ -135,7 +135,12 @@ tried_model <- function(model, present, bar, context) {
   for (round in seq_len(rules$trial_rounds)) {
     found <- posterior_of(model, context, trial_ais, border = rules$border)
     found <- check_by_runs(found$model, found$fits, rules$trial_check, context)
-    model <- with_fit(with_least(found$model, context), found$fits, "tried", round, context)
+    model <- with_least(found$model, context)
+    if (round < rules$trial_rounds && misses_least(model, found$fits) && !is_spent(context)) {
+      model <- moved_to_least(model, context)
+      next
+    }
+    model <- with_fit(model, found$fits, "tried", round, context)
     model$taken <- taken_away(model, present, context)
     if (is_spent(context) || is_clear(model, present, bar)) break
   }
