@@ -3,11 +3,13 @@ study_fields <- list(
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
   optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
-               "fill_gaps_h", "separator", "decimal", "runs", "seed", "control", "title", "records"))
+               "fill_gaps_h", "missing", "range", "separator", "decimal", "runs", "seed", "control", "title",
+               "records"))
 
 # What each of several records may have of its own.
 record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h", "calibrate", "validate",
-                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h", "separator", "decimal")
+                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h", "missing", "range", "separator",
+                   "decimal")
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
@@ -25,27 +27,30 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' The value of `model` and of `catalogue` may also be a function of the [measurements()] that returns the piece: so a
 #' study can have given runs ([ensemble()]) as its model, and [responses()] as its catalogue.
 #'
-#' *Several records.* `records` maps the name of each record to the fields that it has of its own, of `data`, `time`,
-#' `target`, `boundary`, `model`, `noise_sd`, `average_h`, `calibrate`, `validate`, `warmup_h`, `unit`, `time_format`,
-#' `time_zone`, `fill_gaps_h`, `separator` and `decimal`; those outside are for all that do not say otherwise. The value
-#' of a `model` may also be a list of simulators by the names of the records ([outputs_of()]). A catalogue that is a
-#' function gets the list of measurements. The loop is then that of [upgrade_model()] over several records.
+#' Needed are `study` (a name), `data`, `time`, `target` and `boundary`, and `model` with `catalogue`, or `models`.
+#' R files are evaluated in their own folder.
+#' * `data`: a table (see *Tables*) or an R file whose value is a data frame; `separator` and `decimal` of the
+#'   table.
+#' * `time`, `target`, `boundary`: columns of it; `boundary` is a list, with `circular(Wd)` for degrees.
+#' * `calibrate` and `validate`: conditions in the columns of the data.
+#' * `noise_sd`, `unit`, `time_format`, `time_zone`, as in [measurements()]; `average_h` (the step of the data if it
+#'   is not given), `warmup_h` and `fill_gaps_h` (0) in hours.
+#' * `missing`: codes for a missing value, as `[-9999, 85]`, or `none`. `range`: ends of the target's sensor, as
+#'   `[-.inf, 27]`.
+#' * `title` (that of `study`), `seed`, `control` and `runs`, as in [upgrade_model()] or [compare_models()] (150
+#'   runs); `method` (`paper`) of a comparison.
 #'
-#' The other fields are `study` (name), `data` (a table, see *Tables*, or an R file whose value is a data frame),
-#' `time`, `target`, `boundary` (list; `circular(Wd)` for degrees), and, if wanted, `title`, `unit` (of the target),
-#' `noise_sd`, `average_h`, `warmup_h`, `fill_gaps_h` (hours), `time_format`, `time_zone` (as in [measurements()]),
-#' `separator`, `decimal` (of the table), `calibrate`, `validate` (conditions in the columns of the data), `runs`,
-#' `seed` and `control` (as in [upgrade_model()] or [compare_models()]). R files are evaluated in their own folder.
+#' *Several records.* `records` maps the name of each record to the fields that it has of its own. Fields outside
+#' are for all records that do not say otherwise. Of its own a record may have its model, and all that says what was
+#' measured. The value of a `model` may also be a list of simulators by the names of the records ([outputs_of()]). A
+#' catalogue that is a function gets the list of measurements. The loop is then that of [upgrade_model()] over
+#' several records.
 #'
 #' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical, and
 #' numbers are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text). Conditions are no R code: they may hold
 #' columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, the four operations of arithmetic and `%in%
 #' c(...)`. Texts are compared as in [measurements()]. One that begins with `!` needs quotes around it: `validate:
 #' '!(hour > 72)'`.
-#'
-#' `study`, `data`, `time`, `target` and `boundary` are needed, and `model` with `catalogue`, or `models`. Without the
-#' others `title` is that of `study`, `runs` 150, `method` `paper`, `average_h` the step of the data, `warmup_h` and
-#' `fill_gaps_h` 0.
 #'
 #' *result.json* of a loop holds `schema`, `study`, `seed`, `wall_s` (seconds), `runs_total`, `diagnosis` (`verdict`:
 #' `"named"`, `"likely"`, `"unexplained"` or `"nothing"`; `tag`, `headline`), `named_cause` (`null` if there is none; a
@@ -194,7 +199,9 @@ study_measurements <- function(study, files) {
                noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
                validate = rows("validate"),
                warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
-               time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0)
+               time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0,
+               missing = if (identical(study$missing, "none")) NA else unlist(study$missing),
+               range = unlist(study$range))
 }
 
 # The options that can be checked before anything is computed.

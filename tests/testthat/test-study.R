@@ -343,3 +343,26 @@ test_that("the noise of the paper's synthetic study has a hundredth of the recor
   m <- paper_study("paper_synthetic")$measurements
   expect_equal(m$noise_sd^2, 0.01 * stats::var(m$raw$drivers[m$use == "calibrate", "Ti_clean"]), tolerance = 0.01)
 })
+
+test_that("a study says which values are missing and where a sensor ends", {
+  folder <- withr::local_tempdir()
+  data <- linear_data(120)
+  data$Ti[7] <- -9999
+  data$Ti[20] <- 31
+  write.csv(data, file.path(folder, "data.csv"), row.names = FALSE)
+  writeLines(c("library(amiss)", "function_simulator(function(v, d) v[['a']] * d[, 'Te'], free('a', uniform(0, 1)),",
+               "                   boundary = 'Te')"), file.path(folder, "model.R"))
+  writeLines("amiss::catalogue()", file.path(folder, "catalogue.R"))
+  written <- function(...) {
+    path <- file.path(folder, "study.yml")
+    writeLines(c("study: marks", "data: data.csv", "time: hour", "target: Ti", "boundary: [Te, Gv]", "noise_sd: 0.1",
+                 "model: model.R", "catalogue: catalogue.R", ...), path)
+    read_study(path, trust = TRUE)$measurements
+  }
+  expect_error(written(), "-9999", class = "amiss_error_input")
+  expect_setequal(which(is.na(written("missing: -9999")$y)), 7)
+  expect_setequal(which(is.na(written("missing: [-9999, 85]", "range: [-.inf, 31]")$y)), c(7, 20))
+  expect_equal(written("missing: none")$y[7], -9999)
+  expect_error(written("missing: [-9999]", "range: [31, 0]"), "lower end comes first", class = "amiss_error_input")
+  expect_error(written("missing: broken"), "missing", class = "amiss_error_input")
+})
