@@ -55,3 +55,32 @@ test_that("a trial that its runs do not confirm is checked again, once, before i
   trial$fit$check$effective <- 0.9
   expect_false(asks(low + 1))
 })
+
+test_that("a model at a lower mode than its run of least squares is searched again from there", {
+  # Two places fit the amplitude; a small term says which is right.
+  data <- linear_data(200)
+  data$Ti <- 20 + 0.36 * data$Te + 0.012 * data$Gv * 0.6 + 0.1 * cos(1.7 * data$hour)
+  m <- linear_measurements(data)
+  simulator <- function_simulator(function(v, d) {
+    v[["offset"]] + v[["a"]]^2 * d[, "Te"] + 0.012 * v[["a"]] * d[, "Gv"]
+  }, free("offset", uniform(10, 30)), free("a", uniform(-1, 1)), boundary = c("Te", "Gv"))
+  model <- amiss:::new_model(list(simulator), list(amiss:::loop_record(m, quick_ais)))
+  context <- amiss:::new_context(1, 1, list(calibration = quick_ais))
+  found <- function(model, a) {
+    made <- amiss:::with_runs(model, rbind(c(0, a * sqrt(3))), context)
+    slopes <- amiss:::difference_slopes(made$model, made$at, context)
+    amiss:::run_search(amiss:::begin_search(slopes$model, made$at, slopes$slopes, 0, steps = 3), context)
+  }
+  right <- found(model, 0.6)
+  wrong <- found(right$model, -0.6)
+  model <- amiss:::with_modes(wrong$model, list(wrong), 1)
+  model$least <- right$least
+  model <- amiss:::with_local_runs(model, 20, context)
+  at_wrong <- amiss:::posterior_of(model, context, amiss:::rough_ais)
+  checked <- amiss:::check_by_runs(at_wrong$model, at_wrong$fits, 4, context)
+  expect_gt(amiss:::straight_distance(checked$model)[model$least$at], 1)
+  expect_true(amiss:::misses_least(checked$model, checked$fits))
+  moved <- amiss:::moved_to_least(checked$model, context)
+  expect_lte(amiss:::straight_distance(moved)[moved$least$at], 1)
+  expect_false(amiss:::misses_least(moved, checked$fits))
+})
