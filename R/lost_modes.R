@@ -141,7 +141,7 @@ add_mode <- function(result, density, peak, seed) {
   is_lost <- share > rules$lost_share && 1 - outside < share / 10 && 1 / sum(own^2) > n / 10
   if (!isTRUE(is_lost)) return(result)
   both <- c(log(outside) + result$log_evidence, inside)
-  log_evidence <- max(both) + log(sum(exp(both - max(both))))
+  log_evidence <- log_mean_exp(both) + log(2)
   share <- exp(both - log_evidence)
   error <- sqrt(sum((share * c(result$standard_error, sqrt(sum(own^2) - 1 / n)))^2))
   result$weights <- c(share[1] * result$weights[kept] / outside, share[2] * own)

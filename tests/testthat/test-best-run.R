@@ -53,6 +53,19 @@ test_that("the discrepancy keeps out of the slopes there, in normal quantiles, w
   expect_equal(root[, 2], mean_square(2, 0, 1) * te, tolerance = 0.01, ignore_attr = TRUE)
 })
 
+test_that("a parameter moves as it does over all that least squares leaves open, not at one run", {
+  # At 1.6 of sqrt(3), known to one standard deviation.
+  model <- list(runs = list(z = matrix(1.6), outputs = matrix(1:4)), target = 1:4, noise = rep(1, 4), flat = TRUE,
+                limit = sqrt(3))
+  unit <- amiss:::normal_units(model, list(at = 1, slopes = matrix(0.5, 4)))
+  z <- seq(-sqrt(3), sqrt(3), length.out = 2001)[-c(1, 2001)]
+  weight <- dnorm(z, 1.6, 1)
+  exact <- sqrt(sum(weight * amiss:::per_normal(z, rep(TRUE, 1999))^2) / sum(weight))
+  # Of 400 independent draws: three standard errors of the root of a mean square, each of about 2 %.
+  expect_equal(unit, exact, tolerance = 0.06)
+  expect_gt(unit, 2 * amiss:::per_normal(1.6, TRUE))
+})
+
 test_that("a parameter pressed against the end of a flat prior moves nothing; the middle moves most", {
   ends <- amiss:::flat_limit * c(-1, 1)
   expect_equal(amiss:::per_normal(ends, c(TRUE, TRUE)), c(0, 0))
