@@ -112,7 +112,7 @@ rule_table <- list(
   effective_trial = rule(0.7, "share", "effective share of the check runs that confirms a trial",
                          "trials below it were off by up to two decades", "bench/runs.R"),
   trial_margin = rule(0.5, "decades", "how far the evidence of a trial may be off beyond its error if its check passes",
-                      "in 60 trials what runs found later lay within it", "bench/runs.R"),
+                      "in one of 70 trials later runs found more than it and three errors", "bench/runs.R"),
   trial_doubt = rule(2, "decades", "the same if its check has failed, and as much again for an error of the noise",
                      "its runs have not reached its mode yet", "bench/runs.R"),
   worst_ratio = rule(4, "noise", "error of an emulator beyond which a trial's bound rises no further",
