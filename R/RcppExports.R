@@ -61,6 +61,14 @@ run_likelihood_ <- function(data, priors, points, runs, context_list) {
     .Call(`_amiss_run_likelihood_`, data, priors, points, runs, context_list)
 }
 
+network_simulate_ <- function(network, coefficients, drivers, hold, options, context) {
+    .Call(`_amiss_network_simulate_`, network, coefficients, drivers, hold, options, context)
+}
+
+network_slopes_ <- function(network, coefficients, directions, drivers, hold, options) {
+    .Call(`_amiss_network_slopes_`, network, coefficients, directions, drivers, hold, options)
+}
+
 calibrate_paper_ <- function(data, priors, emulator_list, control, context_list) {
     .Call(`_amiss_calibrate_paper_`, data, priors, emulator_list, control, context_list)
 }

@@ -97,6 +97,8 @@ object_parts <- list(
   amiss_function_simulator = c("format_version", "name", "f", "parameters", "boundary"),
   amiss_program_simulator = c("format_version", "name", "command", "parameters", "boundary"),
   amiss_zone = "components",
+  amiss_network = c("format_version", "name", "components", "output", "before"),
+  amiss_network_part = c("type", "name"),
   amiss_mechanism = c("name", "edit", "boundary", "sentence"))
 
 check_parts <- function(x, name, hint = NULL, call = rlang::caller_env()) {

@@ -79,3 +79,13 @@ simulate_runs.amiss_renamed <- function(simulator, values, drivers, step_h, hold
   colnames(values)[at] <- names(simulator$to)
   simulate_runs(simulator$simulator, values, drivers, step_h, hold, threads, ...)
 }
+
+#' @export
+slopes.amiss_renamed <- function(simulator, values, drivers, step_h, hold = NULL, ...) {
+  at <- match(simulator$to, colnames(values))
+  colnames(values)[at] <- names(simulator$to)
+  out <- slopes(simulator$simulator, values, drivers, step_h, hold, ...)
+  if (is.null(out)) return(NULL)
+  colnames(out)[match(names(simulator$to), colnames(out))] <- simulator$to
+  out
+}

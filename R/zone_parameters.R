@@ -68,9 +68,13 @@ fill_free <- function(x, fields, values) {
 #' @export
 zone_parameters <- function(zone) {
   check_zone(zone)
-  call <- rlang::current_env()
+  collect_parameters(free_fields(unclass(zone)))
+}
+
+# The parameters of free fields, each once, under their names.
+collect_parameters <- function(fields, call = rlang::caller_env()) {
   found <- list()
-  for (field in free_fields(unclass(zone))) {
+  for (field in fields) {
     x <- field$free
     known <- found[[x$name]]
     if (!is.null(known) && !identical(known$prior, x$prior)) {

@@ -225,6 +225,38 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// network_simulate_
+Eigen::MatrixXd network_simulate_(Rcpp::List network, Eigen::MatrixXd coefficients, Eigen::MatrixXd drivers, Eigen::VectorXd hold, Rcpp::List options, Rcpp::List context);
+RcppExport SEXP _amiss_network_simulate_(SEXP networkSEXP, SEXP coefficientsSEXP, SEXP driversSEXP, SEXP holdSEXP, SEXP optionsSEXP, SEXP contextSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< Rcpp::List >::type network(networkSEXP);
+    Rcpp::traits::input_parameter< Eigen::MatrixXd >::type coefficients(coefficientsSEXP);
+    Rcpp::traits::input_parameter< Eigen::MatrixXd >::type drivers(driversSEXP);
+    Rcpp::traits::input_parameter< Eigen::VectorXd >::type hold(holdSEXP);
+    Rcpp::traits::input_parameter< Rcpp::List >::type options(optionsSEXP);
+    Rcpp::traits::input_parameter< Rcpp::List >::type context(contextSEXP);
+    rcpp_result_gen = Rcpp::wrap(network_simulate_(network, coefficients, drivers, hold, options, context));
+    return rcpp_result_gen;
+END_RCPP
+}
+// network_slopes_
+Eigen::MatrixXd network_slopes_(Rcpp::List network, Eigen::VectorXd coefficients, Eigen::MatrixXd directions, Eigen::MatrixXd drivers, Eigen::VectorXd hold, Rcpp::List options);
+RcppExport SEXP _amiss_network_slopes_(SEXP networkSEXP, SEXP coefficientsSEXP, SEXP directionsSEXP, SEXP driversSEXP, SEXP holdSEXP, SEXP optionsSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< Rcpp::List >::type network(networkSEXP);
+    Rcpp::traits::input_parameter< Eigen::VectorXd >::type coefficients(coefficientsSEXP);
+    Rcpp::traits::input_parameter< Eigen::MatrixXd >::type directions(directionsSEXP);
+    Rcpp::traits::input_parameter< Eigen::MatrixXd >::type drivers(driversSEXP);
+    Rcpp::traits::input_parameter< Eigen::VectorXd >::type hold(holdSEXP);
+    Rcpp::traits::input_parameter< Rcpp::List >::type options(optionsSEXP);
+    rcpp_result_gen = Rcpp::wrap(network_slopes_(network, coefficients, directions, drivers, hold, options));
+    return rcpp_result_gen;
+END_RCPP
+}
 // calibrate_paper_
 Rcpp::List calibrate_paper_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& emulator_list, const Rcpp::List& control, const Rcpp::List& context_list);
 RcppExport SEXP _amiss_calibrate_paper_(SEXP dataSEXP, SEXP priorsSEXP, SEXP emulator_listSEXP, SEXP controlSEXP, SEXP context_listSEXP) {
@@ -316,6 +348,8 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_draws_within_", (DL_FUNC) &_amiss_draws_within_, 6},
     {"_amiss_response_evidence_", (DL_FUNC) &_amiss_response_evidence_, 6},
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
+    {"_amiss_network_simulate_", (DL_FUNC) &_amiss_network_simulate_, 6},
+    {"_amiss_network_slopes_", (DL_FUNC) &_amiss_network_slopes_, 6},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
     {"_amiss_fictitious_condition_", (DL_FUNC) &_amiss_fictitious_condition_, 2},
     {"_amiss_paper_discrepancy_", (DL_FUNC) &_amiss_paper_discrepancy_, 4},
