@@ -142,7 +142,7 @@ print.amiss_network <- function(x, ...) on_stdout(x, {
   say_bullets(vapply(shown, format, ""))
   if (length(x$components) > length(shown)) say_bullets(paste(length(x$components) - length(shown), "more parts"))
   cli::cli_bullets(c("*" = "drivers: {.field {driver_names(x)}}",
-                     ">" = "next: {.fun amiss}, or {.fun add_component} for a mechanism"))
+                     ">" = "next: {.fun upgrade_model}, or {.fun add_component} for a mechanism"))
 })
 
 #' @export

@@ -88,7 +88,7 @@ house_mechanisms <- list(
   function(house) {
     capacity <- from_nothing("C_mass", 3 * house$capacity, "kWh/K", "capacity of the mass inside")
     conductance <- about("H_mass", 5 * house$loss, "kW/K", "conductance between the air and the mass inside")
-    house_mechanism("interior mass", c(house$heating, house$sun, house$outdoors),
+    house_mechanism("interior mass", as.character(c(house$heating, house$sun, house$outdoors)),
                     "Something inside takes up heat and gives it back.",
                     network_node("mass", capacity), network_link(house$air, "mass", conductance = conductance))
   },

@@ -33,18 +33,28 @@ run_search <- function(search, context) {
 
 descend <- function(search, context) {
   while (!finished(search)) {
-    search <- propose(search, context)
+    search <- propose(with_given_slopes(search), context)
     if (finished(search)) break
     made <- with_runs(search$model, rbind(search$proposal), context)
     search$model <- made$model
     search <- accept(search, made$at, context)
     if (!finished(search) && needs_slopes(search)) search <- renew_slopes(search, context)
   }
+  search <- with_given_slopes(search)
   search$slopes <- secant_slopes(search$model, search$at, search$reference)
   search
 }
 
 finished <- function(search) search$status != "going"
+
+# A simulator that knows its slopes gives them at each run that the search has come to.
+with_given_slopes <- function(search) {
+  z <- search$model$runs$z[search$at, ]
+  if (search$reference$stale == 0 && all(search$reference$z == z)) return(search)
+  known <- given_slopes(search$model, z)
+  if (!is.null(known)) search$reference <- list(z = z, slopes = known, stale = 0)
+  search
+}
 
 # Slopes by differences cost a run a parameter: they are worth it if steps failed in a row, or if as many were made and
 # some of them were poor.

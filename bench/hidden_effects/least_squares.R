@@ -45,13 +45,15 @@ cube_slopes <- function(error_at, unit, error, step = 1e-4) {
   sweep(errors - error, 2, step, "/")
 }
 
+# Output at places in the cube, one a row; the simulator carries the length of its rows as `step`.
+runs_in_cube <- function(simulator, unit, drivers) {
+  values <- amiss:::unit_to_values(unit, amiss::free_parameters(simulator))
+  amiss::simulate_runs(simulator, values, drivers, simulator$step)
+}
+
 # The simulator's parameters fitted to a series without noise at some rows of its drivers.
 adapt_to <- function(simulator, series, drivers, rows, starts) {
-  error_at <- function(unit) {
-    values <- amiss:::unit_to_values(unit, simulator$parameters)
-    output <- function(i) simulator$f(values[i, ], drivers)[rows]
-    vapply(seq_len(nrow(unit)), output, numeric(length(rows))) - series[rows]
-  }
+  error_at <- function(unit) runs_in_cube(simulator, unit, drivers)[rows, , drop = FALSE] - series[rows]
   least_squares_in_cube(error_at, starts)
 }
 
@@ -77,7 +79,7 @@ best_on_record <- function(simulator, measurements, seed, starts = 5, known = NU
 #' @param most RMS of the largest effect, from most_left().
 #' @return size, effect, noise, achieved.
 hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, limits, most) {
-  plain <- base$f(amiss:::unit_to_values(t(unit), base$parameters)[1, ], drivers)
+  plain <- runs_in_cube(base, t(unit), drivers)[, 1]
   last <- unit
   rms_at <- function(size, starts = list(unit, last)) {
     fit <- adapt_to(base, plain + effect_at(size), drivers, rows, starts)
@@ -105,7 +107,7 @@ hide_effect <- function(effect_at, base, unit, drivers, rows, strength, noise, l
 # What the parameters leave of the largest effect. Worlds in which that is below the least noise that the wanted
 # strength allows are drawn again, a few times, as nobody could tell them from worlds without an effect.
 most_left <- function(effect_at, base, unit, drivers, rows) {
-  plain <- base$f(amiss:::unit_to_values(t(unit), base$parameters)[1, ], drivers)
+  plain <- runs_in_cube(base, t(unit), drivers)[, 1]
   adapt_to(base, plain + effect_at(1), drivers, rows, list(unit, rep(0.5, length(unit))))$rms
 }
 

@@ -49,7 +49,7 @@ network_topologies <- c("one wall", "lined wall", "layered wall", "thick wall", 
 #' @param radiant Share of the heating that reaches the inner surface of the wall.
 base_network <- function(topology, scale = 1, flat = FALSE, radiant = 0) {
   network <- list(topology = topology, scale = scale, flat = flat, pieces = character(), parameters = list(),
-                  fixed = c(R_ground = 12 / scale), start = c(held = 20, remembered = 10))
+                  fixed = c(R_ground = 12 / scale), start = c(held = 20))
   capacity <- function(network, name, centre, label) {
     add_parameter(network, decade(name, centre * scale, "kWh/K", label, flat))
   }
@@ -101,10 +101,14 @@ base_network <- function(topology, scale = 1, flat = FALSE, radiant = 0) {
     network <- add_gain(network, "floor", "Gv", 1e-3, "A_floor")
   }
   if (radiant > 0) network <- add_gain(network, inner, "P", radiant)
-  network <- add_gain(network, "air", "P", 1 - radiant)
-  # The air was held at a temperature before the record began; what outdoor temperature the rest remembers is not known.
-  add_parameter(network, amiss::free("remembered", amiss::normal(0, 1.5, -4.5, 4.5), "K",
-                                     "outdoor temperature that the walls remember, over that of the first day"))
+  add_gain(network, "air", "P", 1 - radiant)
+}
+
+# The air was held at a temperature before the record began; what outdoor temperature the rest remembers is not known.
+with_past <- function(network, held, first_day) {
+  network$start[["held"]] <- held
+  prior <- amiss::normal(first_day, 1.5, first_day - 4.5, first_day + 4.5)
+  add_parameter(network, amiss::free("remembered", prior, "degC", "outdoor temperature that the walls remember"))
 }
 
 # The mechanisms. The first parameter of each is its extent, zero where the mechanism is absent.
@@ -161,7 +165,7 @@ network_plan <- function(network) {
 }
 
 # Temperature of the air, averaged over each step, driven by conditions that are constant over a step: exact, mode by
-# mode.
+# mode. The truth is computed so, the models are the package's own networks.
 network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
   n <- plan$n
   values <- c(values, plan$fixed)
@@ -183,7 +187,7 @@ network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
   }
   # Steady before the record: the air was held, the rest between it and what it remembers of outdoors.
   held <- plan$start[["held"]]
-  outdoors <- plan$start[["remembered"]] + values[["remembered"]]
+  outdoors <- values[["remembered"]]
   start <- c(held, solve(loss[-1, -1, drop = FALSE], gain[-1, 1] * outdoors - loss[-1, 1] * held))
   for (l in seq_along(plan$gain_node)) {
     parameter <- plan$gain_parameter[l]
@@ -214,30 +218,40 @@ lift_per_kw <- function(network, values) {
   rise(heated) - rise(0 * heated)
 }
 
-#' A simulator of a network: a function_simulator() that carries the network it was built from.
+#' The package's simulator of a network, which carries the description that it was built from.
 #' @param step Length of a row of the drivers in hours.
 network_simulator <- function(network, step, parameters = network$parameters) {
-  f <- network_function(network_plan(network), step)
-  named <- list(boundary = network_conditions, name = network$topology)
-  built <- do.call(amiss::function_simulator, c(list(f), unname(parameters), named))
+  field <- function(name, factor = 1) {
+    if (name %in% names(parameters)) parameters[[name]] * factor else network$fixed[[name]] * factor
+  }
+  place <- function(node) if (node == "outside") "Te" else node
+  nodes <- Map(function(node, capacity, share) {
+    amiss::network_node(node, field(capacity, share), start = if (node == "air") network$start[["held"]])
+  }, network$nodes$node, network$nodes$capacity, network$nodes$share)
+  links <- Map(function(from, to, parameter, conductance) {
+    if (conductance) amiss::network_link(from, place(to), conductance = field(parameter))
+    else amiss::network_link(from, place(to), resistance = field(parameter))
+  }, network$links$from, network$links$to, network$links$parameter, network$links$conductance)
+  gains <- Map(function(node, driver, factor, parameter) {
+    amiss::network_gain(node, driver, if (is.na(parameter)) factor else field(parameter, factor))
+  }, network$gains$node, network$gains$driver, network$gains$factor, network$gains$parameter)
+  parts <- unname(c(nodes, links, gains))
+  before <- list(Te = field("remembered"), P = 0)
+  if ("Gv" %in% network$gains$driver) before$Gv <- 0
+  built <- do.call(amiss::network, c(parts, list(output = "air", before = before, hold = FALSE,
+                                                 name = network$topology)))
   built$network <- network
   built$step <- step
   built
-}
-
-# A scope of its own, so that the function carries these two and nothing else.
-network_function <- function(plan, step) {
-  force(plan)
-  force(step)
-  function(values, drivers) network_output(plan, values, drivers[, network_conditions, drop = FALSE], step)
 }
 
 # The model with one more piece; parameters that it has, whatever their priors have become, stay as they are.
 network_with <- function(model, piece) {
   network <- network_pieces[[piece]](model$network)
   network$pieces <- c(network$pieces, piece)
-  own <- network$parameters[setdiff(names(network$parameters), names(model$parameters))]
-  network_simulator(network, model$step, c(model$parameters, own))
+  known <- amiss::free_parameters(model)
+  own <- network$parameters[setdiff(names(network$parameters), names(known))]
+  network_simulator(network, model$step, c(known, own))
 }
 
 network_catalogue <- function() {
@@ -284,7 +298,7 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
   network <- draw_network_base()
   fine <- 5L
   weather <- draw_network_weather(days, step, fine)
-  network$start[] <- c(stats::runif(1, 18, 23), mean(weather[seq_len(24 * fine / step), "Te"]))
+  network <- with_past(network, stats::runif(1, 18, 23), mean(weather[seq_len(24 * fine / step), "Te"]))
   base <- network_simulator(network, step)
   hours <- seq_len(round(24 * days / step)) * step
   warmup <- if (days < 10) 24 else 48
@@ -293,8 +307,8 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
   heating <- weather[, "P"]
   limits <- c(0.02, 0.3)
   for (attempt in 1:20) {
-    unit <- true_unit(base$parameters)
-    values <- amiss:::unit_to_values(t(unit), base$parameters)[1, ]
+    unit <- true_unit(amiss::free_parameters(base))
+    values <- amiss:::unit_to_values(t(unit), amiss::free_parameters(base))[1, ]
     # A heater of the size of the house: on for good, it would lift it by 15 to 30 K.
     weather[, "P"] <- heating * stats::runif(1, 15, 30) / lift_per_kw(network, values)
     drivers <- block_means(weather, fine)
@@ -314,7 +328,8 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
     }
     if (kind == "none") break
     true <- network_with(real$simulator, kind)
-    new <- true$parameters[setdiff(names(true$parameters), names(real$simulator$parameters))]
+    known <- names(amiss::free_parameters(real$simulator))
+    new <- amiss::free_parameters(true)[setdiff(names(amiss::free_parameters(true)), known)]
     other <- amiss:::unit_to_values(t(true_unit(new)), new)[1, ]
     at_size <- function(size) replace(other, 1, 0.95 * size * new[[1]]$prior$upper)
     effect_at <- function(size) run_truth(true, c(real$values, at_size(size))) - plain

@@ -56,7 +56,8 @@ best_rmse <- function(world) {
   if (!world$family %in% c("network", "runoff")) return(NA)
   true <- Reduce(function(model, k) world$catalogue[[k]]$edit(model), world$kinds, world$base)
   values <- c(world$values, unlist(lapply(unname(world$effects), function(e) e[names(e) != "size"])))
-  unit <- vapply(names(true$parameters), function(n) amiss:::prior_cdf(true$parameters[[n]]$prior, values[[n]]), 0)
+  parameters <- amiss::free_parameters(true)
+  unit <- vapply(names(parameters), function(n) amiss:::prior_cdf(parameters[[n]]$prior, values[[n]]), 0)
   best_on_record(true, world$measurements, fit_seed(world), starts = 3, known = list(unname(unit)))$rms
 }
 

@@ -18,6 +18,7 @@ with_second_zone <- function(base) {
   network <- add_link(network, "room_wall", "outside", "R_room_outside")
   network <- add_link(network, "air", "room", "H_door", conductance = TRUE)
   network <- add_gain(network, "room", "P", share)
+  network$fixed <- c(network$fixed, values)
   list(simulator = network_simulator(network, base$step), values = values)
 }
 

@@ -6,7 +6,7 @@ namespace amiss::network {
 
 namespace {
 
-constexpr Eigen::Index kBlock = 256;
+constexpr Eigen::Index kRows = 256;
 
 Eigen::VectorXd flat(const Eigen::MatrixXd& m) { return Eigen::Map<const Eigen::VectorXd>(m.data(), m.size()); }
 
@@ -42,7 +42,7 @@ Eigen::Map<const Eigen::MatrixXd> RowPropagators::at(Eigen::Index r) {
 }
 
 void RowPropagators::fill(Eigen::Index from) {
-  const Eigen::Index count = std::min(kBlock, drivers_.rows() - from);
+  const Eigen::Index count = std::min(kRows, drivers_.rows() - from);
   first_ = from;
   if (series_) {
     block_ = (*series_)(drivers_.col(modulators_[0]).segment(from, count));

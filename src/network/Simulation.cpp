@@ -16,6 +16,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr Index kBlock = 256;
+
 // The state, and its slopes along directions.
 struct State {
   VectorXd x;
@@ -121,13 +123,49 @@ MatrixXd inputs_of(const Eigen::Ref<const MatrixXd>& drivers, bool linear) {
   return out;
 }
 
+// x_1 = A x_0 + f, y = c x_0 + g for the columns [f; g] of `forcing`; of n states, unrolled if they are few.
+template <int n>
+void recur(const Eigen::Ref<const MatrixXd>& p, const MatrixXd& forcing, VectorXd& state, double* output) {
+  const Index high = n == Eigen::Dynamic ? state.size() : n;
+  const Eigen::Matrix<double, n, n> a = p.topLeftCorner(high, high);
+  const Eigen::Matrix<double, 1, n> c = p.row(high).head(high);
+  Eigen::Matrix<double, n, 1> x = state, next(high);
+  for (Index j = 0; j < forcing.cols(); ++j) {
+    output[j] = c.dot(x) + forcing(high, j);
+    next.noalias() = a * x;
+    x = next + forcing.col(j).head(high);
+  }
+  state = x;
+}
+
+using Recursion = void (*)(const Eigen::Ref<const MatrixXd>&, const MatrixXd&, VectorXd&, double*);
+
+Recursion recursion_of(Index nodes) {
+  static const Recursion known[] = {recur<1>, recur<2>, recur<3>, recur<4>, recur<5>, recur<6>, recur<7>, recur<8>};
+  return nodes <= 8 ? known[nodes - 1] : recur<Eigen::Dynamic>;
+}
+
 // Goes through the rows, some hundred at a time.
 class Stepper {
  public:
   Stepper(RowPropagators& propagators, const MatrixXd& inputs, Index nodes, Index directions)
       : propagators_(propagators), inputs_(inputs), nodes_(nodes), directions_(directions) {}
 
-  /// Takes the state over row r, asked for in ascending order, and writes output and slopes there.
+  /// Takes the state over rows [from, to), asked for in ascending order, and writes output and slopes there.
+  void run(State& state, Index from, Index to, Run& run) {
+    if (propagators_.same() && directions_ == 0) {
+      const auto p = propagators_.at(from);
+      const Recursion recursion = recursion_of(nodes_);
+      for (Index first = from; first < to; first += kBlock) {
+        forcing_.noalias() = p.rightCols(inputs_.rows()) * inputs_.middleCols(first, std::min(kBlock, to - first));
+        recursion(p, forcing_, state.x, run.output.data() + first);
+      }
+    } else {
+      for (Index r = from; r < to; ++r) step(state, r, run);
+    }
+  }
+
+ private:
   void step(State& state, Index r, Run& run) {
     const auto p = propagators_.at(r);
     const Index high = nodes_ + 1;
@@ -148,9 +186,8 @@ class Stepper {
     run.output[r] = moved_[nodes_];
   }
 
- private:
   void force(const Eigen::Map<const MatrixXd>& p, Index from) {
-    const Index count = std::min<Index>(256, inputs_.cols() - from);
+    const Index count = std::min(kBlock, inputs_.cols() - from);
     first_ = from;
     forcing_.noalias() = p.rightCols(inputs_.rows()) * inputs_.middleCols(from, count);
   }
@@ -205,9 +242,12 @@ Run simulate(const Network& network, const Coefficients& coefficients, const std
   std::optional<RowPropagators> held;
   std::optional<Stepper> holding;
   Run run{VectorXd(drivers.rows()), MatrixXd(drivers.rows(), count)};
-  for (Index r = 0; r < drivers.rows(); ++r) {
+  for (Index r = 0; r < drivers.rows();) {
     if (!is_held(holds, r)) {
-      freely.step(state, r, run);
+      Index to = r + 1;
+      while (to < drivers.rows() && !is_held(holds, to)) ++to;
+      freely.run(state, r, to, run);
+      r = to;
       continue;
     }
     if (!holding) {
@@ -216,7 +256,8 @@ Run simulate(const Network& network, const Coefficients& coefficients, const std
     }
     state.x[output_node] = holds[r];
     state.slopes.row(output_node).setZero();
-    holding->step(state, r, run);
+    holding->run(state, r, r + 1, run);
+    ++r;
   }
   return run;
 }

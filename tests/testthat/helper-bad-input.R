@@ -24,6 +24,8 @@ bad_input_objects <- function() {
                                  cache = tempfile())
   o$room <- zone(zone_wall("wall", 1, zone_layer(0.1, 1, 1e6), outside = "Te"), zone_heater("heater", "P"),
                  zone_infiltration("leak", free("ach", uniform(0, 1)), "Te"), volume = 10)
+  o$network <- network(network_node("air", 1), network_link("air", "Te", free("H", uniform(0, 1))),
+                       network_gain("air", "P"), output = "air")
   o$drivers <- cbind(Te = rep(5, 10), P = rep(100, 10))
   o$catalogue <- catalogue(mechanism("sun", identity, "Gv", "The sun shines in."))
   o$folder <- tempfile("bad-input-")
@@ -47,7 +49,7 @@ valid_calls <- function() {
   upgrade <- list(measurements = o$measurements, runs = 10, control = list(), seed = 1, threads = 1, quiet = TRUE,
                   checkpoint = NULL)
   list(
-    add_component = list(zone = o$room, component = zone_gain("gain", "P")),
+    add_component = list(model = o$room, zone_gain("gain", "P")),
     ais = list(log_likelihood = function(z) -z[, 1]^2, priors = list(a = uniform(0, 1)), control = o$ais, seed = 1,
                gradient = NULL),
     amiss = list(data = o$measurements, design = o$ensemble$values, runs = o$ensemble$outputs, parameters = NULL,
@@ -69,12 +71,12 @@ valid_calls <- function() {
     calibrate_refined = list(ensemble = o$ensemble, measurements = o$measurements, rounds = 0, runs = 10,
                              control = list(), seed = 1, threads = 1, quiet = TRUE),
     catalogue = o$catalogue[1],
-    change_component = list(zone = o$room, name = "heater", capacity = 3),
+    change_component = list(model = o$room, name = "heater", capacity = 3),
     compare_models = c(list(models = list(a = o$simulator), method = "history", truth = NULL), upgrade),
-    component = list(zone = o$room, name = "heater"),
+    component = list(model = o$room, name = "heater"),
     discrepancy = list(fit = o$fit),
     driver_names = list(simulator = o$simulator),
-    drop_component = list(zone = o$room, name = "leak"),
+    drop_component = list(model = o$room, name = "leak"),
     ensemble = list(design = o$ensemble$values, outputs = o$ensemble$outputs,
                     parameters = unname(o$ensemble$parameters),
                     measurements = o$measurements, validation = NULL, time = NULL),
@@ -84,6 +86,14 @@ valid_calls <- function() {
     glance = list(x = o$fit),
     heat_loss_coefficient = list(simulator = o$room, values = cbind(ach = 0.5), drivers = numeric(), outside = 10,
                                  inside = 30),
+    network = list(network_node("air", 1), network_link("air", "Te", 0.1), output = "air", before = list(Te = 5),
+                   hold = TRUE, interpolation = "constant", output_at = "mean", start_hours = 24, name = "a"),
+    network_catalogue = list(network = o$network, air = "air", envelope = NULL, outdoors = "Te", sun = "Gv",
+                             heating = "P", wind = NULL, neighbour = NULL, sun_factor = 1e-3),
+    network_flow = list(from = "a", to = "b", rate = 1, by = NULL, name = "f"),
+    network_gain = list(to = "a", driver = "P", factor = 1, by = NULL, name = "g"),
+    network_link = list(from = "a", to = "b", conductance = 1, resistance = NULL, by = NULL, name = "l"),
+    network_node = list(name = "a", capacity = 1, start = NULL),
     lognormal = list(meanlog = 0, sdlog = 1, lower = 0, upper = Inf),
     measurements = list(data = o$record, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
                         average = NULL,

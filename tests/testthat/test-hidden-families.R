@@ -20,6 +20,10 @@ true_values <- function(world) {
   c(world$values, unlist(lapply(unname(world$effects), function(e) e[names(e) != "size"])))
 }
 
+output_at <- function(simulator, values, drivers) {
+  simulate_runs(simulator, rbind(values[names(free_parameters(simulator))]), drivers, simulator$step)[, 1]
+}
+
 rms <- function(x) sqrt(mean(x^2))
 
 # RMS of the noise that was drawn, at the steps that calibrate.
@@ -70,7 +74,7 @@ test_that("mechanisms stack: parameters are never lost, and where each is at zer
       world <- scope$family_world(family, seed, kind = "none", days = short[[family]])
       expect_length(world$catalogue, 5)
       drivers <- world$measurements$raw$drivers
-      plain <- world$base$f(world$values, drivers)
+      plain <- output_at(world$base, world$values, drivers)
       for (order in list(1:5, c(4, 2, 5, 1, 3))) {
         model <- world$base
         for (entry in world$catalogue[order]) {
@@ -79,12 +83,14 @@ test_that("mechanisms stack: parameters are never lost, and where each is at zer
           expect_identical(free_parameters(model)[names(before)], before, info = entry$name)
           expect_gt(length(free_parameters(model)), length(before))
         }
-        middle <- amiss:::unit_to_values(matrix(0.5, 1, length(model$parameters)), model$parameters)[1, ]
-        added <- function(entry) setdiff(names(entry$edit(world$base)$parameters), names(world$values))
+        parameters <- free_parameters(model)
+        middle <- amiss:::unit_to_values(matrix(0.5, 1, length(parameters)), parameters)[1, ]
+        added <- function(entry) setdiff(names(free_parameters(entry$edit(world$base))), names(world$values))
         extents <- vapply(world$catalogue, function(entry) added(entry)[1], "")
-        expect_equal(model$f(replace(replace(middle, names(world$values), world$values), extents, 0), drivers), plain,
-                     tolerance = 1e-4, info = paste(family, seed))
-        expect_gt(rms(model$f(replace(middle, names(world$values), world$values), drivers) - plain), 1e-3)
+        with_base <- replace(middle, names(world$values), world$values)
+        expect_equal(output_at(model, replace(with_base, extents, 0), drivers), plain, tolerance = 1e-4,
+                     info = paste(family, seed))
+        expect_gt(rms(output_at(model, with_base, drivers) - plain), 1e-3)
       }
     }
   }
@@ -93,9 +99,9 @@ test_that("mechanisms stack: parameters are never lost, and where each is at zer
 test_that("a prior that was changed survives a mechanism", {
   scope <- families_scope()
   world <- scope$family_world("network", 1, kind = "none", days = 5)
-  narrowed <- world$base
-  narrowed$parameters$C_air <- free("C_air", uniform(0.9, 1.1), "kWh/K")
-  expect_identical(world$catalogue[["heater state"]]$edit(narrowed)$parameters$C_air, narrowed$parameters$C_air)
+  narrow <- free("C_air", uniform(0.9, 1.1), "kWh/K")
+  narrowed <- change_component(world$base, "air", capacity = narrow)
+  expect_identical(free_parameters(world$catalogue[["heater state"]]$edit(narrowed))$C_air, narrow)
 })
 
 test_that("the models' coarser steps stay below the noise: a simulator with the true values gives the truth", {
@@ -106,7 +112,7 @@ test_that("the models' coarser steps stay below the noise: a simulator with the 
     for (i in seq_along(kinds)) {
       world <- scope$family_world(family, 10 + i, kind = kinds[i], strength = 1, days = short[[family]])
       own <- world$measurements$raw$use != "warmup"
-      error <- (true_model(world)$f(true_values(world), world$measurements$raw$drivers) - world$clean)[own]
+      error <- (output_at(true_model(world), true_values(world), world$measurements$raw$drivers) - world$clean)[own]
       expect_lt(rms(error), 0.3 * world$noise, label = paste(family, kinds[i]))
     }
   }
