@@ -30,15 +30,14 @@ read_sqlite <- function(output, folder) {
 
 # A variable as it was reported most often, of the weather's run period alone: no design days, no warm-up.
 sqlite_series <- function(column, database, file) {
-  key <- sub(":.*$", "", column)
-  name <- sub("^[^:]*:", "", column)
   known <- DBI::dbGetQuery(database, "SELECT ReportDataDictionaryIndex AS id, KeyValue AS key, Name AS name
                                       FROM ReportDataDictionary")
-  found <- known$id[tolower(known$name) == tolower(name) &
-                    tolower(known$key) == tolower(if (name == column) "" else key)]
+  keyed <- !is.na(known$key) & nzchar(known$key)  # meters have none
+  names <- ifelse(keyed, paste0(known$key, ":", known$name), known$name)
+  found <- known$id[tolower(names) == tolower(column)]
   if (!length(found)) {
-    there <- utils::head(paste0(known$key, ifelse(nzchar(known$key), ":", ""), known$name), 5)
-    stop("there is no variable ", column, " in ", file, "; there: ", shown(paste(there, collapse = ", ")))
+    there <- paste(utils::head(unique(names), 5), collapse = ", ")
+    stop("there is no variable ", column, " in ", file, "; there: ", shown(there))
   }
   series <- lapply(found, function(id) DBI::dbGetQuery(database, run_period_query, params = list(id)))
   series[[which.max(vapply(series, nrow, 0L))]]

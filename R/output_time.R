@@ -8,9 +8,9 @@ by_time <- function(table, output, expected) {
   tried <- stamp_seconds(table, output, expected, ends, step, offset)
   matched <- lapply(tried, function(seconds) match_rows(seconds, ends, step, output$stamps))
   rows <- vapply(matched, function(one) sum(one$count > 0), 0)
-  best <- which(rows == max(rows))
-  best <- matched[[utils::tail(best, 1)]]
-  require_times(best, tried, expected, output, offset)
+  last <- max(which(rows == max(rows)))
+  best <- matched[[last]]
+  require_times(best, tried[[last]], expected, output, offset)
   as.numeric(rowsum(table$value[best$at], best$row, reorder = TRUE)) / best$per_row
 }
 
@@ -18,8 +18,8 @@ by_time <- function(table, output, expected) {
 # belong to none.
 match_rows <- function(seconds, ends, step, stamps) {
   known <- which(!is.na(seconds))
-  own <- if (length(known) > 1) stats::median(diff(seconds[known])) else step
-  per_row <- if (own > 0) step / own else 1
+  own <- own_step(diff(seconds[known]), step)
+  per_row <- step / own
   coarse <- per_row < 0.75
   per_row <- max(1, round(per_row))
   own <- step / per_row
@@ -32,13 +32,21 @@ match_rows <- function(seconds, ends, step, stamps) {
        twice = at[anyDuplicated(round(place[at]))])
 }
 
-require_times <- function(best, tried, expected, output, offset) {
+# The usual step of the output. If rows are missing, it may be longer than that of the record, which the least is not.
+own_step <- function(steps, step) {
+  steps <- steps[steps > 0]
+  if (!length(steps)) return(step)
+  usual <- stats::median(steps)
+  if (usual > step / 0.75) min(steps) else usual
+}
+
+require_times <- function(best, seconds, expected, output, offset) {
   if (best$coarse) stop("the rows of ", output$file, " are further apart than those of the record, ", step_words(
     seq(0, 2) * expected$step_h))
   if (length(best$twice)) stop(output$file, " has a time twice, in its row ", best$twice[1])
   missed <- which(best$count < best$per_row)
   if (!length(missed)) return(invisible())
-  range <- range(unlist(tried), na.rm = TRUE)
+  range <- range(seconds, na.rm = TRUE)
   stop(output$file, " has no row for ", program_time(expected$time[missed[1]], offset), ": ", length(missed), " of ",
        length(expected$time), " times of the record are not in it. Its times go from ", said_time(range[1], expected),
        " to ", said_time(range[2], expected))

@@ -16,10 +16,10 @@
 #'
 #' # Formats of time
 #'
-#' * `NULL`: text in ISO 8601 and the other forms of [measurements()], also ` 07/21  24:00:00` of EnergyPlus, which has
-#'   no year; or numbers that are the `time` of the drivers' CSV, for a record without dates.
-#' * `"seconds"`, `"minutes"`, `"hours"`, `"days"`: numbers since the beginning of the first row of the drivers, as their
-#'   column `hours`.
+#' * `NULL`: text in ISO 8601 and the other forms of [measurements()], also ` 07/21  24:00:00` of EnergyPlus, which
+#'   has no year; or numbers that are the `time` of the drivers' CSV, for a record without dates.
+#' * `"seconds"`, `"minutes"`, `"hours"`, `"days"`: numbers since the beginning of the first row of the drivers, as in
+#'   their column `hours`.
 #' * `"day_of_year"`: decimal days of ESP-r. 1 January 0:00 is 1, noon of 2 January is 2.5.
 #' * `"hours_of_year"`: hours since 1 January 0:00.
 #' * A format of [strptime()]: text, with a year (`"%d.%m.%Y %H:%M"`) or without (`"%d/%m %H:%M"`). Hour 24 ends a day.
@@ -115,8 +115,8 @@ check_output_time <- function(format, stamps, utc_offset, call = rlang::caller_e
 
 #' @export
 print.amiss_program_output <- function(x, ...) on_stdout(x, {
-  of <- if (length(x$column) > 1) paste("the", x$combine, "of ") else ""
-  cli::cli_text("{.strong Output} in {.file {x$file}}: {of}column{?s} {.val {x$column}}")
+  of <- if (length(x$column) > 1) paste("the", x$combine, "of the ") else "the "
+  cli::cli_text("{.strong Output} in {.file {x$file}}: {of}{cli::qty(length(x$column))}column{?s} {.val {x$column}}")
   how <- if (x$sqlite) "by EnergyPlus' own time" else if (is.null(x$time)) "by the number of rows" else
     paste0("by time (column ", listed(x$time), if (!is.null(x$time_format)) paste0(", ", x$time_format), ")")
   say_bullets(paste("matched to the record", how))

@@ -47,8 +47,10 @@ run_values <- function(simulator, values, call = rlang::caller_env()) {
   parameters <- simulator$parameters
   if (is.null(values)) values <- vapply(parameters, function(parameter) prior_quantile(parameter$prior, 0.5), 0)
   check_input(checkmate::check_numeric(values, any.missing = FALSE, finite = TRUE), "values", call = call)
-  check_input(checkmate::check_names(names(values), permutation.of = names(parameters)), "values",
-              "Give a value for each parameter: {.val {names(parameters)}}.", call = call)
+  if (!setequal(names(values), names(parameters)) || anyDuplicated(names(values))) {
+    abort_input(c("{.arg values} has the names {.val {names(values)}}.",
+                  i = "Give a value for each parameter: {.val {names(parameters)}}."), call = call)
+  }
   matrix(values, 1, dimnames = list(NULL, names(values)))
 }
 
