@@ -43,6 +43,7 @@
 #' @param decimal `"."` or `","`.
 #' @param units_rows Rows between the names and the first row of numbers.
 #' @param drop_first,drop_last Rows to leave out at the begin and at the end.
+#' @param transform Function of the values, taken last: `log` for the logarithm of a flow.
 #' @return An object of class `amiss_program_output`.
 #' @examples
 #' # EnergyPlus
@@ -55,23 +56,25 @@
 #' @export
 program_output <- function(file, column, combine = NULL, time = NULL, time_format = NULL, stamps = "end",
                            utc_offset = NULL, skip = 0, comment = "#", separator = NULL, decimal = ".", units_rows = 0,
-                           drop_first = 0, drop_last = 0) {
+                           drop_first = 0, drop_last = 0, transform = NULL) {
   check_input(checkmate::check_string(file, min.chars = 1), "file")
   check_inside(c(file = file))
   check_output_columns(column, combine, time)
   check_output_time(time_format, stamps, utc_offset)
   check_input(checkmate::check_string(comment), "comment")
-  check_table_options(separator, decimal)
+  check_table_options(separator, decimal, rlang::current_env())
+  check_input(checkmate::check_string(decimal), "decimal", "It is {.val .} or {.val ,}, in quotes.")
   counts <- list(skip = skip, units_rows = units_rows, drop_first = drop_first, drop_last = drop_last)
   for (name in names(counts)) {
     count <- counts[[name]]
     check_input(checkmate::check_int(count, lower = 0, upper = 1e6), name, "It is a number of rows.")
   }
+  check_input(checkmate::check_function(transform, null.ok = TRUE), "transform", "Give for example {.code log}.")
   sqlite <- grepl("[.](sql|sqlite|db)$", file)
   if (sqlite) check_sqlite(column)
   structure(c(list(file = file, column = column, combine = combine, time = time, time_format = time_format,
                    stamps = stamps, utc_offset = utc_offset, comment = comment, separator = separator,
-                   decimal = decimal, sqlite = sqlite), counts), class = "amiss_program_output")
+                   decimal = decimal, sqlite = sqlite, transform = transform), counts), class = "amiss_program_output")
 }
 
 check_output_columns <- function(column, combine, time, call = rlang::caller_env()) {
@@ -126,7 +129,11 @@ print.amiss_program_output <- function(x, ...) on_stdout(x, {
 # of these rows and the program's clock. An error says why there is none.
 read_run_output <- function(output, folder, expected) {
   if (!inherits(output, "amiss_program_output")) return(read_output(output, folder, expected$rows))
-  if (output$sqlite) return(by_time(read_sqlite(output, folder), output, expected))
-  table <- read_output_table(output, folder, expected$rows)
-  if (is.null(output$time)) table$value else by_time(table, output, expected)
+  value <- if (output$sqlite) {
+    by_time(read_sqlite(output, folder), output, expected)
+  } else {
+    table <- read_output_table(output, folder, expected$rows)
+    if (is.null(output$time)) table$value else by_time(table, output, expected)
+  }
+  if (is.null(output$transform)) value else output$transform(value)
 }

@@ -28,6 +28,9 @@ render_run <- function(simulator, values = NULL, folder, measurements = NULL, se
   }
   check_folder_possible(folder, "folder")
   values <- run_values(simulator, values)
+  if (is.null(measurements) && !identical(segment, 1)) {
+    abort_input("{.arg segment} = {seen(segment)} needs {.arg measurements}, whose segment it is.")
+  }
   given <- if (is.null(measurements)) no_drivers() else drivers_of(simulator, measurements, segment)
   if (is.null(measurements)) simulator$drivers <- list()
   plan <- plan_runs(simulator, values, given$drivers, given$step_h, given$time)

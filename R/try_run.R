@@ -123,7 +123,7 @@ start_forgotten <- function(simulator, centre, measurements, threads) {
   if (anyNA(apart)) return(list(rows = NA, hours = NA, warmup = NA, settled = NA))
   last <- max(which(apart >= measurements$noise_sd), 0)
   settled <- last < length(later)
-  warmup <- sum(measurements$raw$use[within] == "warmup") * measurements$raw$step_h
+  warmup <- (match(TRUE, measurements$block[within] %in% rows) - 1) * measurements$raw$step_h
   hours <- last * measurements$raw$step_h
   list(rows = if (settled) last else NA, hours = if (settled) hours else NA, warmup = warmup, first = apart[1],
        settled = settled && hours <= warmup + 1e-9, watched = length(later))
@@ -165,7 +165,7 @@ say_start <- function(start) {
     mark <- if (start$settled) "v" else "!"
     told <- if (start$settled) "" else ": give {.arg warmup} or {.arg lead_in} that length"
     cli::cli_bullets(
-      stats::setNames(paste0("The start is forgotten after {start$rows} row{?s} ({short(start$hours)} h);",
-                                            " the record's warm-up is {short(start$warmup)} h", told, "."), mark))
+      stats::setNames(paste0("The start is forgotten after {start$rows} row{?s} ({short(start$hours)} h); ",
+                                            "{short(start$warmup)} h are run before a value is compared", told, "."), mark))
   }
 }

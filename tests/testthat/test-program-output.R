@@ -27,6 +27,7 @@ test_that("several columns are added or averaged", {
   lines <- c("quick slow", "1 2", "3 4", "5 6")
   expect_identical(read_lines(lines, c("quick", "slow"), combine = "sum"), c(3, 7, 11))
   expect_identical(read_lines(lines, c("quick", "slow"), combine = "mean"), c(1.5, 3.5, 5.5))
+  expect_identical(read_lines(lines, c("quick", "slow"), combine = "sum", transform = sqrt), sqrt(c(3, 7, 11)))
   expect_error(program_output("o.txt", c("quick", "slow")), "combine", class = "amiss_error_input")
 })
 

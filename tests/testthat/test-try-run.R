@@ -24,7 +24,7 @@ test_that("time, parameters that act, and the start are looked at, with few runs
   expect_equal(look$start$rows, 19)
   expect_false(look$start$settled)  # the warm-up is 12 h
   expect_equal(look$study_s, 200 * look$seconds)
-  expect_match(printed(look), "gain.*\"idle\" does not act.*forgotten after 19 rows.*warm-up is 12 h.*give")
+  expect_match(printed(look), "gain.*\"idle\" does not act.*forgotten after 19 rows.*12 h are run before.*give")
   expect_lte(length(utils::capture.output(print(look))), 15)
 })
 
