@@ -237,7 +237,8 @@ with_template <- function(simulator, templates, ..., boundary = character()) {
 print.amiss_program_simulator <- function(x, ...) on_stdout(x, {
   steps <- as_steps(x$command)
   programs <- unique(vapply(steps, function(step) step$command[1], ""))
-  cli::cli_text(paste("{.strong Simulator} {.val {x$name}} (the {cli::qty(length(programs))}program{?s} {.file {programs}}) with",
+  cli::cli_text(
+    paste("{.strong Simulator} {.val {x$name}} (the {cli::qty(length(programs))}program{?s} {.file {programs}}) with",
                       "{length(x$parameters)} free parameter{?s}"))
   say_bullets(vapply(utils::head(x$parameters, 6), format, ""))
   if (length(x$parameters) > 6) say_bullets(paste("and", length(x$parameters) - 6, "more parameters"))

@@ -165,7 +165,8 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
 print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Simulator} {.val {x$name}} (an R function) with {length(x$parameters)} free parameter{?s}")
   say_bullets(vapply(utils::head(x$parameters, 10), format, ""))
-  cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
+  cli::cli_bullets(c("*" = if (length(x$boundary)) "driven by {.field {x$boundary}}",
+                     ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
 
 #' What a simulator needs and does

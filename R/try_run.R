@@ -67,7 +67,7 @@ quantile_values <- function(parameters, u) {
 
 looked_uses <- c("calibrate", "validate")
 
-# list(y, seconds, found, failed) at the medians: its time is that of a run that was kept, if it was.
+# list(y, seconds, found, failed) at the medians.
 first_run <- function(simulator, centre, measurements, threads) {
   said <- character()
   found <- found_so_far()
@@ -87,7 +87,9 @@ first_run <- function(simulator, centre, measurements, threads) {
   failed <- if (length(lost)) {
     c(cli::ansi_strip(said), if (!length(said)) paste("Its output is not finite in row", lost[1], "of", length(run)))
   }
-  list(y = run[, 1, drop = TRUE], seconds = max(seconds, if (found) last_seconds()), found = found, failed = failed)
+  # A program's run is timed by itself, also if it was made before.
+  if (last_seconds() > 0) seconds <- last_seconds()
+  list(y = run[, 1, drop = TRUE], seconds = seconds, found = found, failed = failed)
 }
 
 # The output at two values of each parameter, the others at their medians.
@@ -158,14 +160,13 @@ say_acting <- function(x) {
 say_start <- function(start) {
   if (is.na(start$settled)) return(cli::cli_bullets(c("x" = "A run that starts later fails.")))
   if (is.na(start$rows)) {
-    cli::cli_bullets(
-      c("!" = paste("The start is not forgotten within {start$watched} rows: the simulator remembers longer",
-                                   "than the record, or its output depends on when it starts.")))
+    told <- c("!" = paste("The start is not forgotten within {start$watched} rows: the simulator remembers longer than",
+                          "the record, or its output depends on when it starts."))
   } else {
-    mark <- if (start$settled) "v" else "!"
-    told <- if (start$settled) "" else ": give {.arg warmup} or {.arg lead_in} that length"
-    cli::cli_bullets(
-      stats::setNames(paste0("The start is forgotten after {start$rows} row{?s} ({short(start$hours)} h); ",
-                                            "{short(start$warmup)} h are run before a value is compared", told, "."), mark))
+    told <- paste("The start is forgotten after {start$rows} row{?s} ({short(start$hours)} h);",
+                  "{short(start$warmup)} h are run before a value is compared")
+    more <- if (!start$settled) ": give {.arg warmup} or {.arg lead_in} that length"
+    told <- stats::setNames(paste0(told, more, "."), if (start$settled) "v" else "!")
   }
+  cli::cli_bullets(told)
 }
