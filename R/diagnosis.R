@@ -452,7 +452,9 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
                                   if (has_validation(x)) "{errors(g$rmse_validation)} held out"
                                   else "no data held out",
                                   if (is_several(x$measurements)) paste(",", noise_unit)),
-                     "*" = if (x$runs_total) "{x$runs_total} runs of the simulator",
+                     "*" = if (x$runs_total) paste0("{x$runs_total} runs of the simulator",
+                                                    if (isTRUE(x$runs_found > 0))
+                                                      ", {x$runs_found} found in its cache"),
                      "*" = "stopped because {x$stopped_because}",
                      ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
 })

@@ -165,7 +165,8 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
 print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Simulator} {.val {x$name}} (an R function) with {length(x$parameters)} free parameter{?s}")
   say_bullets(vapply(utils::head(x$parameters, 10), format, ""))
-  cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
+  cli::cli_bullets(c("*" = if (length(x$boundary)) "driven by {.field {x$boundary}}",
+                     ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
 
 #' What a simulator needs and does
@@ -331,25 +332,60 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
 # Runs of simulators in this session, by which a study says what it cost.
 ledger <- new.env(parent = emptyenv())
 ledger$runs <- 0
+ledger$found <- 0
+ledger$seconds <- 0
 
 runs_so_far <- function() ledger$runs
 
 count_runs <- function(runs) ledger$runs <- ledger$runs + runs
 
+# Runs that were not made, as a program's cache had them.
+found_so_far <- function() ledger$found
+
+# A method of simulate_runs() that keeps runs notes of each whether it was found, and the seconds that it took when it
+# was made.
+note_found <- function(found, seconds) {
+  ledger$last <- found
+  ledger$seconds <- ledger$seconds + sum(seconds)
+}
+
+# Seconds of the runs that were counted last, when they were made; 0 for simulators that keep none.
+last_seconds <- function() ledger$seconds
+
+# Evaluates the code that makes `runs` runs, and counts those of which a part had to be made. `found()` is to be called
+# after each part. If the code stops, all count.
+counting_runs <- function(runs, code) {
+  all_found <- rep(TRUE, runs)
+  ledger$seconds <- 0
+  finished <- FALSE
+  on.exit(count_runs(if (finished) sum(!all_found) else runs))
+  part <- function(made) {
+    ledger$last <- NULL
+    force(made)
+    all_found <<- all_found & if (length(ledger$last) == runs) ledger$last else FALSE
+    made
+  }
+  result <- code(part)
+  finished <- TRUE
+  ledger$found <- ledger$found + sum(all_found)
+  result
+}
+
 # Runs over the segments that hold rows of the wanted uses, averaged like the measurements: one row for each used row.
 simulate_measured <- function(simulator, values, measurements, uses, threads, call = rlang::caller_env()) {
   check_driver_columns(simulator, measurements, call)
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
-  count_runs(nrow(values))
   out <- matrix(NaN, length(measurements$y), nrow(values))
   pieces <- simulated_rows(measurements, rows)
   over <- if (length(pieces) > 1) paste0(" (", length(pieces), " segments)")
-  counted(paste0("runs of the simulator", over), length(pieces) * nrow(values), for (i in seq_along(pieces)) {
-    within <- pieces[[i]]
-    fine <- simulate_rows(simulator, values, measurements$raw, within, threads, call)
-    averaged <- block_means(fine, measurements$block[within], measurements$per_step)
-    out[as.integer(rownames(averaged)), ] <- averaged
-    piece_done(i * nrow(values))
+  counting_runs(nrow(values), function(part) {
+    counted(paste0("runs of the simulator", over), length(pieces) * nrow(values), for (i in seq_along(pieces)) {
+      within <- pieces[[i]]
+      fine <- part(simulate_rows(simulator, values, measurements$raw, within, threads, call))
+      averaged <- block_means(fine, measurements$block[within], measurements$per_step)
+      out[as.integer(rownames(averaged)), ] <<- averaged
+      piece_done(i * nrow(values))
+    })
   })
   out[rows, , drop = FALSE]
 }
@@ -383,9 +419,10 @@ simulate_rows <- function(simulator, values, raw, rows, threads, call) {
                               "as a whole.")), call = call)
     }
   }
-  hold <- ifelse(raw$use[rows] == "warmup", raw$y[rows], NA_real_)
-  simulate_runs(simulator, values, raw$drivers[rows, needed, drop = FALSE], raw$step_h, hold, threads,
-                time = raw$time[rows], segment = raw$segment[rows[1]])
+  given <- segment_drivers(simulator, raw, rows, needed)
+  runs <- simulate_runs(simulator, values, given$drivers, raw$step_h, given$hold, threads, time = given$time,
+                        segment = raw$segment[rows[1]])
+  if (given$lead) runs[-seq_len(given$lead), , drop = FALSE] else runs
 }
 
 # Rows of the raw record averaged like the measurements; the names of the rows are those of the blocks.

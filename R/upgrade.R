@@ -51,7 +51,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   Bayes factor if neither model has an unknown response to the conditions of the mechanism; `beside_unknown` is that
 #'   with the response in both, which imitates the mechanism. If a trial is not trusted, both hold the second factor.
 #'   The result also has the `named_cause`, the `gain`, why the loop stopped (`stopped_because`, in a word
-#'   `stopped_id`) and how many runs of the simulator it took (`runs_total`). Each model that adopted a mechanism
+#'   `stopped_id`) how many runs of the simulator it took (`runs_total`), and how
+#'   many more a program's cache had (`runs_found`). Each model that adopted a mechanism
 #'   has a `verdict`: `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks
 #'   against it; or `"stand-in"`, if held-out data do not improve (`held_out_gain`, with its standard error). `inert`
 #'   names parameters of the base model that the last model no longer uses. `steps` has, for each record, what
@@ -119,7 +120,8 @@ finish_upgrade <- function(state, context) {
                  gain = upgrade_gain(models), stopped_because = state$stopped$words,
                  stopped_id = state$stopped$id,
                  stopped_reason = state$stopped$reason %||% state$stopped$words, inert = inert_parameters(state),
-                 runs_total = runs_spent(context), measurements = measurements, seed = context$seed,
+                 runs_total = runs_spent(context), runs_found = runs_found(context), measurements = measurements,
+                 seed = context$seed,
                  control = context$control), class = "amiss_upgrade")
 }
 

@@ -30,6 +30,8 @@ bad_input_objects <- function() {
   o$catalogue <- catalogue(mechanism("sun", identity, "Gv", "The sun shines in."))
   o$folder <- tempfile("bad-input-")
   dir.create(o$folder)
+  o$epw <- file.path(o$folder, "weather.epw")
+  writeLines(c("LOCATION,A,-,DEU,None,0,48,11,1,0", rep("-", 6), "DATA PERIODS,1,1", "2001,1,1,1,60,?9,5"), o$epw)
   bad_input$objects <- o
 }
 
@@ -80,6 +82,9 @@ valid_calls <- function() {
     ensemble = list(design = o$ensemble$values, outputs = o$ensemble$outputs,
                     parameters = unname(o$ensemble$parameters),
                     measurements = o$measurements, validation = NULL, time = NULL),
+    epw_columns = list(),
+    epw_weather = list(template = o$epw, columns = c(dry_bulb = "Te"), file = "w.epw", instant = character(),
+                       utc_offset = NULL),
     free = list(name = "a", prior = uniform(0, 1), unit = "K", label = "A"),
     free_parameters = list(simulator = o$simulator),
     function_simulator = list(f = o$function_simulator$f, o$gain, boundary = "Te", name = "a"),
@@ -110,11 +115,19 @@ valid_calls <- function() {
     program_simulator = list(command = c("awk", "{{gain}}"), o$gain, output = c(file = "a", column = "b"),
                              templates = list(),
                              boundary = "Te", drivers = "d.csv", time_limit = 1, retries = 0, cache = "runs",
-                             version = "", name = "p", size_limit = 10),
+                             version = "", name = "p", size_limit = 10, files = NULL, width = NULL, lead_in = 0,
+                             before = "record", keep = 0),
+    program_output = list(file = "o.csv", column = "Ti", combine = NULL, time = "t", time_format = NULL, stamps = "end",
+                          utc_offset = NULL, skip = 0, comment = "#", separator = NULL, decimal = ".", units_rows = 0,
+                          drop_first = 0, drop_last = 0, transform = NULL),
+    program_step = list(command = "awk", input = NULL, stdout = NULL, folder = NULL, makes = NULL, needs = NULL,
+                        fails_if = NULL, log = NULL, time_limit = NULL, status = 0),
     read_calibro = list(folder = o$folder, parameters = NULL, relative = FALSE, step_h = 1, files = NULL),
     read_study = list(path = system.file("studies", "paper_synthetic.yml", package = "amiss"), quiet = TRUE,
                       trust = FALSE),
     refine_ensemble = list(ensemble = o$ensemble, fit = o$fit, runs = 10, threads = 1, quiet = TRUE),
+    render_run = list(simulator = o$program, values = c(gain = 0.5), folder = tempfile(), measurements = NULL,
+                      segment = 1),
     rename_parameters = list(simulator = o$function_simulator, gain = "other"),
     report = list(x = seeming("amiss_upgrade"), file = file.path(o$folder, "report.html"),
                   quiet = TRUE),
@@ -145,6 +158,7 @@ valid_calls <- function() {
     tidy = list(x = o$fit, conf.level = 0.95),
     train_emulator = list(ensemble = o$ensemble, noise_sd = 0.1, control = list(), threads = 1),
     triangular = list(lower = 0, mode = 1, upper = 2),
+    try_run = list(simulator = o$simulator, measurements = o$measurements, runs = 200, threads = 1, quiet = TRUE),
     uniform = list(lower = 0, upper = 1),
     upgrade_model = c(list(simulator = o$simulator, catalogue = o$catalogue), upgrade),
     with_parameters = list(model = o$function_simulator, free("k", uniform(0, 1)), f = NULL, boundary = "Te",
@@ -188,6 +202,9 @@ kinds <- list(
   flag = list(NULL, NA, "yes", c(TRUE, FALSE)),
   string = list(NA_character_, 1, c("a", "b")),
   filled_string = list(NULL, "", 1, c("a", "b")),
+  file_name = list("", 1, "../a", "/a"),
+  file_names = list("", 1, NA_character_, c("a", "../b")),
+  pattern = list("(", NA_character_, 1),
   column = list(NA_character_, "", 1),
   columns = list(NULL, NA_character_, list("a")),
   choice = list(NULL, NA_character_, "nonsense", identity),
