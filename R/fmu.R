@@ -217,7 +217,8 @@ check_fmu_value <- function(name, value, v, call) {
   kind <- if (row$type == "String") "text" else if (row$type == "Boolean") "TRUE or FALSE"
           else if (row$type %in% c("Real", "Float64", "Float32")) "a number" else "a whole number"
   fits <- switch(kind, text = checkmate::test_string(value), `TRUE or FALSE` = checkmate::test_flag(value),
-                 `a number` = checkmate::test_number(value, finite = TRUE), checkmate::test_integerish(value, len = 1))
+                 `a number` = checkmate::test_number(value, finite = TRUE),
+                 checkmate::test_number(value, finite = TRUE) && value == round(value))
   if (!fits) {
     abort_input("{.arg {paste0('fixed$', name)}} = {seen(value)} cannot be used: the FMU needs {kind}.", call = call)
   }

@@ -10,21 +10,24 @@ fmu_description_name <- "modelDescription.xml"
 # Data frame of the files in the archive: name, size. An archive is refused that could write outside of a folder, fill
 # the disk or plant links.
 fmu_entries <- function(file, call = rlang::caller_env()) {
-  refuse <- function(why) refuse_fmu(file, why, call)
+  refuse <- function(...) {
+    why <- paste(...)
+    refuse_fmu(file, "{why}", call)
+  }
   if (!is_regular_file(file)) refuse("It is no file.")
-  if (file.size(file) > fmu_most_bytes) refuse(paste("It is larger than", fmu_most_bytes / 1e9, "GB."))
+  if (file.size(file) > fmu_most_bytes) refuse("It is larger than", fmu_most_bytes / 1e9, "GB.")
   entries <- tryCatch(suppressWarnings(utils::unzip(file, list = TRUE)), error = function(e) NULL)
   flags <- archive_flags(file)
   if (is.null(entries) || is.null(flags) || !nrow(entries)) refuse("It is no zip archive, or is cut off.")
   entries <- data.frame(name = entries$Name, size = entries$Length)
-  if (nrow(entries) > fmu_most_files) refuse(paste("It holds more than", fmu_most_files, "files."))
+  if (nrow(entries) > fmu_most_files) refuse("It holds more than", fmu_most_files, "files.")
   if (nrow(entries) != nrow(flags)) refuse("Its list of files is not whole.")
   check_entry_names(entries$name, refuse)
-  if (any(flags$link)) refuse("It holds the symbolic link {.file {shown_name(entries$name[flags$link][1])}}.")
+  if (any(flags$link)) refuse("It holds the symbolic link", shown_name(entries$name[flags$link][1]))
   if (any(flags$secret)) refuse("It is encrypted.")
   total <- sum(entries$size)
   if (total > fmu_most_bytes || total > max(1e8, fmu_most_packed * file.size(file))) {
-    refuse(paste("It would unpack", signif(total / 1e6, 3), "MB from", signif(file.size(file) / 1e6, 3), "MB."))
+    refuse("It would unpack", signif(total / 1e6, 3), "MB from", signif(file.size(file) / 1e6, 3), "MB.")
   }
   entries[!grepl("/$", entries$name), ]
 }
@@ -32,12 +35,12 @@ fmu_entries <- function(file, call = rlang::caller_env()) {
 check_entry_names <- function(names, refuse) {
   bare <- sub("/$", "", names)  # a folder
   out <- !validEnc(names) | !stays_inside(bare)
-  if (any(out)) refuse("Its file {.file {shown_name(names[out][1])}} would be written outside of its folder.")
+  if (any(out)) refuse("Its file", shown_name(names[out][1]), "would be written outside of its folder.")
   twice <- anyDuplicated(tolower(bare))
-  if (twice) refuse("It holds the file {.file {shown_name(names[twice])}} twice.")
+  if (twice) refuse("It holds the file", shown_name(names[twice]), "twice.")
 }
 
-# Names of strangers, in messages that cli would evaluate.
+# Names of strangers in messages.
 shown_name <- function(name) substr(one_line(name), 1, 100)
 
 # `why`: a sentence with cli's markup.

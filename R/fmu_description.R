@@ -77,7 +77,7 @@ described_fmu <- function(path, call) {
 
 # The XML of strangers: without a document type there are no entities to expand, and nothing is fetched.
 description_root <- function(bytes, path, call) {
-  refuse <- function(why) refuse_fmu(path, paste0("Its {.file {fmu_description_name}} ", why), call)
+  refuse <- function(why) refuse_fmu(path, "Its {.file {fmu_description_name}} {why}", call)
   encoding <- "<[?]xml[^>]*encoding *= *[\"'](utf-8|us-ascii|iso-8859-1|windows-1252)[\"']"
   if (any(bytes == as.raw(0))) refuse("is not UTF-8.")
   head <- rawToChar(utils::head(bytes, 1000))
@@ -85,8 +85,7 @@ description_root <- function(bytes, path, call) {
   if (named && !grepl(encoding, head, ignore.case = TRUE, useBytes = TRUE)) refuse("is not UTF-8.")
   if (length(grepRaw("<!(DOCTYPE|ENTITY)", bytes, ignore.case = TRUE))) refuse("declares a document type.")
   document <- tryCatch(xml2::read_xml(bytes, options = c("NONET", "NOBLANKS")), error = function(e) {
-    why <- one_line(conditionMessage(e))
-    refuse("is no XML: {shown_name(why)}")
+    refuse(paste("is no XML:", shown_name(conditionMessage(e))))
   })
   root <- xml2::xml_root(document)
   if (xml2::xml_name(root) != "fmiModelDescription") refuse("is no description of a model.")

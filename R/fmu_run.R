@@ -11,10 +11,15 @@ fmu_request <- function(simulator, fmu, drivers, step_h, time, call = rlang::cal
   number <- vapply(fixed, function(value) if (is.character(value)) 0 else as.numeric(value), 0)
   list(free = of_engine(names(simulator$parameters)),
        fixed = c(of_engine(as.character(names(fixed))), list(number = as.numeric(number), text = as.character(text))),
-       inputs = of_engine(simulator$inputs), drivers = unname(drivers[, names(simulator$inputs), drop = FALSE]),
+       inputs = of_engine(simulator$inputs), drivers = unname(input_columns(drivers, simulator)),
        output = of_engine(simulator$output), start_s = segment_start(simulator$start, time[1], step_h, call),
        row_s = 3600 * step_h, steps = as.integer(simulator$steps_per_row), averaged = simulator$averaged,
        tolerance = simulator$tolerance %||% 0)
+}
+
+# A column for each input; a matrix without columns has no names to ask for.
+input_columns <- function(drivers, simulator) {
+  if (length(simulator$inputs)) drivers[, names(simulator$inputs), drop = FALSE] else matrix(0, nrow(drivers), 0)
 }
 
 # Rows are stamped at their end.

@@ -5,35 +5,41 @@
 # `edit`: a function of the lines of the description. `resources`: files of the folder of that name, as text.
 build_house <- function(file, version = 2, edit = identity, resources = list(start.txt = "20"),
                         sources = system.file("examples", "fmu", package = "amiss")) {
-  library <- house_library(version, sources)
-  platform <- house_platform(version)
-  description <- edit(readLines(file.path(sources, paste0("house", version, ".xml"))))
+  description <- readLines(file.path(sources, paste0("house", version, ".xml")))
+  library <- compiled(file.path(sources, paste0("house", version, ".c")), file.path(sources, "house.h"))
+  write_zip(file, fmu_parts("house", library, version, edit(description), resources))
+}
+
+# The files of an FMU in memory, by their names in it.
+fmu_parts <- function(name, library, version, description, resources = list()) {
   entries <- list("modelDescription.xml" = as_bytes(description))
-  entries[[paste0("binaries/", platform, "/house", .Platform$dynlib.ext)]] <-
+  entries[[paste0("binaries/", this_platform(version), "/", name, .Platform$dynlib.ext)]] <-
     readBin(library, "raw", file.size(library))
-  for (name in names(resources)) entries[[paste0("resources/", name)]] <- as_bytes(resources[[name]])
-  write_zip(file, entries)
+  for (file in names(resources)) entries[[paste0("resources/", file)]] <- as_bytes(resources[[file]])
+  entries
 }
 
 as_bytes <- function(lines) charToRaw(paste0(lines, "\n", collapse = ""))
 
-# Compiled once in a session for each version.
-house_library <- function(version, sources) {
-  folder <- file.path(tempdir(), paste0("house", version))
-  library <- file.path(folder, paste0("house", .Platform$dynlib.ext))
+# The library of one C file, compiled once in a session.
+compiled <- function(source, ..., flags = "") {
+  name <- sub("[.]c$", "", basename(source))
+  folder <- file.path(tempdir(), paste0("fmu-", name))
+  library <- file.path(folder, paste0(name, .Platform$dynlib.ext))
   if (file.exists(library)) return(library)
   dir.create(folder, showWarnings = FALSE)
-  file.copy(file.path(sources, c("house.h", paste0("house", version, ".c"))), folder)
+  file.copy(c(source, ...), folder)
+  writeLines(paste("PKG_CPPFLAGS =", flags), file.path(folder, "Makevars"))
   before <- setwd(folder)
   on.exit(setwd(before))
-  said <- system2(file.path(R.home("bin"), "R"), c("CMD", "SHLIB", "-o", basename(library),
-                                                   paste0("house", version, ".c")), stdout = TRUE, stderr = TRUE)
-  if (!file.exists(library)) stop("the house cannot be compiled:\n", paste(said, collapse = "\n"))
+  said <- system2(file.path(R.home("bin"), "R"), c("CMD", "SHLIB", "-o", basename(library), basename(source)),
+                  stdout = TRUE, stderr = TRUE)
+  if (!file.exists(library)) stop(name, " cannot be compiled:\n", paste(said, collapse = "\n"))
   library
 }
 
 # The name that the standard has for this platform: FMI 3.0, section 2.5.1.4; FMI 2.0, section 2.3.
-house_platform <- function(version) {
+this_platform <- function(version) {
   system <- switch(Sys.info()[["sysname"]], Darwin = "darwin", Windows = "windows", "linux")
   if (version == 3) paste0(sub("arm64", "aarch64", sub("x86-64", "x86_64", R.version$arch)), "-", system)
   else paste0(c(darwin = "darwin", windows = "win", linux = "linux")[[system]], 8 * .Machine$sizeof.pointer)

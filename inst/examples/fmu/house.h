@@ -55,8 +55,17 @@ static void house_slopes(const House* house, const double* t, double* slope) {
   slope[2] = (to_heater + heat) / v[C_HEATER];
 }
 
-/* What a faulty FMU does, by the value of `fault`: it crashes (1), never returns (2), leaves (3), fills memory that is
- * not its own (4), or has no number (5). */
+static void house_fill_disk(void) {
+  for (;;) {
+    FILE* file = fopen("filled.txt", "a");
+    if (file == NULL) return;
+    for (int i = 0; i < 1000; ++i) fputs("0123456789\n", file);
+    fclose(file);
+  }
+}
+
+/* What a faulty FMU does, by the value of `fault`: it crashes (1), never returns (2), leaves (3), writes where nothing
+ * is (4), has no number (5), fills the disk (8), prints what its caller waits for (9), or does that and leaves (9.5). */
 static void house_fault(House* house) {
   switch ((int)house->value[FAULT]) {
     case 1: abort();
@@ -64,6 +73,11 @@ static void house_fault(House* house) {
     case 3: exit(3);
     case 4: *(volatile int*)8 = 1; break;
     case 5: house->value[T_AIR] = strtod("nan", NULL); break;
+    case 8: house_fill_disk(); break;
+    case 9:
+      puts("answered\nanswered 1");
+      fflush(stdout);
+      if (house->value[FAULT] > 9) exit(3);
   }
 }
 
