@@ -5,7 +5,7 @@
 #' *co-simulation* by FMI 2.0 or 3.0. [fmu_variables()] lists what an FMU has.
 #'
 #' *Parameters* are named as in the FMU. Their priors lie within its limits. All other parameters keep their start
-#' values, but for those in `fixed`. If the FMU lets the start of a state be set, that is a parameter, too.
+#' values, but for those in `fixed`. A state whose start the FMU lets be set can stand in both places, too.
 #'
 #' *Inputs* are driven by columns of the record, in the FMU's units: convert the columns (a Modelica model wants K, not
 #' degC). A value holds for its whole row. An input that is not driven keeps its start value; `print()` says so.
@@ -31,7 +31,8 @@
 #' @param output Name of the variable that was measured.
 #' @param inputs Inputs of the FMU by the columns that drive them: `c(Te = "weather.T_out")`. One without a name is
 #'   driven by the column of its own name.
-#' @param fixed Named list of values of other parameters: numbers, `TRUE` or `FALSE`, or text.
+#' @param fixed Named list of values of other parameters, or of inputs that no column drives: numbers, `TRUE` or `FALSE`,
+#'   or text.
 #' @param averaged Whether the output is the mean over each row; if not, it is the value at the end of the row.
 #' @param steps_per_row Communication steps in each row.
 #' @param start Time of the FMU at which a segment begins, in s: a number, or a function of the begin of the segment
@@ -125,7 +126,7 @@ with_fmu <- function(model, ..., inputs = character(), fixed = list(), name = mo
   edited$parameters[names(added)] <- added
   inputs <- fmu_inputs(inputs)
   edited$inputs <- c(model$inputs[!model$inputs %in% inputs], inputs)
-  kept <- model$fixed[!names(model$fixed) %in% c(names(added), names(fixed))]
+  kept <- model$fixed[!names(model$fixed) %in% c(names(added), names(fixed), inputs)]
   edited$fixed <- c(kept, fixed)
   check_fmu_use(edited, read_fmu(model$file))
 }
@@ -156,7 +157,6 @@ fmu_fixed <- function(fixed, call = rlang::caller_env()) {
 
 check_fmu_use <- function(simulator, fmu, call = rlang::caller_env()) {
   v <- fmu$variables
-  v$use <- variable_use(v)
   for (parameter in simulator$parameters) check_fmu_free(parameter, v, call)
   for (name in names(simulator$fixed)) check_fmu_value(name, simulator$fixed[[name]], v, call)
   for (name in simulator$inputs) check_fmu_name(name, v, "input", "inputs", call)
@@ -165,20 +165,21 @@ check_fmu_use <- function(simulator, fmu, call = rlang::caller_env()) {
   if (length(both)) abort_input("Parameter {.val {both}} is free and in {.arg fixed}.", call = call)
   set <- c(names(simulator$parameters), names(simulator$fixed), simulator$inputs)
   rows <- v[match(set, v$name), ]
-  same <- duplicated(rows[c("reference", "code")]) | duplicated(rows[c("reference", "code")], fromLast = TRUE)
+  same <- set %in% set[duplicated(set)] | duplicated(rows[c("reference", "code")]) | duplicated(rows[c("reference", "code")], fromLast = TRUE)
   if (any(same)) {
-    abort_input("The FMU has one variable under the names {.val {unname(set[same])}}: give one of them.", call = call)
+    abort_input("The FMU has one variable under the names {.val {unname(set[same])}}: give it once.", call = call)
   }
   simulator
 }
 
-use_words <- c(parameter = "parameter", input = "input", output = "variable with a number that could be measured")
+use_words <- c(parameter = "parameter", input = "input", output = "variable with a number that could be measured",
+               fixed = "parameter or input")
 
 # The row of a name; an error if the FMU has none, or has it for something else.
 check_fmu_name <- function(name, v, use, argument, call) {
   row <- v[match(name, v$name), ]
-  if (identical(row$use, use)) return(row)
-  others <- v$name[v$use == use]
+  if (!is.na(row$name) && has_use(row, use)) return(row)
+  others <- v$name[has_use(v, use)]
   why <- if (is.na(row$name)) "The FMU has no variable {.val {name}}."
          else if (row$array) "{.val {name}} of the FMU is an array; one number is needed."
          else paste("{.val {name}} of the FMU is no {use_words[[use]]}: its causality is {.val {row$causality}}, its",
@@ -213,7 +214,7 @@ check_fmu_free <- function(parameter, v, call) {
 }
 
 check_fmu_value <- function(name, value, v, call) {
-  row <- check_fmu_name(name, v, "parameter", "fixed", call)
+  row <- check_fmu_name(name, v, "fixed", "fixed", call)
   kind <- if (row$type == "String") "text" else if (row$type == "Boolean") "TRUE or FALSE"
           else if (row$type %in% c("Real", "Float64", "Float32")) "a number" else "a whole number"
   fits <- switch(kind, text = checkmate::test_string(value), `TRUE or FALSE` = checkmate::test_flag(value),
@@ -248,7 +249,7 @@ print.amiss_fmu_simulator <- function(x, ...) on_stdout(x, {
     other <- names(x$inputs) != x$inputs
     say_bullets(some_words("inputs:", paste0(x$inputs, ifelse(other, paste0(" from ", names(x$inputs)), ""))))
   }
-  idle <- undriven_inputs(x, v)
+  idle <- idle_inputs(x, v)
   if (nrow(idle)) {
     values <- with_unit(or_empty(idle$start), pretty_unit(idle$unit))
     say_bullets(some_words("inputs that keep their start value:", paste0(idle$name, " (", values, ")")), "!")
@@ -264,10 +265,10 @@ some_words <- function(what, words, most = 6) {
   paste0(what, " ", paste(utils::head(words, most), collapse = ", "), more)
 }
 
-# Rows of the inputs that no column drives.
-undriven_inputs <- function(simulator, v) {
+# Rows of the inputs that keep their start value.
+idle_inputs <- function(simulator, v) {
   if (is.null(v)) return(data.frame())
-  v[variable_use(v) == "input" & !v$name %in% simulator$inputs, ]
+  v[has_use(v, "input") & !v$name %in% c(simulator$inputs, names(simulator$fixed)), ]
 }
 
 #' @export

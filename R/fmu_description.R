@@ -8,8 +8,8 @@
 #' @param file Path of the FMU: FMI 2.0 or 3.0, for co-simulation.
 #' @return A data frame with a row for each variable: `name`, `causality`, `variability`, `type`, `unit`, `start` (as
 #'   text), `min`, `max`, `description`, and its `use` in [fmu_simulator()]: `"parameter"` (by [free()] or `fixed`),
-#'   `"input"`, `"output"`, or `""` for none. The start of a state can be declared like a parameter, if the FMU lets it
-#'   be set.
+#'   `"input"`, `"output"`, several of them, or `""` for none. A state whose start the FMU lets be set can be declared
+#'   like a parameter, too.
 #' @section Errors: `amiss_error_fmu` (and `amiss_error_input`) for a file that is no FMU, is damaged or unsafe to
 #'   unpack, or has no co-simulation.
 #' @examplesIf requireNamespace("xml2", quietly = TRUE) && nzchar(Sys.which("make"))
@@ -20,20 +20,23 @@
 fmu_variables <- function(file) {
   check_input(checkmate::check_string(file, min.chars = 1), "file")
   variables <- read_fmu(file)$variables
-  variables$use <- variable_use(variables)
+  uses <- vapply(fmu_uses, function(use) has_use(variables, use), logical(nrow(variables)))
+  uses <- matrix(uses, ncol = length(fmu_uses))
+  variables$use <- apply(uses, 1, function(has) paste(fmu_uses[has], collapse = ", "))
   variables[c("name", "causality", "variability", "type", "unit", "start", "min", "max", "description", "use")]
 }
 
-# "parameter", "input", "output" or "".
-variable_use <- function(v) {
+fmu_uses <- c("parameter", "input", "output")
+
+# Whether each variable can be a parameter, an input, an output or fixed; the start of a state is a parameter, too.
+has_use <- function(v, use) {
   plain <- !is.na(v$code) & !v$array
-  start <- v$causality %in% c("output", "local") & v$initial %in% c("exact", "approx") & v$variability == "continuous"
-  number <- v$type != "String"
-  use <- rep("", nrow(v))
-  use[plain & number & v$causality %in% c("output", "local")] <- "output"
-  use[plain & number & v$causality == "input"] <- "input"
-  use[plain & v$variability != "constant" & (v$causality == "parameter" | start)] <- "parameter"
-  use
+  own <- v$causality %in% c("output", "local")
+  start <- own & v$initial %in% c("exact", "approx") & v$variability == "continuous"
+  parameter <- plain & v$variability != "constant" & (v$causality == "parameter" | start)
+  input <- plain & v$causality == "input"
+  switch(use, parameter = parameter, input = input & v$type != "String", output = plain & own & v$type != "String",
+         fixed = parameter | input)
 }
 
 known_fmus <- new.env(parent = emptyenv())

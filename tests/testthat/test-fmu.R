@@ -39,6 +39,8 @@ test_that("fixed values, undriven inputs and starts of states are the FMU's own,
     expect_equal(run(inputs = c(To = "Te")), exact(unheated), tolerance = 1e-7)
     expect_equal(run(fixed = c(aperture = 5), inputs = c(To = "Te", "P", "Gv")), exact(drivers, aperture = 5),
                  tolerance = 1e-7)
+    expect_equal(run(fixed = list(P = 500), inputs = c(To = "Te")), exact(replace(drivers[, -3], cbind(1:12, 2), 500)),
+                 tolerance = 1e-7)
     expect_equal(run(fixed = list(T_wall = 10)), exact(drivers[, -3], start = c(20, 10, 20)), tolerance = 1e-7)
   }
   cold <- fmu_simulator(file, free("T_wall", uniform(0, 30)), output = "T_air", inputs = c("Te", "P"), averaged = FALSE)
@@ -74,6 +76,7 @@ test_that("names that the FMU does not have, or uses otherwise, are refused with
   refuses("no variable \"Tair\".*T_air", some, output = "Tair")
   refuses("drives \"Te\" twice", some, output = "T_air", inputs = c("Te", To = "Te"))
   refuses("R_out.*free and in", some, output = "T_air", fixed = list(R_out = 0.01))
+  refuses("\"P\" and \"P\": give it once", some, output = "T_air", inputs = "P", fixed = list(P = 1))
   refuses("no variable \"k\"", some, output = "T_air", fixed = list(k = 1))
   refuses("fixed\\$heating_allowed.*TRUE or FALSE", some, output = "T_air", fixed = list(heating_allowed = 1))
   refuses("fixed\\$leak. = -1 is beyond", some, output = "T_air", fixed = list(leak = -1))
@@ -112,6 +115,7 @@ test_that("a mechanism that is switched off is the base; mechanisms stack and dr
   expect_error(with_fmu(both, free("leak", uniform(0, 5))), "leak.*another prior", class = "amiss_error_input")
   expect_error(with_fmu(both, free("draught", uniform(0, 5))), "no variable \"draught\"", class = "amiss_error_input")
   expect_identical(with_fmu(base, inputs = c(Ta = "Te"))$inputs, c(P = "P", Ta = "Te"))
+  expect_named(with_fmu(with_fmu(base, fixed = list(Gv = 3)), inputs = "Gv")$fixed, "aperture")
 })
 
 test_that("an FMU is calibrated", {
