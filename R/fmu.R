@@ -31,8 +31,8 @@
 #' @param output Name of the variable that was measured.
 #' @param inputs Inputs of the FMU by the columns that drive them: `c(Te = "weather.T_out")`. One without a name is
 #'   driven by the column of its own name.
-#' @param fixed Named list of values of other parameters, or of inputs that no column drives: numbers, `TRUE` or `FALSE`,
-#'   or text.
+#' @param fixed Named list of values of other parameters, or of inputs that no column drives: numbers, `TRUE` or
+#'   `FALSE`, or text.
 #' @param averaged Whether the output is the mean over each row; if not, it is the value at the end of the row.
 #' @param steps_per_row Communication steps in each row.
 #' @param start Time of the FMU at which a segment begins, in s: a number, or a function of the begin of the segment
@@ -165,7 +165,8 @@ check_fmu_use <- function(simulator, fmu, call = rlang::caller_env()) {
   if (length(both)) abort_input("Parameter {.val {both}} is free and in {.arg fixed}.", call = call)
   set <- c(names(simulator$parameters), names(simulator$fixed), simulator$inputs)
   rows <- v[match(set, v$name), ]
-  same <- set %in% set[duplicated(set)] | duplicated(rows[c("reference", "code")]) | duplicated(rows[c("reference", "code")], fromLast = TRUE)
+  key <- paste(rows$reference, rows$code)
+  same <- key %in% key[duplicated(key)]
   if (any(same)) {
     abort_input("The FMU has one variable under the names {.val {unname(set[same])}}: give it once.", call = call)
   }
