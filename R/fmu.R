@@ -8,7 +8,8 @@
 #' values, but for those in `fixed`. A state whose start the FMU lets be set can stand in both places, too.
 #'
 #' *Inputs* are driven by columns of the record, in the FMU's units: convert the columns (a Modelica model wants K, not
-#' degC). A value holds for its whole row. An input that is not driven keeps its start value; `print()` says so.
+#' degC). A value holds for its whole row; of a Boolean, 0 is `FALSE`. An input that is not driven keeps its start
+#' value; `print()` says so.
 #'
 #' *The output* is in the FMU's unit, too. By default it is the mean over each row, as most records hold means: the
 #' trapezoidal rule over the communication points, `steps_per_row` in each row. More steps make it closer. An FMU cannot
