@@ -96,6 +96,7 @@ object_parts <- list(
   amiss_comparison = c("format_version", "method", "models", "tables", "measurements"),
   amiss_function_simulator = c("format_version", "name", "f", "parameters", "boundary"),
   amiss_program_simulator = c("format_version", "name", "command", "parameters", "boundary", "files", "drivers"),
+  amiss_fmu_simulator = c("format_version", "name", "file", "hash", "parameters", "inputs", "fixed", "output"),
   amiss_zone = "components",
   amiss_network = c("format_version", "name", "components", "output", "before"),
   amiss_network_part = c("type", "name"),

@@ -22,6 +22,9 @@ bad_input_objects <- function() {
                                              boundary = "Te")
   o$program <- program_simulator(c("awk", "{{gain}}"), o$gain, output = c(file = "stdout.txt", column = "Ti"),
                                  cache = tempfile())
+  o$fmu_file <- write_zip(tempfile(fileext = ".fmu"), list(
+    modelDescription.xml = as_bytes(readLines(file.path(fmu_sources, "house2.xml")))))
+  o$fmu <- fmu_simulator(o$fmu_file, free("R_out", uniform(0.005, 0.02)), output = "T_air")
   o$room <- zone(zone_wall("wall", 1, zone_layer(0.1, 1, 1e6), outside = "Te"), zone_heater("heater", "P"),
                  zone_infiltration("leak", free("ach", uniform(0, 1)), "Te"), volume = 10)
   o$network <- network(network_node("air", 1), network_link("air", "Te", free("H", uniform(0, 1))),
@@ -85,6 +88,10 @@ valid_calls <- function() {
     epw_columns = list(),
     epw_weather = list(template = o$epw, columns = c(dry_bulb = "Te"), file = "w.epw", instant = character(),
                        utc_offset = NULL),
+    fmu_simulator = list(file = o$fmu_file, free("R_out", uniform(0.005, 0.02)), output = "T_air", inputs = "Te",
+                         fixed = list(), averaged = TRUE, steps_per_row = 1, start = 0, tolerance = NULL,
+                         time_limit = 1, size_limit = 10, retries = 0, cache = NULL, logging = FALSE, name = "house"),
+    fmu_variables = list(file = o$fmu_file),
     free = list(name = "a", prior = uniform(0, 1), unit = "K", label = "A"),
     free_parameters = list(simulator = o$simulator),
     function_simulator = list(f = o$function_simulator$f, o$gain, boundary = "Te", name = "a"),
@@ -161,6 +168,7 @@ valid_calls <- function() {
     try_run = list(simulator = o$simulator, measurements = o$measurements, runs = 200, threads = 1, quiet = TRUE),
     uniform = list(lower = 0, upper = 1),
     upgrade_model = c(list(simulator = o$simulator, catalogue = o$catalogue), upgrade),
+    with_fmu = list(model = o$fmu, free("leak", uniform(0, 1)), inputs = "Te", fixed = list(), name = "b"),
     with_parameters = list(model = o$function_simulator, free("k", uniform(0, 1)), f = NULL, boundary = "Te",
                            name = "b"),
     with_template = list(simulator = o$program, templates = list(b.txt = I("{{k}}")), free("k", uniform(0, 1)),
