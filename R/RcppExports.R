@@ -61,6 +61,22 @@ run_likelihood_ <- function(data, priors, points, runs, context_list) {
     .Call(`_amiss_run_likelihood_`, data, priors, points, runs, context_list)
 }
 
+fmu_run_ <- function(origin, request) {
+    .Call(`_amiss_fmu_run_`, origin, request)
+}
+
+fmu_serve_ <- function(parent) {
+    .Call(`_amiss_fmu_serve_`, parent)
+}
+
+fmu_say_ <- function(descriptor, line) {
+    invisible(.Call(`_amiss_fmu_say_`, descriptor, line))
+}
+
+fmu_forget_errors_ <- function() {
+    invisible(.Call(`_amiss_fmu_forget_errors_`))
+}
+
 network_simulate_ <- function(network, coefficients, drivers, hold, options, context) {
     .Call(`_amiss_network_simulate_`, network, coefficients, drivers, hold, options, context)
 }

@@ -225,6 +225,49 @@ BEGIN_RCPP
     return rcpp_result_gen;
 END_RCPP
 }
+// fmu_run_
+Rcpp::List fmu_run_(Rcpp::List origin, Rcpp::List request);
+RcppExport SEXP _amiss_fmu_run_(SEXP originSEXP, SEXP requestSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< Rcpp::List >::type origin(originSEXP);
+    Rcpp::traits::input_parameter< Rcpp::List >::type request(requestSEXP);
+    rcpp_result_gen = Rcpp::wrap(fmu_run_(origin, request));
+    return rcpp_result_gen;
+END_RCPP
+}
+// fmu_serve_
+int fmu_serve_(int parent);
+RcppExport SEXP _amiss_fmu_serve_(SEXP parentSEXP) {
+BEGIN_RCPP
+    Rcpp::RObject rcpp_result_gen;
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< int >::type parent(parentSEXP);
+    rcpp_result_gen = Rcpp::wrap(fmu_serve_(parent));
+    return rcpp_result_gen;
+END_RCPP
+}
+// fmu_say_
+void fmu_say_(int descriptor, std::string line);
+RcppExport SEXP _amiss_fmu_say_(SEXP descriptorSEXP, SEXP lineSEXP) {
+BEGIN_RCPP
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    Rcpp::traits::input_parameter< int >::type descriptor(descriptorSEXP);
+    Rcpp::traits::input_parameter< std::string >::type line(lineSEXP);
+    fmu_say_(descriptor, line);
+    return R_NilValue;
+END_RCPP
+}
+// fmu_forget_errors_
+void fmu_forget_errors_();
+RcppExport SEXP _amiss_fmu_forget_errors_() {
+BEGIN_RCPP
+    Rcpp::RNGScope rcpp_rngScope_gen;
+    fmu_forget_errors_();
+    return R_NilValue;
+END_RCPP
+}
 // network_simulate_
 Eigen::MatrixXd network_simulate_(Rcpp::List network, Eigen::MatrixXd coefficients, Eigen::MatrixXd drivers, Eigen::VectorXd hold, Rcpp::List options, Rcpp::List context);
 RcppExport SEXP _amiss_network_simulate_(SEXP networkSEXP, SEXP coefficientsSEXP, SEXP driversSEXP, SEXP holdSEXP, SEXP optionsSEXP, SEXP contextSEXP) {
@@ -348,6 +391,10 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_draws_within_", (DL_FUNC) &_amiss_draws_within_, 6},
     {"_amiss_response_evidence_", (DL_FUNC) &_amiss_response_evidence_, 6},
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
+    {"_amiss_fmu_run_", (DL_FUNC) &_amiss_fmu_run_, 2},
+    {"_amiss_fmu_serve_", (DL_FUNC) &_amiss_fmu_serve_, 1},
+    {"_amiss_fmu_say_", (DL_FUNC) &_amiss_fmu_say_, 2},
+    {"_amiss_fmu_forget_errors_", (DL_FUNC) &_amiss_fmu_forget_errors_, 0},
     {"_amiss_network_simulate_", (DL_FUNC) &_amiss_network_simulate_, 6},
     {"_amiss_network_slopes_", (DL_FUNC) &_amiss_network_slopes_, 6},
     {"_amiss_calibrate_paper_", (DL_FUNC) &_amiss_calibrate_paper_, 5},
