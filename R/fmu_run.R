@@ -30,7 +30,7 @@ segment_start <- function(start, time, step_h, call) {
   abort_input("The function {.arg start} returned {seen(seconds)}; a number of seconds was expected.", call = call)
 }
 
-# list(value, kept) of one run, kept or made; list(why, stderr) if it failed.
+# list(value, kept) of one run, kept or made; list(why, said) if it failed.
 fmu_run <- function(simulator, fmu, platform, request, values) {
   point <- as.numeric(values[names(simulator$parameters)])
   settings <- list(reference = c(request$free$reference, request$fixed$reference),

@@ -12,7 +12,7 @@ fmu_answer_line <- "answered"
 # A forked session leaves the processes of the one that it came from alone.
 fmu_worker_key <- function(fmu) paste(Sys.getpid(), fmu$hash)
 
-# list(value) of a run; list(why, stderr) if it failed.
+# list(value) of a run; list(why, said) if it failed.
 worker_run <- function(fmu, platform, simulator, request) {
   worker <- tryCatch(fmu_worker(fmu, platform), amiss_error_worker = function(e) conditionMessage(e))
   if (is.character(worker)) return(list(why = worker))
@@ -26,7 +26,8 @@ worker_run <- function(fmu, platform, simulator, request) {
   worker$runs <- worker$runs + 1
   spent <- !is.null(why) || isTRUE(answer$fatal) || worker$runs >= most_runs_of_worker || fmu$once
   if (is.null(answer$value)) {
-    list(why = one_line(answer$why), stderr = last_words(answer$said, file.path(worker$folder, "stderr.txt")))
+    said <- fmu_last_words(answer$said, file.path(worker$folder, "stderr.txt"))
+    list(why = one_line(answer$why), said = c("Its last words" = said))
   } else if (all(is.finite(answer$value))) {
     list(value = answer$value)
   } else {
@@ -35,7 +36,7 @@ worker_run <- function(fmu, platform, simulator, request) {
 }
 
 # What an FMU said by the log of the standard, or else printed last.
-last_words <- function(said, stderr) {
+fmu_last_words <- function(said, stderr) {
   if (!length(said) && is_regular_file(stderr) && isTRUE(file.size(stderr) > 0)) {
     said <- utils::tail(lines_of(tail_bytes(stderr, 5000)), 5)
   }
@@ -111,7 +112,7 @@ start_fmu_worker <- function(fmu, platform) {
     ready <- fmu_answer_line %in% worker$process$read_output_lines()
   }
   if (ready) return(worker)
-  said <- last_words(NULL, file.path(worker$folder, "stderr.txt"))
+  said <- fmu_last_words(NULL, file.path(worker$folder, "stderr.txt"))
   abort_input(c("the process of the FMU could not be started: {said}"), class = "amiss_error_worker", call = NULL)
 }
 

@@ -62,7 +62,7 @@ network_node <- function(name, capacity, start = NULL) {
 #' @export
 network_link <- function(from, to, conductance = NULL, resistance = NULL, by = NULL, name = paste0(from, "-", to)) {
   check_present(from, to)
-  check_place_names(from, to)
+  check_places(list(from = from, to = to))
   new_part("link", name, list(from = from, to = to, conductance = conductance, resistance = resistance, by = by))
 }
 
@@ -70,7 +70,7 @@ network_link <- function(from, to, conductance = NULL, resistance = NULL, by = N
 #' @export
 network_flow <- function(from, to, rate, by = NULL, name = paste0(from %||% "outside", "-", to %||% "outside")) {
   check_present(from, to, rate)
-  check_place_names(from, to)
+  check_places(list(from = from, to = to), optional = c("from", "to"))
   new_part("flow", name, list(from = from, to = to, rate = rate, by = by))
 }
 
@@ -78,16 +78,15 @@ network_flow <- function(from, to, rate, by = NULL, name = paste0(from %||% "out
 #' @export
 network_gain <- function(to, driver, factor = 1, by = NULL, name = paste(driver %||% "constant", "to", to)) {
   check_present(to, driver)
-  check_place_names(to, driver)
+  check_places(list(to = to, driver = driver), optional = "driver")
   new_part("gain", name, list(to = to, driver = driver, factor = factor, by = by))
 }
 
 # Before a name is made of them.
-check_place_names <- function(first, second, call = rlang::caller_env()) {
-  for (place in list(first, second)) {
-    if (is.null(place) || checkmate::test_string(place, min.chars = 1)) next
-    abort_input(c("A part of a network cannot stand at {seen(place)}.",
-                  i = "Give the name of a node or of a driver column."), call = call)
+check_places <- function(places, optional = character(), call = rlang::caller_env()) {
+  for (field in names(places)) {
+    check_input(checkmate::check_string(places[[field]], min.chars = 1, null.ok = field %in% optional), field,
+                "Give the name of a node or of a driver column.", call = call)
   }
 }
 
