@@ -111,29 +111,30 @@ class SteadyStart {
   Eigen::ColPivHouseholderQR<MatrixXd> solver_;
 };
 
-// Inputs of all rows, one a column: drivers and the constant one at the start of the row, and what they gain over it.
+// Inputs of all rows, one a row: drivers and the constant one at the start of the row, and what they gain over it.
 MatrixXd inputs_of(const Eigen::Ref<const MatrixXd>& drivers, bool linear) {
   const Index m = drivers.cols(), rows = drivers.rows();
-  MatrixXd out = MatrixXd::Zero((linear ? 2 : 1) * (m + 1), rows);
-  out.topRows(m) = drivers.transpose();
-  out.row(m).setOnes();
+  MatrixXd out = MatrixXd::Zero(rows, (linear ? 2 : 1) * (m + 1));
+  out.leftCols(m) = drivers;
+  out.col(m).setOnes();
   if (!linear) return out;
-  out.block(m + 1, 1, m, rows - 1) = out.block(0, 1, m, rows - 1) - out.block(0, 0, m, rows - 1);
-  out.topRows(m) -= out.middleRows(m + 1, m);
+  out.block(1, m + 1, rows - 1, m) = out.block(1, 0, rows - 1, m) - out.block(0, 0, rows - 1, m);
+  out.leftCols(m) -= out.middleCols(m + 1, m);
   return out;
 }
 
-// x_1 = A x_0 + f, y = c x_0 + g for the columns [f; g] of `forcing`; of n states, unrolled if they are few.
+// x_1 = A x_0 + f, y = c x_0 + g for the rows [f, g] of `forcing`; of n states, unrolled if they are few.
 template <int n>
 void recur(const Eigen::Ref<const MatrixXd>& p, const MatrixXd& forcing, VectorXd& state, double* output) {
   const Index high = n == Eigen::Dynamic ? state.size() : n;
   const Eigen::Matrix<double, n, n> a = p.topLeftCorner(high, high);
   const Eigen::Matrix<double, 1, n> c = p.row(high).head(high);
   Eigen::Matrix<double, n, 1> x = state, next(high);
-  for (Index j = 0; j < forcing.cols(); ++j) {
-    output[j] = c.dot(x) + forcing(high, j);
-    next.noalias() = a * x;
-    x = next + forcing.col(j).head(high);
+  for (Index j = 0; j < forcing.rows(); ++j) {
+    output[j] = c.dot(x) + forcing(j, high);
+    for (Index i = 0; i < high; ++i) next[i] = forcing(j, i);
+    next.noalias() += a * x;
+    x = next;
   }
   state = x;
 }
@@ -157,7 +158,7 @@ class Stepper {
       const auto p = propagators_.at(from);
       const Recursion recursion = recursion_of(nodes_);
       for (Index first = from; first < to; first += kBlock) {
-        forcing_.noalias() = p.rightCols(inputs_.rows()) * inputs_.middleCols(first, std::min(kBlock, to - first));
+        force(p, first, std::min(kBlock, to - first));
         recursion(p, forcing_, state.x, run.output.data() + first);
       }
     } else {
@@ -170,10 +171,10 @@ class Stepper {
     const auto p = propagators_.at(r);
     const Index high = nodes_ + 1;
     if (propagators_.same()) {
-      if (r < first_ || r >= first_ + forcing_.cols()) force(p, r);
-      moved_ = forcing_.col(r - first_);
+      if (r < first_ || r >= first_ + forcing_.rows()) force(p, r, std::min(kBlock, inputs_.rows() - r));
+      moved_ = forcing_.row(r - first_);
     } else {
-      moved_.noalias() = p.rightCols(inputs_.rows()) * inputs_.col(r);
+      moved_.noalias() = p.rightCols(inputs_.cols()) * inputs_.row(r).transpose();
     }
     moved_.noalias() += p.leftCols(nodes_) * state.x;
     Eigen::Map<MatrixXd> all(moved_.data(), high, 1 + directions_);
@@ -186,10 +187,14 @@ class Stepper {
     run.output[r] = moved_[nodes_];
   }
 
-  void force(const Eigen::Map<const MatrixXd>& p, Index from) {
-    const Index count = std::min(kBlock, inputs_.cols() - from);
+  // What inputs bring to each quantity, one a column: a product by vectors is faster than one by matrices, as the
+  // block is tall and narrow.
+  void force(const Eigen::Map<const MatrixXd>& p, Index from, Index count) {
     first_ = from;
-    forcing_.noalias() = p.rightCols(inputs_.rows()) * inputs_.middleCols(from, count);
+    forcing_.resize(count, p.rows());
+    for (Index i = 0; i < p.rows(); ++i) {
+      forcing_.col(i).noalias() = inputs_.middleRows(from, count) * p.row(i).tail(inputs_.cols()).transpose();
+    }
   }
 
   RowPropagators& propagators_;
