@@ -96,7 +96,7 @@ read_epw <- function(path, call = rlang::caller_env()) {
   lines <- lines_of(file_bytes(path))
   if (length(lines) < 9 || !startsWith(lines[1], "LOCATION")) refuse("its first line is not that of a LOCATION")
   if (!startsWith(lines[8], "DATA PERIODS")) refuse("line 8 does not say DATA PERIODS")
-  per_hour <- trimws(strsplit(lines[8], ",", fixed = TRUE)[[1]][3])
+  per_hour <- trimws(strsplit(lines[8], ",", fixed = TRUE, useBytes = TRUE)[[1]][3])
   if (!identical(per_hour, "1")) refuse("it has ", per_hour, " rows an hour, where 1 is needed")
   fields <- regmatches(lines[-(1:8)],
                        regexec("^[^,]*,\\s*([0-9]+)\\s*,\\s*([0-9]+)\\s*,\\s*([0-9]+)\\s*,", lines[-(1:8)]))
@@ -111,7 +111,7 @@ read_epw <- function(path, call = rlang::caller_env()) {
 epw_key <- function(month, day, hour) 10000 * month + 100 * day + hour
 
 epw_offset <- function(location, call = rlang::caller_env()) {
-  offset <- suppressWarnings(as.numeric(strsplit(location, ",", fixed = TRUE)[[1]][9]))
+  offset <- suppressWarnings(as.numeric(strsplit(location, ",", fixed = TRUE, useBytes = TRUE)[[1]][9]))
   if (isTRUE(abs(offset) <= 14)) return(offset)
   abort_input("The LOCATION line of the template states no time zone.", call = call)
 }
@@ -138,7 +138,7 @@ written_epw <- function(epw, table, step_h, call) {
   hours <- unique(ends)
   lines <- epw$lines
   at <- 8 + epw_rows(epw, hours, call)
-  fields <- strsplit(lines[at], ",", fixed = TRUE)
+  fields <- strsplit(lines[at], ",", fixed = TRUE, useBytes = TRUE)
   for (column in names(epw$columns)) {
     x <- table[[epw$columns[[column]]]]
     values <- if (column %in% epw$instant) values_at_ends(x, seconds, hours, step_h,
@@ -152,7 +152,7 @@ written_epw <- function(epw, table, step_h, call) {
     fields <- Map(function(row, value) replace(row, place, value), fields, sprintf("%.7g", values))
   }
   lines[at] <- vapply(fields, paste, "", collapse = ",")
-  charToRaw(paste0(enc2utf8(lines), "\n", collapse = ""))
+  charToRaw(paste0(lines, "\n", collapse = ""))
 }
 
 # Seconds since 1970 as the program's clock shows them; hours without a date count from the beginning of 2001.
