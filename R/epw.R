@@ -58,24 +58,22 @@ epw_weather <- function(template, columns, file = "weather.epw", instant = chara
 
 #' @rdname epw_weather
 #' @export
-epw_columns <- function() {
-  of <- function(column, lower, upper, missing) data.frame(column = column, lower = lower, upper = upper,
-                                                           missing = missing)
-  rbind(of("dry_bulb", -70, 70, 99.9), of("dew_point", -70, 70, 99.9), of("relative_humidity", 0, 110, 999),
-        of("pressure", 31000, 120000, 999999), of("extraterrestrial_horizontal", 0, 9998, 9999),
-        of("extraterrestrial_normal", 0, 9998, 9999), of("infrared_horizontal", 0, 9998, 9999),
-        of("global_horizontal", 0, 9998, 9999), of("direct_normal", 0, 9998, 9999),
-        of("diffuse_horizontal", 0, 9998, 9999), of("global_illuminance", 0, 999899, 999999),
-        of("direct_illuminance", 0, 999899, 999999), of("diffuse_illuminance", 0, 999899, 999999),
+epw_columns <- function() epw_table
+
+epw_table <- local({
+  radiation <- c("extraterrestrial_horizontal", "extraterrestrial_normal", "infrared_horizontal", "global_horizontal",
+                 "direct_normal", "diffuse_horizontal")
+  light <- c("global_illuminance", "direct_illuminance", "diffuse_illuminance")
+  of <- function(column, lower, upper, missing) data.frame(column, lower, upper, missing)
+  rbind(of(c("dry_bulb", "dew_point"), -70, 70, 99.9), of("relative_humidity", 0, 110, 999),
+        of("pressure", 31000, 120000, 999999), of(radiation, 0, 9998, 9999), of(light, 0, 999899, 999999),
         of("zenith_luminance", 0, 9998, 9999), of("wind_direction", 0, 360, 999), of("wind_speed", 0, 40, 999),
-        of("total_sky_cover", 0, 10, 99), of("opaque_sky_cover", 0, 10, 99), of("visibility", 0, 9998, 9999),
+        of(c("total_sky_cover", "opaque_sky_cover"), 0, 10, 99), of("visibility", 0, 9998, 9999),
         of("ceiling_height", 0, 99998, 99999), of("weather_observation", 0, 9, 9),
-        of("weather_codes", 0, 999999998, 999999999),
-        of("precipitable_water", 0, 998, 999), of("aerosol_optical_depth", 0, 0.998, 0.999),
-        of("snow_depth", 0, 998, 999),
-        of("days_since_snow", 0, 98, 99), of("albedo", 0, 1, 999), of("liquid_depth", 0, 998, 999),
-        of("liquid_rate", 0, 98, 99))
-}
+        of("weather_codes", 0, 999999998, 999999999), of("precipitable_water", 0, 998, 999),
+        of("aerosol_optical_depth", 0, 0.998, 0.999), of("snow_depth", 0, 998, 999), of("days_since_snow", 0, 98, 99),
+        of("albedo", 0, 1, 999), of("liquid_depth", 0, 998, 999), of("liquid_rate", 0, 98, 99))
+})
 
 #' @export
 print.amiss_epw <- function(x, ...) on_stdout(x, {
@@ -98,7 +96,7 @@ read_epw <- function(path, call = rlang::caller_env()) {
   lines <- lines_of(file_bytes(path))
   if (length(lines) < 9 || !startsWith(lines[1], "LOCATION")) refuse("its first line is not that of a LOCATION")
   if (!startsWith(lines[8], "DATA PERIODS")) refuse("line 8 does not say DATA PERIODS")
-  per_hour <- trimws(strsplit(lines[8], ",", fixed = TRUE)[[1]][3])
+  per_hour <- trimws(strsplit(lines[8], ",", fixed = TRUE, useBytes = TRUE)[[1]][3])
   if (!identical(per_hour, "1")) refuse("it has ", per_hour, " rows an hour, where 1 is needed")
   fields <- regmatches(lines[-(1:8)],
                        regexec("^[^,]*,\\s*([0-9]+)\\s*,\\s*([0-9]+)\\s*,\\s*([0-9]+)\\s*,", lines[-(1:8)]))
@@ -113,13 +111,24 @@ read_epw <- function(path, call = rlang::caller_env()) {
 epw_key <- function(month, day, hour) 10000 * month + 100 * day + hour
 
 epw_offset <- function(location, call = rlang::caller_env()) {
-  offset <- suppressWarnings(as.numeric(strsplit(location, ",", fixed = TRUE)[[1]][9]))
+  offset <- suppressWarnings(as.numeric(strsplit(location, ",", fixed = TRUE, useBytes = TRUE)[[1]][9]))
   if (isTRUE(abs(offset) <= 14)) return(offset)
   abort_input("The LOCATION line of the template states no time zone.", call = call)
 }
 
-# The bytes of the file for a table of drivers.
+# The bytes of the file for a table of drivers, remembered: a search asks for the same again and again, a run at a time.
 epw_bytes <- function(epw, table, step_h, call = rlang::caller_env()) {
+  key <- rlang::hash(list(epw, table, step_h))
+  if (is.null(epw_memory[[key]])) {
+    if (length(epw_memory) >= 20) rm(list = ls(epw_memory), envir = epw_memory)
+    epw_memory[[key]] <- written_epw(epw, table, step_h, call)
+  }
+  epw_memory[[key]]
+}
+
+epw_memory <- new.env(parent = emptyenv())
+
+written_epw <- function(epw, table, step_h, call) {
   if (step_h > 1 + 1e-6) {
     abort_input(c("An EPW file has a row for each hour; the drivers' step is {signif(step_h, 4)} h.",
                   i = "Give measurements in steps of an hour or less."), call = call)
@@ -129,7 +138,7 @@ epw_bytes <- function(epw, table, step_h, call = rlang::caller_env()) {
   hours <- unique(ends)
   lines <- epw$lines
   at <- 8 + epw_rows(epw, hours, call)
-  fields <- strsplit(lines[at], ",", fixed = TRUE)
+  fields <- strsplit(lines[at], ",", fixed = TRUE, useBytes = TRUE)
   for (column in names(epw$columns)) {
     x <- table[[epw$columns[[column]]]]
     values <- if (column %in% epw$instant) values_at_ends(x, seconds, hours, step_h,
@@ -143,7 +152,7 @@ epw_bytes <- function(epw, table, step_h, call = rlang::caller_env()) {
     fields <- Map(function(row, value) replace(row, place, value), fields, sprintf("%.7g", values))
   }
   lines[at] <- vapply(fields, paste, "", collapse = ",")
-  charToRaw(paste0(enc2utf8(lines), "\n", collapse = ""))
+  charToRaw(paste0(lines, "\n", collapse = ""))
 }
 
 # Seconds since 1970 as the program's clock shows them; hours without a date count from the beginning of 2001.
@@ -193,7 +202,7 @@ night_offset <- -20  # W/m2
 
 epw_values <- function(values, column, driver, rows, call) {
   limits <- epw_columns()[match(column, epw_columns()$column), ]
-  if (limits$missing == 9999 && column != "visibility") values[values < 0 & values >= night_offset] <- 0
+  if (grepl("_(horizontal|normal)$", column)) values[values < 0 & values >= night_offset] <- 0
   bad <- which(values < limits$lower | values > limits$upper | values == limits$missing)
   if (length(bad)) {
     where <- paste(strsplit(rows[bad[1]], ",", fixed = TRUE)[[1]][2:4], collapse = "/")

@@ -37,7 +37,8 @@ folder_table <- function(folder, call) {
     abort_input(c("{.arg files} cannot be copied: {.file {bad[1]}} is no regular file.",
                   i = "Remove pipes and broken links from the folder."), call = call)
   }
-  file_table(names, paths)
+  # Folders without files are copied, too: a program may write into them.
+  structure(file_table(names, paths), folders = list.dirs(folder, full.names = FALSE)[-1])
 }
 
 file_table <- function(names, paths) {
@@ -55,7 +56,7 @@ check_files_same <- function(files, call = rlang::caller_env()) {
 }
 
 copy_files <- function(files, folder) {
-  for (within in setdiff(unique(dirname(files$name)), ".")) {
+  for (within in setdiff(c(unique(dirname(files$name)), attr(files, "folders")), ".")) {
     dir.create(file.path(folder, within), recursive = TRUE, showWarnings = FALSE)
   }
   done <- file.copy(files$path, file.path(folder, files$name), overwrite = TRUE, copy.mode = TRUE)

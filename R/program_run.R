@@ -8,7 +8,7 @@ plan_runs <- function(simulator, values, drivers, step_h, time, call = rlang::ca
   expected <- list(time = time, step_h = step_h, rows = nrow(drivers), offset = drivers_offset(simulator$drivers))
   steps <- lapply(as_steps(simulator$command, call), find_program, simulator = simulator, call = call)
   shared <- rlang::hash(list(inputs, unname(tools::md5sum(command_files(steps))), simulator$version,
-                             plain(simulator$output), simulator$files[c("name", "md5")], lapply(steps, unclass)))
+                             plain(simulator$output), simulator$files[c("name", "md5")], lapply(steps, what_counts)))
   texts <- compiled_texts(simulator, steps)
   id <- simulator_id(simulator)
   jobs <- lapply(seq_len(nrow(values)), function(m) {
@@ -19,6 +19,9 @@ plan_runs <- function(simulator, values, drivers, step_h, time, call = rlang::ca
   list(steps = steps, files = simulator$files, inputs = inputs, expected = expected, id = id, jobs = jobs,
        simulator = simulator[c("cache", "output", "time_limit", "size_limit", "retries", "keep")])
 }
+
+# Where a program is found and how long it may take do not change what it writes.
+what_counts <- function(step) unclass(step)[setdiff(names(step), c("program", "time_limit"))]
 
 # A step with `program`, the path of its program, or with `within`, its name in the run's folder.
 find_program <- function(step, simulator, call) {
@@ -63,8 +66,9 @@ job_of <- function(filled, simulator, steps, key) {
 
 # Tells the runs of a simulator from those of others in the same cache.
 simulator_id <- function(simulator) {
-  of <- simulator[c("command", "templates", "files", "drivers", "version", "boundary", "lead_in", "before")]
-  substr(content_hash(plain(c(of, list(names(simulator$parameters), simulator$output)))), 1, 8)
+  of <- simulator[c("templates", "files", "drivers", "version", "boundary", "lead_in", "before")]
+  steps <- lapply(as_steps(simulator$command), what_counts)
+  substr(content_hash(plain(c(of, list(steps, names(simulator$parameters), simulator$output)))), 1, 8)
 }
 
 # list(value, seconds, found) of one run, found or made; list(why, directory, said) if it failed.
@@ -272,17 +276,22 @@ kept_bytes <- 1e6  # of each file of a failed run
 
 # The ends of what a step wrote, and of what the one before it did: the cause often stands there.
 last_words <- function(steps, k, folder) {
-  words <- character()
-  for (j in c(k, if (k > 1) k - 1)) for (stream in c("stdout", "stderr")) {
-    path <- file.path(folder, steps[[j]][[stream]])
-    if (!is_regular_file(path) || file.size(path) %in% 0) next
-    bytes <- if (file.size(path) > 1e5) file_ends(path, 1e5) else file_bytes(path)
-    lines <- lines_of(bytes[bytes != as.raw(0)])
-    of <- if (length(steps) > 1) paste0(" of step ", j, " (", basename(steps[[j]]$command[1]), ")")
-    name <- paste0("End of standard ", if (stream == "stdout") "output" else "error", of)
-    words[name] <- substr(paste(one_line(utils::tail(lines, 5)), collapse = " "), 1, 500)
-  }
-  words
+  words <- lapply(c(k, if (k > 1) k - 1), function(j) {
+    step <- steps[[j]]
+    of <- if (length(steps) > 1) paste0(" of step ", j, " (", basename(step$command[1]), ")")
+    files <- c("standard output" = step$stdout, "standard error" = step$stderr, stats::setNames(nm = step$log))
+    said <- vapply(file.path(folder, files), end_of_file, "")
+    stats::setNames(said, paste0("End of ", names(files), of))
+  })
+  words <- unlist(words)
+  words[nzchar(words)]
+}
+
+# The last lines of a file in one, or nothing.
+end_of_file <- function(path) {
+  if (!is_regular_file(path) || file.size(path) %in% 0) return("")
+  bytes <- if (file.size(path) > 1e5) file_ends(path, 1e5) else file_bytes(path)
+  substr(paste(one_line(utils::tail(lines_of(bytes[bytes != as.raw(0)]), 5)), collapse = " "), 1, 500)
 }
 
 # The folder of a run that succeeded under another name, up to the number that is to be kept.

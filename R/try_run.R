@@ -45,7 +45,7 @@ try_run <- function(simulator, measurements, runs = 200, threads = 1, quiet = FA
   look <- list(name = simulator_name(simulator), unit = measurements$unit, noise_sd = measurements$noise_sd,
                seconds = first$seconds, found = first$found, rows = length(first$y), failed = first$failed)
   if (is.null(first$failed)) {
-    look$parameters <- parameters_act(simulator, parameters, centre, first$y, measurements, threads)
+    look$parameters <- parameters_act(simulator, parameters, centre, measurements, threads)
     look$start <- start_forgotten(simulator, centre, measurements, threads)
     look$study_s <- runs * first$seconds
   }
@@ -93,7 +93,7 @@ first_run <- function(simulator, centre, measurements, threads) {
 }
 
 # The output at two values of each parameter, the others at their medians.
-parameters_act <- function(simulator, parameters, centre, y, measurements, threads) {
+parameters_act <- function(simulator, parameters, centre, measurements, threads) {
   low <- quantile_values(parameters, 0.1)[1, ]
   high <- quantile_values(parameters, 0.9)[1, ]
   values <- centre[rep(1, 2 * length(parameters)), , drop = FALSE]

@@ -44,6 +44,20 @@ test_that("the columns that are named are replaced in the hours of the record, a
   expect_match(printed(weather), "48 hours, 1 h ahead of UTC.*dry_bulb from Te, mean of the hour")
 })
 
+test_that("a template of Windows, in Latin-1, is read", {
+  file <- withr::local_tempfile()
+  lines <- epw_header()
+  lines[c(1, 6)] <- c("LOCATION,M*nchen,-,DEU,None,0,48.0,11.7,1.0,700.0", "COMMENTS 1,-")
+  bytes <- charToRaw(paste0(c(lines, epw_rows_of(c("2001-12-30", "2001-12-30"))), "\r\n", collapse = ""))
+  bytes[bytes == charToRaw("*")] <- as.raw(0xfc)
+  writeBin(bytes, file)
+  weather <- epw_weather(file, c(dry_bulb = "Te"))
+  expect_identical(weather$utc_offset, 1)
+  bytes <- epw_bytes(weather, data.frame(time = stamps("2013-12-29 23:00", 2), Te = 1:2), 1)
+  expect_length(grepRaw(as.raw(c(0x4d, 0xfc)), bytes), 1)
+  expect_length(grepRaw(charToRaw("?9,1,1.0"), bytes, fixed = TRUE), 1)
+})
+
 test_that("hour 24 ends a day, and years do not matter", {
   weather <- epw_weather(epw_file("0.0"), c(dry_bulb = "Te"))
   out <- written(weather, stamps("2013-12-30 22:00", 3), Te = c(101, 102, 103) / 10)

@@ -24,11 +24,13 @@ two_rows <- matrix(0, 2, 0)
 
 test_that("a folder is copied byte for byte, and only the templates named in it are filled in", {
   folder <- model_folder()
+  dir.create(file.path(folder, "tmp", "deep"), recursive = TRUE)
   program <- house(folder, keep = 1)
   expect_equal(simulate_runs(program, cbind(k = 1.5), two_rows, 1)[, 1], c(1.5, 7))
   kept <- dir(program$cache, "^kept-", full.names = TRUE)
   expect_identical(file_bytes(file.path(kept, "climate.bin")), file_bytes(file.path(folder, "climate.bin")))
   expect_identical(readLines(file.path(kept, "cfg", "walls.con"))[2], "1.500")
+  expect_true(dir.exists(file.path(kept, "tmp", "deep")))
   expect_match(printed(program), "4 files of the model")
 })
 

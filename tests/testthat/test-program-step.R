@@ -59,6 +59,7 @@ test_that("a program that exits with 0 fails by what it says, does not say or do
   say <- function(...) chain(program_step("sh", "-c", "echo no weather; echo log > l.txt", ...), simulate_step())
   expect_match(told_by(say(fails_if = "no [a-z]+er")), "step 1 of 2 \\(sh\\): its standard output says \"no weather\"")
   expect_match(told_by(say(fails_if = "^log$", log = "l.txt")), "its l.txt says \"log\"")
+  expect_match(told_by(say(needs = "finished", log = "l.txt")), "End of l.txt of step 1 \\(sh\\): log")
   expect_match(told_by(say(needs = "finished")), "standard output and standard error.* does not say \"finished\"")
   expect_match(told_by(say(makes = c("l.txt", "house.res"))), "exit status 0 and wrote nothing into house.res")
   expect_match(told_by(chain(program_step("sh", "-c", "echo bad; exit 3", fails_if = "bad"))),
@@ -81,6 +82,8 @@ test_that("a step that is checked in another way is another run", {
   cache <- withr::local_tempdir()
   simulate_runs(note(), cbind(gain = 1), te, 1)
   simulate_runs(note(), cbind(gain = 1), te, 1)
+  expect_length(readLines(log), 1)
+  simulate_runs(note(time_limit = 100), cbind(gain = 1), te, 1)
   expect_length(readLines(log), 1)
   simulate_runs(note(fails_if = "bad"), cbind(gain = 1), te, 1)
   expect_length(readLines(log), 2)
@@ -134,5 +137,5 @@ test_that("runs that the cache has do not count, and those of another segment do
   expect_equal(spent(c(0.1, 0.2, 0.3), m), c(1, 2))
   context <- new_context(1, 1, list(), budget = 5)
   simulate_measured(program, cbind(gain = c(0.1, 0.2)), m, "calibrate", 1)
-  expect_equal(runs_left(context), 5)
+  expect_equal(c(runs_left(context), runs_found(context)), c(5, 2))
 })
