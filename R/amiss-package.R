@@ -21,11 +21,12 @@
 #' * `amiss.font`: font of the figures.
 #'
 #' @section Conditions: Errors have the class `amiss_error` and one of `amiss_error_input` (what was asked cannot be
-#'   done as it was given; also `amiss_error_trust`, a study whose trust was not given, and `amiss_error_edit`, a
-#'   mechanism that cannot be applied) or `amiss_error_numerical` (the computation failed). Warnings have
-#'   `amiss_warning` and one of `amiss_warning_input` or `amiss_warning_result` (also `amiss_warning_missing`, a file
-#'   of a study's results that could not be made); messages `amiss_message_gap`, `_time`, `_kept`, `_noise` and
-#'   `_base_case`. That numbers are not to be trusted is no condition: see `trust` and `check` of a calibration.
+#'   done as it was given; also `amiss_error_trust`, a study whose trust was not given, `amiss_error_edit`, a
+#'   mechanism that cannot be applied, and `amiss_error_fmu`, an FMU that cannot be used) or `amiss_error_numerical`
+#'   (the computation failed). Warnings have `amiss_warning` and one of `amiss_warning_input` or
+#'   `amiss_warning_result` (also `amiss_warning_missing`, a file of a study's results that could not be made);
+#'   messages `amiss_message_gap`, `_time`, `_kept`, `_noise` and `_base_case`. That numbers are not to be trusted is
+#'   no condition: see `trust` and `check` of a calibration.
 #'
 #' @useDynLib amiss, .registration = TRUE
 #' @importFrom Rcpp evalCpp

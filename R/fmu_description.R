@@ -44,7 +44,10 @@ known_fmus <- new.env(parent = emptyenv())
 # The description of a file, read once in a session as long as the file stays as it is: list(file, hash, version,
 # model, identifier, token, once, fixed_step, variables, platforms).
 read_fmu <- function(file, call = rlang::caller_env()) {
-  rlang::check_installed("xml2", "to read the description of an FMU.", call = call)
+  if (!requireNamespace("xml2", quietly = TRUE)) {
+    abort_input(c("The package {.pkg xml2} is needed to read the description of an FMU.",
+                  i = "Install it by {.code install.packages(\"xml2\")}."), call = call)
+  }
   if (!is_regular_file(file)) refuse_fmu(file, "There is no such file.", call)
   path <- normalizePath(file)
   seen <- paste(file.size(path), as.numeric(file.mtime(path)))

@@ -4,13 +4,13 @@
 #' and one sentence for a person. A catalogue holds the mechanisms that make sense for a model.
 #'
 #' @param name Short name.
-#' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared by
-#'   [free()]: an edit of a [zone()], [with_parameters()] of a function, [with_template()] of a program. Of a model that
-#'   is an [ensemble()] of given runs, another ensemble, of runs with the mechanism, or a function of the present
-#'   ensemble that returns one. An ensemble is tried while it has the parameters of all that was adopted before it. A
-#'   function of two arguments gets the name of the record as the second: of several records it is called for each in
-#'   turn, and may return the simulator as it is where the mechanism does not act. Of a single record that is not given
-#'   in a list it is the name of the measurements.
+#' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared
+#'   by [free()]: an edit of a [zone()], [with_parameters()] of a function, [with_template()] of a program,
+#'   [with_fmu()] of an FMU. Of a model that is an [ensemble()] of given runs, another ensemble, of runs with the
+#'   mechanism, or a function of the present ensemble that returns one. An ensemble is tried while it has the
+#'   parameters of all that was adopted before it. A function of two arguments gets the name of the record as the
+#'   second: of several records it is called for each in turn, and may return the simulator as it is where the
+#'   mechanism does not act. Of a single record that is not given in a list it is the name of the measurements.
 #' @param boundary Names of the boundary conditions that drive the mechanism: those without which it would do nothing,
 #'   or always the same; `character()` for none. Of a mechanism that acts on a state, those that drive the state. The
 #'   order of trials, what is told of the cause and one doubt (`vignette("algorithm", "amiss")`, *Naming*) go by them;

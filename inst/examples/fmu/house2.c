@@ -73,7 +73,10 @@ EXPORT int fmi2DoStep(void* house, double time, double length, int no_return) {
   (void)time, (void)no_return;
   if (length <= 0) return ERROR;
   if (((House*)house)->value[FAULT] == 6) return DISCARD;
-  if (((House*)house)->value[FAULT] == 7) return FATAL;
+  if (((House*)house)->value[FAULT] == 7) {
+    free(house); /* nothing may be called after it */
+    return FATAL;
+  }
   house_step(house, length);
   return OK;
 }

@@ -66,7 +66,10 @@ EXPORT int fmi3DoStep(void* house, double time, double length, bool no_return, b
   *reached = time + length;
   if (length <= 0) return ERROR;
   if (((House*)house)->value[FAULT] == 6) *ends = true;
-  if (((House*)house)->value[FAULT] == 7) return FATAL;
+  if (((House*)house)->value[FAULT] == 7) {
+    free(house); /* nothing may be called after it */
+    return FATAL;
+  }
   house_step(house, length);
   return OK;
 }
