@@ -262,6 +262,7 @@ prediction_scores <- function(prediction) {
 #' head(simulate(fit, nsim = 3, seed = 1))
 #' @export
 simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   check_input(checkmate::check_count(nsim, positive = TRUE), "nsim")
   check_run_number(nsim, length(object$measurements$raw$hours), "nsim")

@@ -49,12 +49,16 @@ report <- function(x, file, quiet = TRUE) {
   on.exit(unlink(work, recursive = TRUE))
   source <- file.path(work, "report.Rmd")
   file.copy(report_path("templates", "report", "skeleton", "skeleton.Rmd"), source)
-  made <- rmarkdown::render(source, if (kind == "docx") "word_document" else "html_document", output_dir = work,
-                            intermediates_dir = work, params = list(result = x),
-                            envir = new.env(parent = globalenv()), quiet = quiet)
+  made <- render_report(x, source, work, kind, quiet)
   if (kind == "pdf") made <- print_page(made, file.path(work, "report.pdf"), browser)
   move_into_place(made, file)
   invisible(file)
+}
+
+render_report <- function(x, source, work, kind, quiet) {
+  rmarkdown::render(source, if (kind == "docx") "word_document" else "html_document", output_dir = work,
+                    intermediates_dir = work, params = list(result = x), envir = new.env(parent = globalenv()),
+                    quiet = quiet)
 }
 
 #' @rdname report

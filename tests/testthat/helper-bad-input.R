@@ -26,17 +26,11 @@ bad_input_objects <- function() {
                  zone_infiltration("leak", free("ach", uniform(0, 1)), "Te"), volume = 10)
   o$drivers <- cbind(Te = rep(5, 10), P = rep(100, 10))
   o$catalogue <- catalogue(mechanism("sun", identity, "Gv", "The sun shines in."))
+  o$upgrade <- quietly(upgrade_model(o$simulator, o$measurements, o$catalogue, runs = 10, seed = 1, quiet = TRUE,
+                                     control = list(calibration = o$calibration, rounds = 1, max_steps = 1)))
   o$folder <- tempfile("bad-input-")
   dir.create(o$folder)
   bad_input$objects <- o
-}
-
-# An object that has the parts of its class, and nothing in them.
-seeming <- function(class) {
-  parts <- object_parts[[class]]
-  object <- structure(stats::setNames(vector("list", length(parts)), parts), class = class)
-  object$format_version <- format_version
-  object
 }
 
 # One call of every exported function with all its arguments, as good ones; `list()` stands for what is never used.
@@ -54,7 +48,7 @@ valid_calls <- function() {
                  noise_sd = NULL, control = list(), seed = 1, threads = 1),
     attribute_discrepancy = list(fit = o$fit, control = list(), seed = 1, threads = 1),
     augment = list(x = o$fit, data = NULL, newdata = NULL),
-    autoplot = list(object = seeming("amiss_upgrade"), which = "fit"),
+    autoplot = list(object = o$upgrade, which = "fit"),
     bayes_factor = list(model = o$fit, reference = o$fit),
     beta_prior = list(shape1 = 1, shape2 = 1, lower = 0, upper = 1),
     bootstrap_noise = list(replicates = 50, detrend = FALSE, seed = 1),
@@ -106,9 +100,9 @@ valid_calls <- function() {
                       trust = FALSE),
     refine_ensemble = list(ensemble = o$ensemble, fit = o$fit, runs = 10, threads = 1, quiet = TRUE),
     rename_parameters = list(simulator = o$function_simulator, gain = "other"),
-    report = list(x = seeming("amiss_upgrade"), file = file.path(o$folder, "report.html"),
+    report = list(x = o$upgrade, file = file.path(o$folder, "report.html"),
                   quiet = TRUE),
-    report_fragment = list(x = seeming("amiss_upgrade"), parts = NULL, level = 2),
+    report_fragment = list(x = o$upgrade, parts = NULL, level = 2),
     response_mechanism = list(boundary = "Gv", measurements = o$measurements, unit = "W/m2", gain = NULL,
                               time_constant = NULL, reference = NULL, name = "sun"),
     responses = list(measurements = o$measurements, units = character()),
@@ -269,3 +263,8 @@ study_rows <- function(field, ..., pattern = field) unlist(
   lapply(list(...), function(value) bad("study", field, value, pattern)), recursive = FALSE)
 
 row_name <- function(row) sprintf("%s(%s = %s)", row$f, row$arg, substr(deparse1(row$value), 1, 60))
+
+# Arguments that take anything, or nothing.
+takes_all <- list(circular = "x", program_simulator = "version", glance = "x", tidy = "x", augment = "x",
+                  autoplot = "object",
+                  slopes = c("simulator", "values", "drivers", "step_h", "hold"))  # gives none to any
