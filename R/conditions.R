@@ -90,7 +90,8 @@ check_whole <- function(x, name, hint = NULL, call = rlang::caller_env()) {
   fault <- object_fault(x)
   if (is.null(fault)) return(invisible(TRUE))
   wrong <- if (!is.null(fault$absent)) "it has no {.field {fault$absent}}."
-           else "its part {.field {fault$part}} is {seen(fault$value)}, which is no {fault$expected} of this size."
+           else paste("its part {.field {fault$part}} is {seen(fault$value)}, and not {kind_words(fault$expected)} of",
+                      "the size that goes with the other parts.")
   abort_input(c(paste("{.arg {name}} has the class {.cls {class(x)}}, but is not whole:", wrong),
                 i = hint %||% "Make it with the package's own function."), call = call)
 }

@@ -1,8 +1,10 @@
 # What the parts of the package's objects are, so that one that was damaged, faked or edited is known from a good one.
 #
-# A part is written as its kind and, in brackets, its size: numbers, or letters that stand for the same number in all
-# of the object. `?` before the kind: it may be absent or NULL. Kinds: text, flag, number (NA may be), real (finite),
-# estimate (NA, but not NaN), numbers (a list of single ones), values (any vector), list, table, function, any, a class, `:shape`, and `each:shape` (a list of these).
+# A part is written as its kind and, in brackets, its size: numbers, or letters that stand for the same number in all of
+# the object. `?` before the kind: it may be absent or NULL. Kinds: text, flag, number (NA may be), real (finite),
+# estimate (NA, but not NaN), numbers (a list of single ones), values (any vector), list, table, function, any, a class,
+# `:shape`, which shares the letters of what it is part of, and `each:shape` or `some:shape`, a list of these, of one at
+# least. The name `*` stands for the object itself.
 
 object_shapes <- list(
   amiss_prior = c(family = "text[1]", parameters = "numbers", lower = "number[1]", upper = "number[1]"),
@@ -19,7 +21,8 @@ object_shapes <- list(
     per_step = "real[1]", step_h = "real[1]", time = "values[n]", hours = "real[n]", segment = "real[n]",
     use = "text[n]", y = "number[n]", standard_error = "number[n]", boundary = "number[n,c]", condition = "real[c]",
     conditions = "text", constant = "?text", time_format = "?text[1]", time_zone = "?text[1]", findings = "?table",
-    faulty = "?number"),
+    faulty = "?number", missing = "?number",
+    range = "?number[2]"),
   raw = c(time = "values[m]", hours = "real[m]", step_h = "real[1]", segment = "real[m]", use = "text[m]",
           y = "number[m]", drivers = "number[m,d]"),
   amiss_ensemble = c(parameters = "some:amiss_free[p]", unit = "real[r,p]", values = "real[r,p]", outputs = "real[n,r]",
@@ -42,8 +45,9 @@ object_shapes <- list(
   amiss_calibration = c(posterior = ":history_posterior", priors = ":history_priors", control = ":history_control",
                         kept = "real[d]", coefficients = "real[e,d]", withheld = "real[w,d]", centre = "real[e]",
                         scale = "real[e]", reach = "number", tangent = ":tangent"),
-  history_posterior = c(unit = "real[k,p]", weights = "real[k]", setting = "real[k]", variance = "real[k]",
-                        t = "real[k,c]", trusted = "flag[1]", log_likelihood = "real[k]", log_evidence = "estimate[1]",
+  history_posterior = c(unit = "real[k,p]", weights = "real[k]", setting = "real[k]", variance = "number[k]",
+                        t = "real[k,c]", trusted = "flag[1]", log_likelihood = "number[k]",
+                        log_evidence = "estimate[1]",
                         standard_error = "estimate[1]", ess = "number[1]"),
   history_priors = c(noise_sd = "real[1]", noise_shape = "real[1]", discarded_variance = "real[1]",
                      inclusion = "real[1]", amplitude = "real[1]", correlation_times = "real", ratios = "real",
@@ -54,12 +58,16 @@ object_shapes <- list(
   amiss_paper_calibration = c(index = "table", evidence = "table", share = "real[s,b]", lambda = "real[k,l]",
                               hyperparameters = "list"),
   posterior = c(unit = "real[k,p]", weights = "real[k]", ess = "number[1]", ladder = "table", evaluations = "real[1]"),
-  amiss_joint = c(records = "some:amiss_fit", parameters = "some:amiss_free[p]", values = "real[k,p]", weights = "real[k]",
+  amiss_joint = c(records = "some:amiss_fit", parameters = "some:amiss_free[p]", values = "real[k,p]",
+                  weights = "real[k]",
                   posterior = ":posterior", log_evidence = "estimate[1]", standard_error = "estimate[1]",
-                  interval = "number[2]", trust = ":trust", check = "?:check"),
+                  interval = "number[2]", trust = ":trust", check = "?:check", seed = "number[1]"),
   amiss_upgrade = c(models = "some:model", candidates = "?table", catalogue = "amiss_catalogue",
                     measurements = "amiss_measurements|amiss_records",
-                    gain = "?list", stopped_because = "text[1]", runs_total = "real[1]", control = "list"),
+                    gain = "?:gain", stopped_because = "text[1]", stopped_id = "text[1]", seed = "number[1]",
+                    runs_total = "real[1]", control = "list"),
+  gain = c(log10_bf = "number[1]", interval = "number[2]", rmse_calibration = "number[2]",
+           rmse_validation = "number[2]"),
   model = c(name = "text[1]", fit = "amiss_fit|amiss_joint", prediction = "any", scores = "list"),
   amiss_comparison = c(method = "text[1]", models = "some:compared", tables = "list",
                        measurements = "amiss_measurements", control = "list", truth = "?list"),
@@ -81,12 +89,28 @@ versioned_classes <- c("amiss_measurements", "amiss_ensemble", "amiss_emulator",
 
 shapes_of <- function(x) intersect(class(x), names(object_shapes))
 
+shape_words <- c(text = "text", flag = "TRUE or FALSE", number = "numbers", real = "finite numbers",
+                 estimate = "a number or NA", numbers = "a list of numbers", values = "a vector", list = "a list",
+                 table = "a data frame", "function" = "a function", match = "what fits the others")
+
+# What a part should be, in words.
+kind_words <- function(kind) {
+  if (kind %in% names(shape_words)) return(shape_words[[kind]])
+  if (grepl("^(each|some):", kind)) return("a list of what it should hold")
+  paste("of class", kind)
+}
+
 # What sizes alone do not say.
 object_rules <- list(
   amiss_measurements = function(x) all(x$condition %in% seq_along(x$conditions)),
+  amiss_fit = function(x) {
+    !anyNA(x$measurements$y[x$rows]) && length(x$rows) == nrow(x$emulator$basis$vectors)
+  },
   amiss_calibration = function(x) {
     length(x$centre) == length(x$control$time_constants) * ncol(x$measurements$boundary)
   })
+
+rule_parts <- c(amiss_measurements = "conditions", amiss_fit = "rows", amiss_calibration = "coefficients")
 
 # NULL for an object that has all its parts, or list(absent) or list(part, value, expected) of the first that is wrong.
 object_fault <- function(x, shapes = shapes_of(x), within = "", sizes = new.env()) {
@@ -96,8 +120,8 @@ object_fault <- function(x, shapes = shapes_of(x), within = "", sizes = new.env(
     fault <- shape_fault(x, object_shapes[[shape]], sizes, within)
     if (!is.null(fault)) return(fault)
   }
-  for (rule in object_rules[shapes]) {
-    if (!is.null(rule) && !rule(x)) return(list(part = paste0(within, "conditions"), value = x, expected = "match"))
+  for (shape in intersect(shapes, names(object_rules))) {
+    if (!object_rules[[shape]](x)) return(list(part = paste0(within, rule_parts[[shape]]), value = x, expected = "match"))
   }
   if (within == "" && any(shapes %in% versioned_classes) && is.null(x[["format_version"]])) {
     list(absent = "format_version")
@@ -124,7 +148,7 @@ part_fault <- function(value, expected, sizes, name) {
   many <- grepl("^(each|some):", kind)
   right <- if (many) is.list(value) && (length(value) || startsWith(kind, "each")) else is_kind(value, kind)
   if (!right || !has_size(value, sub("^[^[]*", "", expected), sizes)) {
-    return(list(part = name, value = value, expected = sub("^(each|some):(amiss_)?", "list of ", kind)))
+    return(list(part = name, value = value, expected = kind))
   }
   if (many) return(each_fault(value, substring(kind, 6), name))
   if (startsWith(kind, "amiss_")) object_fault(value, shapes_of(value), paste0(name, "$"))
@@ -143,7 +167,8 @@ each_fault <- function(values, shape, name) {
 
 is_kind <- function(value, kind) {
   number <- function() is.numeric(value) && !is.object(value)
-  switch(kind, any = TRUE, text = is.character(value) && !anyNA(value) && all(validEnc(value)), flag = is.logical(value),
+  switch(kind, any = TRUE, text = is.character(value) && !anyNA(value) && all(validEnc(value)),
+         flag = is.logical(value),
          number = number() || is.logical(value) && all(is.na(value)), real = number() && all(is.finite(value)),
          estimate = is.double(value) && !any(is.nan(value)),
          numbers = is.list(value) && all(vapply(value, is_kind, NA, "real") & lengths(value) == 1),

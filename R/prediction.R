@@ -11,6 +11,8 @@
 #'   was called there), all boundary conditions of the record and what else drives the simulator, one row for each
 #'   interval. Its target, if it has that column, is compared with
 #'   the prediction, and nothing is learned from it. A data frame has no warm-up: begin it before the rows that count.
+#'   It is checked as the record was: `missing` and `range` of [measurements()] hold, other codes for a missing value
+#'   are refused, and a warning names values far outside all others, readings that are stuck, and counters.
 #'   By default the record that was calibrated on.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both; every row of a data frame.
 #' @param draws Number of posterior draws.
@@ -116,7 +118,8 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   data <- plain_table(as.list(data), nrow(data))
   require_columns(data, c("time", terms$name), call)
   data <- with_switches(data, terms$name)
-  require_numeric(data, c(terms$name, intersect(m$target, names(data))), call)
+  compared <- c(terms$name, intersect(m$target, names(data)))
+  require_numeric(data, compared, call)
   time <- read_time(data$time, "time", m$time_format, m$time_zone, call)
   hours <- time_hours(time)
   step <- m$raw$step_h
@@ -125,6 +128,7 @@ new_record <- function(m, data, call = rlang::caller_env()) {
                   i = "Predict each part of a broken record on its own."), call = call)
   }
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, NA)], c("time", m$target))
+  data <- checked_values(m, data, compared, numeric_columns, terms$name[terms$circular], call)
   drivers <- as.matrix(data[numeric_columns])
   require_complete(drivers, terms$name, time, call = call)
   observed <- if (m$target %in% names(data)) as.numeric(data[[m$target]]) else rep(NA_real_, nrow(data))
@@ -134,6 +138,17 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   coarse <- average_rows(raw, m$step_h, columns$values, call)
   c(list(raw = raw, observed = coarse$y, condition = columns$condition, conditions = columns$names),
     utils::modifyList(coarse, list(y = numeric(length(coarse$y)))))
+}
+
+# The table as the record's own was read: its codes for a missing value and the range of its sensor hold here as well,
+# other codes are refused, and values that seem to be no measurements are told of.
+checked_values <- function(m, data, compared, numeric_columns, circular, call) {
+  data <- with_marks(data, union(compared, numeric_columns), m$target, m$missing, m$range)
+  if (!identical(m$missing, NA)) refuse_codes(data, compared, circular, call)
+  found <- table_findings(data[union(compared, numeric_columns)], m$target, circular, m$noise_sd * sqrt(m$per_step),
+                          m$per_step, m$findings)
+  warn_findings(found[found$id != "missing_code", ], "newdata")
+  data
 }
 
 # The lacking response at the rows of these uses (rows x kept draws), and what it leaves in calibration.

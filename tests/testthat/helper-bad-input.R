@@ -239,8 +239,8 @@ bad_study <- function(fields) {
   o <- bad_input_objects()
   utils::write.csv(o$record, file.path(o$folder, "data.csv"), row.names = FALSE)
   writeLines(
-    'function_simulator(function(values, drivers) drivers[, "Te"], free("gain", uniform(0, 1)), boundary = "Te")',
-             file.path(o$folder, "model.R"))
+    paste('function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],',
+          'free("gain", uniform(0, 1)), boundary = "Te")'), file.path(o$folder, "model.R"))
   writeLines('catalogue(mechanism("sun", identity, "Gv", "The sun."))', file.path(o$folder, "catalogue.R"))
   study <- list(study = "linear", data = "data.csv", time = "hour", target = "Ti", boundary = list("Te", "Gv"),
                 noise_sd = 0.1,

@@ -15,17 +15,20 @@ hostile_values <- list(
   null = NULL, na = NA, na_real = NA_real_, na_text = NA_character_, nan = NaN, inf = Inf, minus_inf = -Inf,
   negative = -1, zero = 0, half = 0.5, fraction = 1.5, huge = 1e300, beyond_integers = 2^31, true = TRUE,
   numbers = c(0.5, 0.25), whole = 2L, named = c(a = 1), complex = 1i, raw = as.raw(1), integer64 = as_integer64(2),
-  date = as.Date("2024-03-01"), stamp = as.POSIXct("2024-03-01", tz = "UTC"), difference = as.difftime(1, units = "days"),
+  date = as.Date("2024-03-01"), stamp = as.POSIXct("2024-03-01", tz = "UTC"),
+  difference = as.difftime(1, units = "days"),
   factor = factor("a"), no_numbers = numeric(), no_text = character(), empty_text = "", blank = " ", newline = "a\nb",
   quotes = "it's \"a\"", braces = "{stop('evaluated')}", markup = "{.val", bracket = "[a", backslash = "\\1",
   percent = "%s%n", path_up = "../../x", bytes = bytes_text, not_utf8 = "a\xff", long_text = strrep("a", 1e4),
   texts = c("a", "a"), empty_list = list(), list_of_null = list(NULL), list_of_number = list(1),
-  list_of_self = list(list(list())), twice_named = list(a = 1, a = 2), no_names = stats::setNames(list(1, 2), c("", "")),
+  list_of_self = list(list(list())), twice_named = list(a = 1, a = 2),
+  no_names = stats::setNames(list(1, 2), c("", "")),
   na_names = stats::setNames(list(1), NA), all_columns = ~ ., two_sided = a ~ b, broken_formula = structure(list(),
   class = "formula"), symbol = as.name("x"), call = quote(x + 1), expression = expression(x), identity = identity,
   no_arguments = function() NULL, stops = function(...) stop("inside"), primitive = sum, environment = new.env(),
   no_table = data.frame(), no_rows = data.frame(a = 1)[0, , drop = FALSE], table = data.frame(a = 1),
-  list_column = data.frame(a = I(list(1, "b"))), no_matrix = matrix(0, 0, 0), matrix = matrix(c(0.5, 0.25, 0.1, 0.2), 2),
+  list_column = data.frame(a = I(list(1, "b"))), no_matrix = matrix(0, 0, 0),
+  matrix = matrix(c(0.5, 0.25, 0.1, 0.2), 2),
   array = array(1, c(1, 1, 1)), text_matrix = matrix("a"), list_matrix = matrix(list(1, 2), 1),
   foreign = structure(list(), class = "nonsense"), foreign_number = structure(1, class = "nonsense"),
   not_whole_fit = structure(list(), class = "amiss_fit"), s4 = methods::getClass("numeric"))
@@ -33,12 +36,15 @@ hostile_values <- list(
 # What is like a good value, and is not one.
 near_values <- function(value) {
   if (is.function(value) || is.null(value)) return(list())
-  near <- list(doubled = c(value, value), as_list = list(value), nothing = value[0], faked = structure(list(), class = class(value)))
+  near <- list(doubled = c(value, value), as_list = list(value), nothing = value[0],
+               faked = structure(list(), class = class(value)))
   if (is.data.frame(value)) return(c(near["faked"], near_tables(value)))
   if (is.matrix(value)) return(c(near["faked"], near_matrices(value)))
   if (is.list(value)) return(c(near, near_lists(value)))
-  if (is.numeric(value)) near <- c(near, list(one_missing = replace(value, length(value), NA), text = as.character(value)))
-  if (is.character(value)) near <- c(near, list(factor = factor(value), one_missing = replace(value, length(value), NA)))
+  if (is.numeric(value))
+    near <- c(near, list(one_missing = replace(value, length(value), NA), text = as.character(value)))
+  if (is.character(value))
+    near <- c(near, list(factor = factor(value), one_missing = replace(value, length(value), NA)))
   near
 }
 
@@ -65,7 +71,8 @@ near_matrices <- function(x) {
     x
   }
   list(no_rows = x[0, , drop = FALSE], no_columns = x[, 0, drop = FALSE], turned = t(x), no_names = unname(x),
-       table = as.data.frame(x), missing = replace(x, 1, NA), infinite = replace(x, 1, Inf), huge = replace(x, 1, 1e300),
+       table = as.data.frame(x), missing = replace(x, 1, NA), infinite = replace(x, 1, Inf),
+       huge = replace(x, 1, 1e300),
        text = `storage.mode<-`(x, "character"), complex = `storage.mode<-`(x, "complex"),
        integer64 = structure(as_integer64(x), dim = dim(x), dimnames = dimnames(x)), vector = as.vector(x),
        more = cbind(x, x), array = array(x, c(dim(x), 1)), empty_name = named(""), no_name = named(NA),
@@ -83,7 +90,8 @@ near_lists <- function(x, deeper = TRUE) {
     x
   }
   without <- function(i) structure(unclass(x)[-i], class = oldClass(x))
-  wrong <- list(null = NULL, text = "nonsense", nothing = numeric(), nan = NaN, list = list(), numbers = c(0.5, 0.25, 0.1))
+  wrong <- list(null = NULL, text = "nonsense", nothing = numeric(), nan = NaN, list = list(),
+                numbers = c(0.5, 0.25, 0.1))
   parts <- stats::setNames(seq_along(x), sprintf("%s[[%d]]", rlang::names2(x), seq_along(x)))
   made <- lapply(parts, function(i) {
     inner <- if (deeper && is.list(x[[i]]) && !is.data.frame(x[[i]])) near_lists(x[[i]], FALSE)
@@ -106,10 +114,12 @@ equal_tables <- function(value) {
   if (is.data.frame(value)) {
     numbers <- value
     numbers[[1]] <- as_integer64(value[[1]])
-    return(list(turned = value[rev(names(value))], of_integer64 = numbers, of_text = replace(value, 1, list(paste(value[[1]])))))
+    return(list(turned = value[rev(names(value))], of_integer64 = numbers,
+                of_text = replace(value, 1, list(paste(value[[1]])))))
   }
   if (!is.matrix(value) || !is.numeric(value)) return(list())
-  list(of_table = as.data.frame(value), turned = value[, rev(seq_len(ncol(value))), drop = FALSE])
+  c(list(of_table = as.data.frame(value)),
+    if (!is.null(colnames(value))) list(turned = value[, rev(seq_len(ncol(value))), drop = FALSE]))
 }
 
 # ---- rows: list(f, at, what, value, same) of a call of `f` whose argument number `at` is replaced
@@ -119,10 +129,34 @@ generated_calls <- function() {
   calls <- valid_calls()
   calibration <- bad_input_objects()$calibration
   calls$upgrade_model$control <- list(rounds = 1, max_steps = 1, calibration = calibration)
-  calls$compare_models$control <- list(rounds = 1, calibration = calibration)
-  calls$run_study$path <- bad_study(list(control = list(rounds = 1, max_steps = 1)))
+  calls$compare_models$control <- list(calibration = calibration)
+  calls$run_study$path <- bad_study(list(control = list(rounds = 1, max_steps = 1,
+                                                        calibration = plain_lists(calibration))))
   calls$run_study$trust <- TRUE
+  calls$read_calibro$folder <- calibro_folder(bad_input_objects())
   calls
+}
+
+# As a study file has them, in which Inf is the word .inf.
+plain_lists <- function(control) lapply(control, function(x) if (is.list(x)) plain_lists(x) else as.list(x))
+
+calibro_folder <- function(o) {
+  folder <- tempfile("calibro-")
+  dir.create(folder)
+  tables <- list(obs = o$record["Ti"][1:45, , drop = FALSE], bc = o$record[1:45, c("Te", "Gv")],
+                 inputs = o$ensemble$values, sims = o$ensemble$outputs)
+  for (name in names(tables)) {
+    utils::write.table(tables[[name]], file.path(folder, paste0(name, ".csv")), sep = ",", row.names = FALSE,
+                       col.names = FALSE)
+  }
+  folder
+}
+
+# Stands in for the work of a report.
+no_report <- function(x, source, work, kind, quiet) {
+  made <- file.path(work, "report.html")
+  writeLines("report", made)
+  made
 }
 
 generated_rows <- function(calls) {

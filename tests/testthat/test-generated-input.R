@@ -1,0 +1,102 @@
+# Whatever is given to an exported function is refused by a condition of the package, or gives a right result: see
+# helper-generated-input.R. AMISS_EXTENDED_TESTS=true tries all of it.
+skip_on_cran()  # second tier: tools/test --quick
+
+wrong_outcomes <- function(rows, calls) {
+  withr::local_dir(withr::local_tempdir())  # some values name files
+  stand_in(render_report = no_report)
+  outcomes <- vapply(rows, generated_outcome, "", calls)
+  paste(vapply(rows, row_words, "", calls), outcomes)[nzchar(outcomes)]
+}
+
+test_that("every exported function has a good call, which is accepted", {
+  calls <- generated_calls()
+  exports <- setdiff(getNamespaceExports("amiss"), c("circular", "decision_rules", "slopes"))
+  expect_identical(setdiff(exports, names(calls)), character())
+  stand_in(render_report = no_report)
+  refused <- Filter(function(f) !is.null(called(f, unclass(calls[[f]]))$refused),
+                    setdiff(names(calls), "report_fragment"))
+  expect_identical(refused, character())
+})
+
+test_that("hostile values are refused by a condition of the package, or change nothing", {
+  calls <- generated_calls()
+  rows <- generated_rows(calls)
+  expect_gt(length(rows), 40000)
+  if (!nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) rows <- spread_rows(rows, 1200)
+  expect_gt(length(unique(vapply(rows, row_words, "", calls))), 1100)
+  expect_identical(wrong_outcomes(rows, calls), character())
+})
+
+# ---- objects of another version, damaged and faked
+
+read_objects <- function() {
+  o <- bad_input_objects()
+  quietly <- function(x) suppressWarnings(suppressMessages(x))
+  calls <- generated_calls()
+  result <- function(f, ...) quietly(do.call(exported_function(f), utils::modifyList(calls[[f]], list(...))))
+  c(o[c("measurements", "ensemble", "emulator", "fit", "paper", "upgrade", "function_simulator", "program")],
+    list(joint = result("calibrate_jointly", control = list(calibration = o$calibration)),
+         comparison = result("compare_models"), sampled = result("ais"), indices = result("sobol_indices"),
+         attribution = result("attribute_discrepancy", control = list(surrogates = 19)),
+         discrepancy = discrepancy(o$fit)))
+}
+
+# Generics for the package's own use, whose callers have looked already.
+inner_generics <- c("calibrated_record", "calibrator", "condition_table", "default_control", "figures_of",
+                    "free_parameters", "driver_names", "simulate_runs", "result_list", "report_content")
+
+# The methods that read an object of these classes, by name.
+readers_of <- function(classes) {
+  methods <- getNamespaceInfo("amiss", "S3methods")
+  methods <- methods[methods[, 2] %in% classes & !methods[, 1] %in% inner_generics, , drop = FALSE]
+  mget(methods[, 3], asNamespace("amiss"))
+}
+
+reader_outcome <- function(reader, object, class) {
+  told <- tryCatch({
+    utils::capture.output(reader(object))
+    "accepted"
+  }, error = function(e) if (inherits(e, class)) "" else paste0("<", class(e)[1], "> ", conditionMessage(e)))
+  told
+}
+
+test_that("every reader of an object says that it was made by another version, and what to do", {
+  objects <- read_objects()
+  readers <- lapply(objects, function(object) readers_of(class(object)))
+  expect_gt(sum(lengths(readers)), 80)
+  for (name in names(objects)) for (reader in names(readers[[name]])) {
+    old <- objects[[name]]
+    old$format_version <- 2L
+    expect_identical(reader_outcome(readers[[name]][[reader]], old, "amiss_error_version"), "", label = reader)
+  }
+  old <- objects$upgrade
+  for (version in list(4, "3", list(), NA)) {
+    old$format_version <- version
+    expect_identical(reader_outcome(print, old, "amiss_error_version"), "")
+  }
+  old$format_version <- 2L
+  expect_error(print(old), "made by another version.*Its format is 2; this version reads 3.*Make it again",
+               class = "amiss_error_input")
+})
+
+test_that("every reader refuses what is damaged, and no reader stops raw", {
+  withr::local_options(cli.progress_show_after = Inf)
+  withr::local_pdf(NULL)
+  objects <- read_objects()
+  rows <- unlist(lapply(names(objects), function(name) {
+    damaged <- near_lists(objects[[name]])
+    unlist(lapply(names(readers_of(class(objects[[name]]))), function(reader) {
+      Map(function(value, what) list(object = name, reader = reader, value = value, what = what), damaged,
+          names(damaged))
+    }), recursive = FALSE)
+  }), recursive = FALSE)
+  if (!nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) rows <- spread_rows(rows, 300)
+  raw <- vapply(rows, function(row) {
+    reader <- readers_of(class(objects[[row$object]]))[[row$reader]]
+    if (row$reader %in% c("update.amiss_fit", "predict.amiss_emulator")) return("")
+    told <- reader_outcome(function(x) suppressWarnings(reader(x)), row$value, "amiss_error")
+    if (told %in% c("", "accepted")) "" else paste(row$reader, row$object, row$what, told)
+  }, "")
+  expect_identical(unname(raw[nzchar(raw)]), character())
+})
