@@ -54,7 +54,7 @@ fitted.amiss_fit <- function(object, ...) {
 residuals.amiss_fit <- function(object, ...) {
   check_whole(object, "object")
   rlang::check_dots_empty()
-  object$measurements$y[object$rows] - simulated_mean(object)
+  left_by_mean(object)
 }
 
 #' @rdname fit

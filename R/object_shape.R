@@ -11,7 +11,7 @@ object_shapes <- list(
   amiss_free = c(name = "text[1]", prior = "amiss_prior", unit = "text[1]", label = "text[1]"),
   amiss_component = c(type = "text[1]", name = "text[1]"),
   amiss_zone = c(components = "each:amiss_component"),
-  amiss_mechanism = c(name = "text[1]", edit = "function", boundary = "text", sentence = "text[1]"),
+  amiss_mechanism = c(name = "text[1]", edit = "function|amiss_ensemble", boundary = "text", sentence = "text[1]"),
   amiss_catalogue = c("*" = "each:amiss_mechanism"),
   amiss_function_simulator = c(name = "text[1]", f = "function", parameters = "some:amiss_free", boundary = "text"),
   amiss_program_simulator = c(name = "text[1]", command = "text", parameters = "some:amiss_free", boundary = "text",

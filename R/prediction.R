@@ -157,7 +157,7 @@ carried_response <- function(fit, use, threads, record = fit$measurements) {
   responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
   moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads, record)
            else matrix(0, length(rows), nrow(fit$withheld))
-  left <- stats::residuals(fit) - rowMeans(seen_response(fit))
+  left <- left_by_mean(fit) - rowMeans(seen_response(fit))
   list(response = lacking_response(fit, responses, moves),
        sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
 }
