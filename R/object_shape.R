@@ -67,7 +67,8 @@ object_shapes <- list(
                     gain = "?:gain", stopped_because = "text[1]", stopped_id = "text[1]", seed = "number[1]",
                     runs_total = "real[1]", control = "list"),
   gain = c(log10_bf = "number[1]", interval = "number[2]", rmse_calibration = "number[2]",
-           rmse_validation = "number[2]"),
+           rmse_validation = "number[2]", coverage95_validation = "number[2]", crps_calibration = "number[2]",
+           crps_validation = "number[2]"),
   model = c(name = "text[1]", fit = "amiss_fit|amiss_joint", prediction = "any", scores = "list"),
   amiss_comparison = c(method = "text[1]", models = "some:compared", tables = "list",
                        measurements = "amiss_measurements", control = "list", truth = "?list"),
@@ -121,7 +122,8 @@ object_fault <- function(x, shapes = shapes_of(x), within = "", sizes = new.env(
     if (!is.null(fault)) return(fault)
   }
   for (shape in intersect(shapes, names(object_rules))) {
-    if (!object_rules[[shape]](x)) return(list(part = paste0(within, rule_parts[[shape]]), value = x, expected = "match"))
+    if (!object_rules[[shape]](x))
+      return(list(part = paste0(within, rule_parts[[shape]]), value = x, expected = "match"))
   }
   if (within == "" && any(shapes %in% versioned_classes) && is.null(x[["format_version"]])) {
     list(absent = "format_version")

@@ -15,6 +15,7 @@ even_draws <- function(fit, n) {
 }
 
 weighted_quantile <- function(x, w, probs) {
+  if (length(x) == 1) return(rep(x, length(probs)))
   order <- order(x)
   cumulative <- cumsum(w[order]) / sum(w)
   stats::approx(cumulative, x[order], probs, rule = 2, ties = "ordered")$y

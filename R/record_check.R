@@ -48,7 +48,8 @@ refuse_codes <- function(data, columns, circular, call = rlang::caller_env()) {
     codes <- unique(v[rows])
     abort_input(c(paste("{.val {column}} is {listed(format_each(codes), 'or')} in {rows_words(rows)}: a code for a",
                         "missing value."),
-                  i = paste("Give {.code missing = {value_code(codes)}} to {.fun measurements}, which sets it to NA, or",
+                  i = paste(
+                    "Give {.code missing = {value_code(codes)}} to {.fun measurements}, which sets it to NA, or",
                             "correct these rows."),
                   i = "If it was measured, {.code missing = NA} says that no value is a code."), call = call)
   }

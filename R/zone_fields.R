@@ -58,6 +58,7 @@ zone_limits <- function() {
 is_free <- function(x) inherits(x, c("amiss_free", "amiss_scaled_free"))
 
 check_field <- function(value, rule, where, field, call) {
+  if (is.character(value)) check_readable(value, field, call)
   switch(rule$kind,
     number = check_number_field(value, rule, where, field, call),
     column = if (!(rule$optional && is.null(value)) && !checkmate::test_string(value, min.chars = 1)) {

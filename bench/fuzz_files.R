@@ -66,7 +66,8 @@ while (proc.time()[["elapsed"]] - started < seconds) {
   if (!is.null(now) && now$case != since$case) since <- c(now, list(at = elapsed))
   hangs <- since$case >= 0 && elapsed - since$at > longest
   if (reader$is_alive() && !hangs) next
-  if (is.null(now) || now$case < first) stop("the reader did not begin:\n", paste(readLines(file.path(work, "log")), "\n"))
+  if (is.null(now) || now$case < first)
+    stop("the reader did not begin:\n", paste(readLines(file.path(work, "log")), "\n"))
   what <- if (hangs) "hangs" else "crashes"
   invisible(reader$kill_tree())
   keep_finding(now$case, now$kind, what)

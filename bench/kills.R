@@ -3,11 +3,11 @@
 # Usage: Rscript bench/kills.R --out FILE [--kills 40] [--seed 1]
 #
 # A small study with `exec/amiss run`, once with an R function as its simulator and once with a program (awk). It runs
-# alone first (without the work of a report and of figures). Then R is killed (SIGKILL) at random moments of its way, again and again; after each fifth kill the same
-# command goes on to its end. It holds if after each kill what stands under the names of results is whole, if each end
-# is the result of the study that was left alone (`result.json` but for its seconds), and if then no process of the
-# study, no folder of a run and no file but the results is left. FILE gets a row for each simulator: kills, ends, and
-# how many of each broke this.
+# alone first (without the work of a report and of figures). Then R is killed (SIGKILL) at random moments of its way,
+# again and again; after each fifth kill the same command goes on to its end. It holds if after each kill what stands
+# under the names of results is whole, if each end is the result of the study that was left alone (`result.json` but for
+# its seconds), and if then no process of the study, no folder of a run and no file but the results is left. FILE gets a
+# row for each simulator: kills, ends, and how many of each broke this.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -33,7 +33,8 @@ models <- list(
                   values[['offset']] + 0.4 * drivers[, 'Te']
                 }, free('offset', uniform(10, 30), 'K'), boundary = 'Te')",
   program = "program_simulator(c('awk', '-F', ',', '-v', 'OFMT=%.12g', '-v', 'offset={{offset}}',
-                                 'NR == 1 { for (i = 1; i <= NF; i++) { gsub(/\"/, \"\", $i); at[$i] = i }; print \"Ti\" }
+                                 'NR == 1 { for (i = 1; i <= NF; i++) { gsub(/\"/, \"\", $i); at[$i] = i }
+                                            print \"Ti\" }
                                   NR > 1 { print offset + 0.4 * $at[\"Te\"] }', 'drivers.csv'),
                                free('offset', uniform(10, 30), 'K'), boundary = 'Te', cache = 'runs',
                                output = c(file = 'stdout.txt', column = 'Ti'))")
@@ -43,7 +44,8 @@ suns <- list(
   r_function = "with_parameters(model, free('sun', uniform(0, 0.01)), boundary = 'Gv',
                   f = function(values, drivers, base) base(values) + values[['sun']] * drivers[, 'Gv'])",
   program = "program_simulator(c('awk', '-F', ',', '-v', 'OFMT=%.12g', '-v', 'offset={{offset}}', '-v', 'sun={{sun}}',
-                                 'NR == 1 { for (i = 1; i <= NF; i++) { gsub(/\"/, \"\", $i); at[$i] = i }; print \"Ti\" }
+                                 'NR == 1 { for (i = 1; i <= NF; i++) { gsub(/\"/, \"\", $i); at[$i] = i }
+                                            print \"Ti\" }
                                   NR > 1 { print offset + 0.4 * $at[\"Te\"] + sun * $at[\"Gv\"] }',
                                  'drivers.csv'),
                                free('offset', uniform(10, 30), 'K'), free('sun', uniform(0, 0.01)),
@@ -108,7 +110,8 @@ is_whole <- function(out, reference) {
 processes_of <- function(folder) {
   ids <- setdiff(grep("^[0-9]+$", dir("/proc"), value = TRUE), Sys.getpid())
   Filter(function(id) {
-    words <- suppressWarnings(tryCatch(readBin(file.path("/proc", id, "cmdline"), "raw", 1e5), error = function(e) raw()))
+    words <- suppressWarnings(tryCatch(readBin(file.path("/proc", id, "cmdline"), "raw", 1e5),
+                                       error = function(e) raw()))
     words <- rawToChar(replace(words, words == as.raw(0), charToRaw(" ")))
     place <- suppressWarnings(Sys.readlink(file.path("/proc", id, "cwd")))
     grepl(folder, words, fixed = TRUE) || isTRUE(startsWith(place, folder))
@@ -131,7 +134,8 @@ killed_study <- function(kind) {
   if (!file.exists(file.path(alone, "result.json"))) stop(paste(readLines(file.path(folder, "log")), collapse = "\n"))
   reference <- found(alone)
   cat(sprintf("%s: %.0f s when left alone; named %s\n", kind, seconds, reference$named_cause$mechanism %||% "nothing"))
-  row <- list(simulator = kind, seconds_alone = seconds, kills = 0, in_vain = 0, not_whole = 0, ends = 0, other_result = 0,
+  row <- list(simulator = kind, seconds_alone = seconds, kills = 0, in_vain = 0, not_whole = 0, ends = 0,
+              other_result = 0,
               processes_left = 0, files_left = 0)
   try_out <- file.path(folder, "out")
   end <- function() {

@@ -1,11 +1,13 @@
 # Random changes of the bytes and of the structure of a text file.
 
 # Words that mean something to a reader of tables, of YAML, or of numbers.
-telling <- c("NA", "NaN", "Inf", "-9999", "1e400", "1e-400", "017", "0x1F", "1e-3", "1:30", "1_000", "1,234.5", "1.234,5",
+telling <- c("NA", "NaN", "Inf", "-9999", "1e400", "1e-400", "017", "0x1F", "1e-3", "1:30", "1_000", "1,234.5",
+             "1.234,5",
              "12-101", "1d3", "\"", "'", "\"\"", ",", ";", "\t", "|", " ", "\n", "\r\n", "\r", "\n\n\n", "#", "%", "!",
              "!!int ", "!!binary ", "!ruby ", "&a ", "*a", "<<: *a", "- ", "? ", ": ", "{", "}", "[", "]", "{}", "[]",
              "null", "~", "true", "yes", "no", "off", ".inf", ".nan", "---\n", "...\n", "%YAML 1.1\n", "|\n  ", ">\n  ",
-             "2024-02-30", "2024-03-31 02:30", "25:00", "\u00a0", "\u2019", "\u20ac", "\ufeff", "{x}", "{stop(1)}", "%s",
+             "2024-02-30", "2024-03-31 02:30", "25:00", "\u00a0", "\u2019", "\u20ac", "\ufeff", "{x}", "{stop(1)}",
+             "%s",
              "../x", "~/x", "/dev/zero", "system('false')", "99999999999999999999", "-0", "+5", ".5", "5.", "1e", "--1")
 
 at_random <- function(bytes) sample.int(length(bytes) + 1, 1) - 1

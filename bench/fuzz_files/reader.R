@@ -10,7 +10,8 @@ source(file.path(here, "changes.R"))
 # ---- good files
 
 hour <- 1:60
-record <- data.frame(hour, Te = round(10 + 5 * sin(hour / 4) + sin(hour), 3), Gv = round(pmax(0, 300 * sin(hour / 4)), 1))
+record <- data.frame(hour, Te = round(10 + 5 * sin(hour / 4) + sin(hour), 3),
+                     Gv = round(pmax(0, 300 * sin(hour / 4)), 1))
 record$Ti <- round(20 + 0.4 * record$Te + 0.1 * sin(7 * hour), 3)
 comma <- function(x) gsub(".", ",", format(x, trim = TRUE), fixed = TRUE)
 stamps <- format(as.POSIXct("2024-03-30", tz = "UTC") + 3600 * hour, "%d.%m.%Y %H:%M")

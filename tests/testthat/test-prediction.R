@@ -237,7 +237,8 @@ test_that("a table to predict is checked as the record was", {
     expect_error(predict(fit, new_table(column, 20:23, code)), "rows 20 to 23: a code for a missing value",
                  class = "amiss_error_input")
   }
-  expect_warning(predict(fit, new_table("Te", 40, 500)), "Te is 500 in row 40, far outside", class = "amiss_warning_input")
+  expect_warning(predict(fit, new_table("Te", 40, 500)), "Te is 500 in row 40, far outside",
+                 class = "amiss_warning_input")
   expect_warning(augment(fit, newdata = new_table("Gv", 30, 1e5)), "Gv is 1e\\+05", class = "amiss_warning_input")
   expect_warning(predict(fit, new_table("Te", 30:70, 11.7)), "stuck", class = "amiss_warning_input")
 })
