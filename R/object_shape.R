@@ -64,7 +64,7 @@ object_shapes <- list(
                   interval = "number[2]", trust = ":trust", check = "?:check", seed = "number[1]"),
   amiss_upgrade = c(models = "some:model", candidates = "?table", catalogue = "amiss_catalogue",
                     measurements = "amiss_measurements|amiss_records",
-                    gain = "?:gain", stopped_because = "text[1]", stopped_id = "text[1]", seed = "number[1]",
+                    gain = ":gain", stopped_because = "text[1]", stopped_id = "text[1]", seed = "number[1]",
                     runs_total = "real[1]", control = "list"),
   gain = c(log10_bf = "number[1]", interval = "number[2]", rmse_calibration = "number[2]",
            rmse_validation = "number[2]", coverage95_validation = "number[2]", crps_calibration = "number[2]",

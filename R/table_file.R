@@ -26,9 +26,17 @@ read_table_file <- function(path, names, separator = NULL, decimal = NULL, call 
 check_table_options <- function(separator, decimal, call) {
   check_input(checkmate::check_string(separator, min.chars = 1, null.ok = TRUE), "separator",
               "Give the sign between two fields, or one of {.val {names(separators)}}.", call = call)
+  if (!is.null(separator) && !can_separate(known_separator(separator))) {
+    abort_input(c("{.arg separator} = {.val {separator}} is no sign that can stand between fields.",
+                  i = "Give one sign, or one of {.val {names(separators)}}."), call = call)
+  }
   check_input(checkmate::check_choice(decimal, c(".", ","), null.ok = TRUE), "decimal",
               "It is {.val .} or {.val ,}, in quotes.", call = call)
 }
+
+# One sign that no field begins or ends with; "" stands for spaces.
+can_separate <- function(sign) !nzchar(sign) || grepl("^([[:punct:]]|\t)$", sign) && !grepl("[\"'#]", sign) &&
+  nchar(sign, "bytes") == 1
 
 known_separator <- function(separator) {
   if (separator %in% names(separators)) return(separators[[separator]])

@@ -133,6 +133,8 @@ generated_calls <- function() {
   calls$run_study$path <- bad_study(list(control = list(rounds = 1, max_steps = 1,
                                                         calibration = plain_lists(calibration))))
   calls$run_study$trust <- TRUE
+  # predict() of a table goes this way.
+  calls$augment$newdata <- stats::setNames(bad_input_objects()$record[1:24, ], c("time", "Te", "Gv", "Ti"))
   calls$read_calibro$folder <- calibro_folder(bad_input_objects())
   calls
 }

@@ -28,6 +28,67 @@ test_that("hostile values are refused by a condition of the package, or change n
   expect_identical(wrong_outcomes(rows, calls), character())
 })
 
+# ---- files and the command
+
+# What YAML can write of the hostile values, and some that only it has.
+hostile_fields <- function() {
+  writable <- function(x) {
+    plain <- is.null(x) || (is.numeric(x) || is.logical(x) || is.character(x)) && !is.object(x) && is.null(dim(x))
+    plain && (!is.character(x) || all(validEnc(x) & Encoding(x) != "bytes"))
+  }
+  c(Filter(writable, hostile_values),
+    list(mapping = list(a = 1, b = "x"), nested = list(list(list(1))), empty = list(), date = "2024-02-30",
+         octal = "017"))
+}
+
+test_that("a study file with any field replaced is refused by a condition of the package, or done", {
+  stand_in(upgrade_model = function(...) structure(list(models = list()), class = "no_upgrade"))
+  fields <- setdiff(unlist(study_fields, use.names = FALSE), c("models", "method", "truth"))
+  rows <- expand.grid(field = fields, value = seq_along(hostile_fields()), stringsAsFactors = FALSE)
+  expect_gt(nrow(rows), 700)
+  rows <- spread_rows(unname(split(rows, seq_len(nrow(rows)))),
+                      if (nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) Inf else 150)
+  wrong <- vapply(rows, function(row) {
+    path <- bad_study(stats::setNames(hostile_fields()[row$value], row$field))
+    told <- called("run_study", list(path = path, quiet = TRUE, trust = TRUE))$refused
+    if (is.null(told) || inherits(told, "amiss_error")) return("")
+    paste(row$field, names(hostile_fields())[row$value], class(told)[1], conditionMessage(told))
+  }, "")
+  expect_identical(wrong[nzchar(wrong)], character())
+})
+
+test_that("the command ends any words with a status, and says why", {
+  words <- c("", " ", "run", "walk", "-", "--", "--out", "--out=", "--seed", "--seed=x", "--seed=1e99", "--threads=-1",
+             "--help=1", "-h", "--version", "{x}", "a\nb", "\u00e9", strrep("a", 1e4), "--trust", "--nonsense",
+             "/dev/null",
+             tempdir(), "--out=/dev/null/x", bad_study(list(runs = -1)))
+  withr::local_dir(withr::local_tempdir())
+  statuses <- withr::with_seed(1, vapply(1:150, function(i) {
+    given <- c(if (i %% 2) "run", sample(words, sample(0:4, 1), replace = TRUE))
+    suppressWarnings(suppressMessages(utils::capture.output(status <- run_command(given))))
+    as.numeric(status)
+  }, 0))
+  expect_true(all(statuses %in% 0:2) && all(c(0, 2) %in% statuses))
+})
+
+test_that("a table whose bytes or lines are changed is read, or refused by a condition of the package", {
+  changes <- testthat::test_path("..", "..", "bench", "fuzz_files", "changes.R")
+  skip_if_not(file.exists(changes), "the package's sources")
+  changed <- new.env()
+  sys.source(changes, changed)
+  path <- withr::local_tempfile(fileext = ".csv")
+  utils::write.csv(bad_input_objects()$record, path, row.names = FALSE)
+  good <- readBin(path, "raw", file.size(path))
+  wrong <- withr::with_seed(1, vapply(1:150, function(i) {
+    writeBin(changed$changed_bytes(good, list(good)), path)
+    tryCatch({
+      suppressWarnings(suppressMessages(linear_measurements(read_table_file(path, c("hour", "Ti", "Te", "Gv")))))
+      ""
+    }, amiss_error = function(e) "", error = function(e) paste(i, class(e)[1], conditionMessage(e)))
+  }, ""))
+  expect_identical(wrong[nzchar(wrong)], character())
+})
+
 # ---- objects of another version, damaged and faked
 
 read_objects <- function() {
