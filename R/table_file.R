@@ -40,7 +40,7 @@ can_separate <- function(sign) !nzchar(sign) || grepl("^([[:punct:]]|\t)$", sign
 
 known_separator <- function(separator) {
   if (separator %in% names(separators)) return(separators[[separator]])
-  if (!nzchar(trimws(separator)) && separator != "\t") "" else separator
+  if (grepl("^ +$", separator)) "" else separator
 }
 
 # list(line, fields, separator): the first line with most of the names. A header may stand in a comment.

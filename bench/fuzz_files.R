@@ -8,7 +8,7 @@
 # read_study(), which also checks the options, the program's table by simulate_runs(). It holds if each ends with a
 # condition of the package (class `amiss_error`), or with a result in which every number stands in the file; within ten
 # seconds, without a crash. FILE gets a row for each kind of file: cases, how many were read and refused, how many were
-# wrong, and the slowest in seconds; a file that breaks this is kept in the folder of findings, with what happened.
+# wrong, and the slowest: its seconds and number; a file that breaks this is kept in the folder of findings, with what happened.
 # Reading goes on in a process of its own, which is watched: see fuzz_files/reader.R.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
@@ -83,7 +83,8 @@ cases <- rbind(read_cases(), lost)
 invisible(file.copy(dir(work, "^found-", full.names = TRUE), findings, overwrite = TRUE))
 rows <- do.call(rbind, lapply(split(cases, cases$kind), function(x) {
   data.frame(kind = x$kind[1], cases = nrow(x), read = sum(x$outcome == "read"), refused = sum(x$outcome == "refused"),
-             wrong = sum(!x$outcome %in% c("read", "refused")), slowest_s = max(x$seconds))
+             wrong = sum(!x$outcome %in% c("read", "refused")), slowest_s = max(x$seconds),
+             slowest_case = x$case[which.max(x$seconds)])
 }))
 print(rows, row.names = FALSE)
 wrong <- cases[!cases$outcome %in% c("read", "refused"), ]
