@@ -7,8 +7,8 @@
 # a comparison) and the table that a program writes. Each is read as people's are: tables and study files by
 # read_study(), which also checks the options, the program's table by simulate_runs(). It holds if each ends with a
 # condition of the package (class `amiss_error`), or with a result in which every number stands in the file; within ten
-# seconds, without a crash. FILE gets a row for each kind of file: cases, how many were read and refused, how many were
-# wrong, and the slowest: its seconds and number; a file that breaks this is kept in the folder of findings, with what happened.
+# seconds, without a crash. FILE gets a row for each kind of file: cases, how many were read, refused and wrong, and the
+# slowest: its seconds and number; a file that breaks this is kept in the folder of findings, with what happened.
 # Reading goes on in a process of its own, which is watched: see fuzz_files/reader.R.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))

@@ -130,3 +130,12 @@ test_that("what cannot stand between fields is no separator", {
   expect_identical(read_table_file(path, c("hour", "Ti", "Te"), "comma"),
                    read_table_file(path, c("hour", "Ti", "Te"), ","))
 })
+
+test_that("a line of a great many fields is refused before a table is made of it", {
+  lines <- c("hour,Ti,Te", paste(1:20, 1:20, 1:20, sep = ","))
+  lines[10] <- strrep(",", 1e5)
+  path <- withr::local_tempfile(lines = lines)
+  stand_in(scan_fields = function(...) stop("a table is made"))
+  expect_error(read_table_file(path, c("hour", "Ti", "Te")), "Line 10 has 100001 fields, its header 3",
+               class = "amiss_error_input")
+})
