@@ -111,8 +111,9 @@ check_report_tools <- function(call = rlang::caller_env()) {
     abort_input(c("A report needs the R package {.pkg rmarkdown}, which is not installed.",
                   i = "Run {.code install.packages(\"rmarkdown\")}."), call = call)
   }
-  if (!rmarkdown::pandoc_available("2.0")) {
-    abort_input(c("A report needs pandoc 2.0 or later, which was not found.",
+  # A pandoc that cannot be started, for lack of memory perhaps, is an error there.
+  if (!tryCatch(rmarkdown::pandoc_available("2.0"), error = function(e) FALSE)) {
+    abort_input(c("A report needs pandoc 2.0 or later, which was not found or cannot be started.",
                   i = paste("Install it (Debian: {.code apt-get install pandoc}; others:",
                             "{.url https://pandoc.org/installing.html}), or work in RStudio, which brings it.")),
                 call = call)

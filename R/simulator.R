@@ -197,7 +197,7 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @export
 free_parameters <- function(simulator) {
   present(simulator)
-  if (!inherits(simulator, "amiss_ensemble")) check_simulator(simulator)
+  if (inherits(simulator, "amiss_ensemble")) check_whole(simulator, "simulator") else check_simulator(simulator)
   UseMethod("free_parameters")
 }
 
