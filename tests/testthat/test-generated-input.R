@@ -23,8 +23,8 @@ test_that("hostile values are refused by a condition of the package, or change n
   calls <- generated_calls()
   rows <- generated_rows(calls)
   expect_gt(length(rows), 40000)
-  if (!nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) rows <- spread_rows(rows, 1200)
-  expect_gt(length(unique(vapply(rows, row_words, "", calls))), 1100)
+  if (!nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) rows <- spread_rows(rows, 600)
+  expect_gt(length(unique(vapply(rows, row_words, "", calls))), 550)
   expect_identical(wrong_outcomes(rows, calls), character())
 })
 
@@ -47,7 +47,7 @@ test_that("a study file with any field replaced is refused by a condition of the
   rows <- expand.grid(field = fields, value = seq_along(hostile_fields()), stringsAsFactors = FALSE)
   expect_gt(nrow(rows), 700)
   rows <- spread_rows(unname(split(rows, seq_len(nrow(rows)))),
-                      if (nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) Inf else 150)
+                      if (nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) Inf else 80)
   wrong <- vapply(rows, function(row) {
     path <- bad_study(stats::setNames(hostile_fields()[row$value], row$field))
     told <- called("run_study", list(path = path, quiet = TRUE, trust = TRUE))$refused
@@ -63,7 +63,7 @@ test_that("the command ends any words with a status, and says why", {
              "/dev/null",
              tempdir(), "--out=/dev/null/x", bad_study(list(runs = -1)))
   withr::local_dir(withr::local_tempdir())
-  statuses <- withr::with_seed(1, vapply(1:150, function(i) {
+  statuses <- withr::with_seed(1, vapply(1:80, function(i) {
     given <- c(if (i %% 2) "run", sample(words, sample(0:4, 1), replace = TRUE))
     suppressWarnings(suppressMessages(utils::capture.output(status <- run_command(given))))
     as.numeric(status)
@@ -79,7 +79,7 @@ test_that("a table whose bytes or lines are changed is read, or refused by a con
   path <- withr::local_tempfile(fileext = ".csv")
   utils::write.csv(bad_input_objects()$record, path, row.names = FALSE)
   good <- readBin(path, "raw", file.size(path))
-  wrong <- withr::with_seed(1, vapply(1:150, function(i) {
+  wrong <- withr::with_seed(1, vapply(1:80, function(i) {
     writeBin(changed$changed_bytes(good, list(good)), path)
     tryCatch({
       suppressWarnings(suppressMessages(linear_measurements(read_table_file(path, c("hour", "Ti", "Te", "Gv")))))
@@ -152,7 +152,7 @@ test_that("every reader refuses what is damaged, and no reader stops raw", {
           names(damaged))
     }), recursive = FALSE)
   }), recursive = FALSE)
-  if (!nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) rows <- spread_rows(rows, 300)
+  if (!nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) rows <- spread_rows(rows, 150)
   raw <- vapply(rows, function(row) {
     reader <- readers_of(class(objects[[row$object]]))[[row$reader]]
     if (row$reader %in% c("update.amiss_fit", "predict.amiss_emulator")) return("")
