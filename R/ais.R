@@ -49,6 +49,7 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
   check_input(checkmate::check_function(log_likelihood), "log_likelihood")
   check_input(checkmate::check_list(priors, types = "amiss_prior", min.len = 1, names = "unique"), "priors",
               "For example {.code list(a = uniform(0, 1))}.")
+  for (one in priors) check_whole(one, "priors")
   check_input(checkmate::check_function(gradient, null.ok = TRUE), "gradient")
   control <- fill_ais_control(control)
   control$gradient <- !is.null(gradient)

@@ -176,6 +176,7 @@ group_words <- function(attribution) {
 
 #' @export
 tidy.amiss_attribution <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   x$table
 }

@@ -47,10 +47,11 @@
 #' @export
 read_calibro <- function(folder, parameters = NULL, relative = FALSE, step_h = 1, files = NULL) {
   call <- rlang::current_env()
+  check_input(checkmate::check_string(folder, min.chars = 1), "folder")
   check_input(checkmate::check_directory_exists(folder), "folder")
   check_input(checkmate::check_flag(relative), "relative")
   check_input(checkmate::check_number(step_h, lower = 1e-9, finite = TRUE), "step_h")
-  files <- merge_control(calibro_files, as.list(files), "files")
+  files <- merge_control(calibro_files, if (is.atomic(files)) as.list(files) else files, "files")
   for (name in names(files)) check_input(checkmate::check_string(files[[name]]), paste0("files$", name))
   tables <- lapply(files, function(file) read_numbers(fs::path_abs(file, folder), call))
   check_calibro_steps(tables, files)

@@ -347,7 +347,7 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
 #' tidy(comparison, "criteria")
 #' @export
 tidy.amiss_comparison <- function(x, what = "evidence", ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   rlang::check_dots_empty()
   check_input(checkmate::check_choice(what, names(x$tables)), "what")
   x$tables[[what]]
@@ -356,7 +356,7 @@ tidy.amiss_comparison <- function(x, what = "evidence", ...) {
 #' @rdname tidy.amiss_comparison
 #' @export
 glance.amiss_comparison <- function(x, ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   rlang::check_dots_empty()
   best <- x$tables$evidence[which.min(x$tables$evidence$rank), ]
   data.frame(best[c("model", "log10_evidence", "lower95", "upper95", "against", "log10_bf", "word", "probability",

@@ -33,7 +33,8 @@ check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) 
   frame <- parent.frame()
   value <- if (checks) present(eval(check[[2]], frame), call)
   if (checks && is.character(value)) check_readable(value, name, call)
-  if (isTRUE(verdict) && checks && as.character(check[[1]][[3]]) %in% number_checks) verdict <- plain_number(value)
+  kind <- if (checks) as.character(check[[1]][[3]]) else ""
+  if (isTRUE(verdict) && kind %in% number_checks) verdict <- plain_number(value, kind != "check_numeric")
   if (isTRUE(verdict)) return(invisible(TRUE))
   told <- if (checks) value_words(value)
   abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)), call = call)
@@ -73,49 +74,34 @@ format_version <- 3L
 
 check_object <- function(x, classes, name, hint = NULL, call = rlang::caller_env()) {
   check_input(checkmate::check_multi_class(x, classes), name, hint, call)
-  check_parts(x, name, hint, call)
+  check_whole(x, name, hint, call)
+}
+
+# What reads an object of the package begins with this: its format is this version's, and none of its parts is missing
+# or damaged.
+check_whole <- function(x, name, hint = NULL, call = rlang::caller_env()) {
   version <- if (is.list(x)) unclass(x)[["format_version"]]
-  if (is.null(version) || identical(version, format_version)) return(invisible(TRUE))
-  abort_input(c("{.arg {name}} was made by another version of the package.",
-                x = "Its format is {.val {version}}; this version reads {.val {format_version}}.",
-                i = "Make it again with this version."), call = call)
-}
-
-# Parts without which an object of a class was not made by the package.
-object_parts <- list(
-  amiss_prior = c("family", "parameters", "lower", "upper"),
-  amiss_free = c("name", "prior", "unit", "label"),
-  amiss_measurements = c("format_version", "target", "unit", "noise_sd", "y", "use", "raw", "conditions"),
-  amiss_ensemble = c("format_version", "parameters", "values", "outputs"),
-  amiss_emulator = c("format_version", "parameters", "basis", "processes"),
-  amiss_fit = c("format_version", "measurements", "rows", "values", "weights", "posterior"),
-  amiss_calibration = c("format_version", "measurements", "rows", "values", "weights", "posterior"),
-  amiss_component = c("type", "name"),
-  amiss_joint = c("format_version", "records", "parameters"),
-  amiss_upgrade = c("format_version", "models", "candidates", "measurements"),
-  amiss_comparison = c("format_version", "method", "models", "tables", "measurements"),
-  amiss_function_simulator = c("format_version", "name", "f", "parameters", "boundary"),
-  amiss_program_simulator = c("format_version", "name", "command", "parameters", "boundary", "files", "drivers"),
-  amiss_fmu_simulator = c("format_version", "name", "file", "hash", "parameters", "inputs", "fixed", "output"),
-  amiss_zone = "components",
-  amiss_network = c("format_version", "name", "components", "output", "before"),
-  amiss_network_part = c("type", "name"),
-  amiss_mechanism = c("name", "edit", "boundary", "sentence"))
-
-check_parts <- function(x, name, hint = NULL, call = rlang::caller_env()) {
-  needed <- unlist(object_parts[intersect(class(x), names(object_parts))])
-  absent <- setdiff(needed, if (is.list(x)) names(x))
-  if (length(absent)) {
-    abort_input(c(paste("{.arg {name}} has the class {.cls {class(x)}}, but is not whole: it has no",
-                        "{.field {absent}}."), i = hint %||% "Make it with the package's own function."), call = call)
+  if (!is.null(version) && !identical(version, format_version)) {
+    told <- if (is.numeric(version) && length(version) == 1) format(version) else seen(version)
+    abort_input(c("{.arg {name}} was made by another version of the package.",
+                  x = "Its format is {told}; this version reads {.val {format_version}}.",
+                  i = "Make it again with this version."), class = "amiss_error_version", call = call)
   }
+  fault <- object_fault(x)
+  if (is.null(fault)) return(invisible(TRUE))
+  wrong <- if (!is.null(fault$absent)) "it has no {.field {fault$absent}}."
+           else paste("its part {.field {fault$part}} is {seen(fault$value)}, and not {kind_words(fault$expected)} of",
+                      "the size that goes with the other parts.")
+  abort_input(c(paste("{.arg {name}} has the class {.cls {class(x)}}, but is not whole:", wrong),
+                i = hint %||% "Make it with the package's own function."), call = call)
 }
 
-# For checkmate dates, times and empty texts are numbers, too.
+# For checkmate dates, times, numbers with a unit or in other bits (integer64) and empty texts are numbers, too.
 number_checks <- paste0("check_", c("number", "count", "int", "numeric"))
 
-plain_number <- function(x) {
-  if (!is.character(x) && !inherits(x, c("Date", "POSIXt", "difftime"))) return(TRUE)
+plain_number <- function(x, single) {
+  if (single && !is.null(dim(x))) return("Must be a plain number, not an array")
+  if (!is.character(x) && !is.object(x)) return(TRUE)
   sprintf("Must be a plain number, not of class '%s'", class(x)[1])
 }
 

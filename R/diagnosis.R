@@ -32,6 +32,7 @@
 #' summary(upgrade)
 #' @export
 summary.amiss_upgrade <- function(object, ...) {
+  check_whole(object, "object")
   verdict <- diagnosis_verdict(object)
   last <- object$models[[length(object$models)]]
   structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,

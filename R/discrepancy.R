@@ -62,13 +62,6 @@ paper_discrepancy <- function(fit, draws = 24) {
   new_discrepancy(fit, mean, mean - 1.96 * sd, mean + 1.96 * sd)
 }
 
-# Mean of the simulator's runs at posterior draws; by the emulator where there are none.
-simulated_mean <- function(fit) {
-  if (!is.null(fit$check$mean)) return(fit$check$mean)
-  w <- emulated_coefficients(fit$emulator, posterior_unit(fit))$mean
-  as.numeric(fit$emulator$basis$vectors %*% crossprod(w, fit$weights))
-}
-
 #' @export
 print.amiss_discrepancy <- function(x, ...) on_stdout(x, {
   cli::cli_text(paste("{.strong Discrepancy} of {.field {x$target}} over {nrow(x$series)} steps: residual RMS",

@@ -256,6 +256,7 @@ print.amiss_emulator <- function(x, ...) on_stdout(x, {
 
 #' @export
 tidy.amiss_emulator <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   q <- nrow(x$processes$hyperparameters)
   p <- length(x$parameters)
@@ -285,6 +286,7 @@ tidy.amiss_emulator <- function(x, ...) {
 #' lapply(predict(train_emulator(runs, room), cbind(gain = c(0.2, 0.4))), head, 3)
 #' @export
 predict.amiss_emulator <- function(object, newdata, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   newdata <- as_number_matrix(newdata)
   check_input(checkmate::check_matrix(newdata, "numeric", any.missing = FALSE, min.rows = 1), "newdata")

@@ -81,6 +81,7 @@ evidence_word <- function(lower, upper) {
 #' @name logml
 #' @exportS3Method bridgesampling::logml
 logml.amiss_fit <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   x$log_evidence
 }
@@ -88,6 +89,7 @@ logml.amiss_fit <- function(x, ...) {
 #' @rdname logml
 #' @exportS3Method bridgesampling::bf
 bf.amiss_fit <- function(x1, x2, log = FALSE, ...) {
+  check_whole(x1, "x1")
   rlang::check_dots_empty()
   check_input(checkmate::check_flag(log), "log")
   value <- bayes_factor(x1, x2)$log10_bf * base::log(10)

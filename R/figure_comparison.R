@@ -24,7 +24,7 @@ autoplot.amiss_comparison <- function(object, which = "evidence", ...) {
 }
 
 comparison_figure <- function(comparison, which, call = rlang::caller_env()) {
-  check_parts(comparison, "object", call = call)
+  check_whole(comparison, "object", call = call)
   check_input(checkmate::check_choice(which, figures_of(comparison)), "which", call = call)
   switch(which,
     evidence = figure_evidence(comparison),

@@ -32,6 +32,7 @@ sobol_colours <- c(first = "#0072B2", total = "#E69F00")
 #' @rdname figures
 #' @export
 plot.amiss_sobol <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   draw(figure_sobol(x))
 }
@@ -39,6 +40,7 @@ plot.amiss_sobol <- function(x, ...) {
 #' @rdname figures
 #' @export
 autoplot.amiss_sobol <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   figure_sobol(object)
 }

@@ -44,6 +44,7 @@ NULL
 #' @rdname fit
 #' @export
 fitted.amiss_fit <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   simulated_mean(object)
 }
@@ -51,13 +52,15 @@ fitted.amiss_fit <- function(object, ...) {
 #' @rdname fit
 #' @export
 residuals.amiss_fit <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
-  object$measurements$y[object$rows] - simulated_mean(object)
+  left_by_mean(object)
 }
 
 #' @rdname fit
 #' @export
 nobs.amiss_fit <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   length(object$rows)
 }
@@ -65,6 +68,7 @@ nobs.amiss_fit <- function(object, ...) {
 #' @rdname fit
 #' @export
 logLik.amiss_fit <- function(object, ...) {
+  check_whole(object, "object")
   abort_input(c("A calibration has no greatest likelihood with a number of free parameters.",
                 x = "Its discrepancy is integrated out.",
                 i = "Compare models by the evidence: {.fun bayes_factor}, or {.code $log_evidence} of the fit.",
@@ -75,6 +79,7 @@ logLik.amiss_fit <- function(object, ...) {
 #' @export
 update.amiss_fit <- function(object, emulator = object$emulator, measurements = object$measurements, control = NULL,
                              seed = object$seed, threads = 1, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   check_input(checkmate::check_list(control, null.ok = TRUE), "control", "Give a list of named options.")
   control <- utils::modifyList(given_control(object), as.list(control))
@@ -96,7 +101,7 @@ changed <- function(options, defaults) {
 #' @rdname fit
 #' @export
 glance.amiss_fit <- function(x, ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   rlang::check_dots_empty()
   decades <- c(x$log_evidence, x$interval) / log(10)
   data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
@@ -107,7 +112,7 @@ glance.amiss_fit <- function(x, ...) {
 #' @rdname fit
 #' @export
 augment.amiss_fit <- function(x, data = NULL, newdata = NULL, ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   if (!is.null(data)) {
     abort_input(c("{.arg data} is not used: the record is part of the fit.", i = "Another record is {.arg newdata}."))
   }
@@ -150,6 +155,7 @@ augment_prediction <- function(fit, prediction) {
 #' summary(fit)
 #' @export
 summary.amiss_fit <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   structure(list(name = object$measurements$name, unit = object$measurements$unit, parameters = generics::tidy(object),
                  glance = generics::glance(object), reach = if (!is.null(object$reach)) reach_words(object),

@@ -54,3 +54,13 @@ sampler_said <- function(fit) if (knows_history(fit)) fit$posterior else fit$tru
 
 # Whether the discrepancy answers to the history of the conditions: then it carries over to other rows.
 knows_history <- function(fit) !is.null(fit$coefficients)
+
+# Mean of the simulator's runs at posterior draws; by the emulator where there are none.
+simulated_mean <- function(fit) {
+  if (!is.null(fit$check$mean)) return(fit$check$mean)
+  w <- emulated_coefficients(fit$emulator, posterior_unit(fit))$mean
+  as.numeric(fit$emulator$basis$vectors %*% crossprod(w, fit$weights))
+}
+
+# What it leaves of the record.
+left_by_mean <- function(fit) fit$measurements$y[fit$rows] - simulated_mean(fit)

@@ -116,6 +116,7 @@ print.amiss_joint <- function(x, ...) on_stdout(x, {
 
 #' @export
 summary.amiss_joint <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   object
 }
@@ -139,19 +140,27 @@ as.data.frame.amiss_joint <- function(x, row.names = NULL, optional = FALSE, dra
 
 # By record, as predict() has it.
 #' @export
-fitted.amiss_joint <- function(object, ...) lapply(object$records, stats::fitted, ...)
+fitted.amiss_joint <- function(object, ...) {
+  check_whole(object, "object")
+  lapply(object$records, stats::fitted, ...)
+}
 
 #' @export
-residuals.amiss_joint <- function(object, ...) lapply(object$records, stats::residuals, ...)
+residuals.amiss_joint <- function(object, ...) {
+  check_whole(object, "object")
+  lapply(object$records, stats::residuals, ...)
+}
 
 #' @export
 simulate.amiss_joint <- function(object, nsim = 1, seed = NULL, ...) {
+  check_whole(object, "object")
   seed <- pick_seed(seed)
   lapply(object$records, stats::simulate, nsim, seed, ...)
 }
 
 #' @export
 nobs.amiss_joint <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   sum(vapply(object$records, stats::nobs, 0L))
 }
@@ -162,7 +171,7 @@ logLik.amiss_joint <- function(object, ...) logLik.amiss_fit(object, ...)
 # Of the emulators the largest numbers; `sigma` is in units of the noise.
 #' @export
 glance.amiss_joint <- function(x, ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   rlang::check_dots_empty()
   decades <- c(x$log_evidence, x$interval) / log(10)
   each <- lapply(unname(x$records), generics::glance)
@@ -177,7 +186,7 @@ glance.amiss_joint <- function(x, ...) {
 # Records need not share conditions nor clocks: a list by record.
 #' @export
 augment.amiss_joint <- function(x, data = NULL, newdata = NULL, ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   lapply(stats::setNames(nm = names(x$records)), function(name) {
     generics::augment(x$records[[name]], data = data[[name]], newdata = newdata[[name]], ...)
   })
@@ -197,6 +206,7 @@ as_draws.amiss_joint <- as_draws_df.amiss_joint
 
 #' @export
 predict.amiss_joint <- function(object, newdata = NULL, ...) {
+  check_whole(object, "object")
   if (!is.null(newdata)) {
     check_input(checkmate::check_list(newdata, names = "unique"), "newdata", "Give a list by record.")
     unknown <- setdiff(names(newdata), names(object$records))
@@ -215,7 +225,7 @@ calibrated_record.amiss_joint <- function(fit) lapply(fit$records, calibrated_re
 # Which conditions drive the discrepancies: of each record, and the same conditions in all that have them.
 #' @export
 attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, threads = 1) {
-  check_parts(fit, "fit")
+  check_whole(fit, "fit")
   seed <- pick_seed(seed)
   threads <- check_threads(threads)
   fits <- fit$records
@@ -280,6 +290,7 @@ print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
 
 #' @export
 tidy.amiss_joint_attribution <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   each <- Map(function(name, attribution) cbind(record = name, attribution$table), names(x$records), x$records)
   do.call(rbind, unname(each))

@@ -59,5 +59,5 @@ left_by_simulation <- function(fit) {
 
 # What the simulation leaves of the record at its best: at the run of least squares, if there is one.
 left_at_best <- function(fit) {
-  if (is.null(fit$best)) stats::residuals(fit) else fit$measurements$y[fit$rows] - fit$best$output
+  if (is.null(fit$best)) left_by_mean(fit) else fit$measurements$y[fit$rows] - fit$best$output
 }

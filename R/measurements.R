@@ -189,7 +189,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                  segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
                  block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
                  time_format = reading$format, time_zone = time_zone, constant = constant, findings = findings,
-                 faulty = faulty_steps(findings, target, coarse$block, grid$row)),
+                 faulty = faulty_steps(findings, target, coarse$block, grid$row), missing = missing, range = range),
             class = "amiss_measurements")
 }
 
@@ -205,7 +205,7 @@ faulty_steps <- function(findings, target, block, row) {
 circular <- function(x, ...) x
 
 boundary_terms <- function(boundary, call = rlang::caller_env()) {
-  labels <- if (inherits(boundary, "formula")) attr(stats::terms(boundary), "term.labels") else boundary
+  labels <- if (inherits(boundary, "formula")) formula_labels(boundary, call) else boundary
   check_input(checkmate::check_character(labels, min.len = 1, any.missing = FALSE, unique = TRUE), "boundary",
               "Give a formula such as {.code ~ Te + circular(Wd)}.", call = call)
   is_circular <- grepl("^circular\\(.*\\)$", labels)
@@ -219,6 +219,16 @@ boundary_terms <- function(boundary, call = rlang::caller_env()) {
     names <- gsub("^`|`$", "", names)
   }
   list(name = names, circular = is_circular)
+}
+
+# The terms of a formula with one side. One that R cannot take apart, as with a dot, names no columns.
+formula_labels <- function(boundary, call) {
+  terms <- tryCatch(stats::terms(boundary), error = function(e) NULL)
+  if (is.null(terms) || attr(terms, "response") || !is.null(attr(terms, "offset"))) {
+    abort_input(c("{.arg boundary} = {.code {deparse1(boundary)}} does not name columns of the data.",
+                  i = "Give a formula such as {.code ~ Te + circular(Wd)}."), call = call)
+  }
+  attr(terms, "term.labels")
 }
 
 require_columns <- function(data, columns, call = rlang::caller_env()) {

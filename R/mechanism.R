@@ -49,7 +49,7 @@ catalogue <- function(...) {
     abort_input(c("Every entry of a catalogue must be a mechanism; number {other} is {seen(mechanisms[[other]])}.",
                   i = "Make each with {.fun mechanism}; of a list of them {.code do.call(catalogue, list)} makes one."))
   }
-  for (one in mechanisms) check_parts(one, "...")
+  for (one in mechanisms) check_whole(one, "...")
   names(mechanisms) <- vapply(mechanisms, `[[`, "", "name")
   if (anyDuplicated(names(mechanisms)))
     abort_input("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}} stands twice in the catalogue.")

@@ -84,7 +84,7 @@ named_parts <- function(parts, call = rlang::caller_env()) {
     abort_input(c("A network is composed of its parts; got {seen(other[[1]])}.",
                   i = "Give for example {.fn network_node}, {.fn network_link}, {.fn network_gain}."), call = call)
   }
-  for (one in parts) check_parts(one, "...", call = call)
+  for (one in parts) check_whole(one, "...", call = call)
   names(parts) <- vapply(parts, `[[`, "", "name")
   twice <- names(parts)[duplicated(names(parts))]
   if (length(twice)) {
@@ -111,7 +111,7 @@ new_network <- function(x, call = rlang::caller_env()) {
   }
   rule <- network_number(-Inf)
   for (driver in names(x$before)) check_part_field(x$before[[driver]], rule, "before", driver, call)
-  collect_parameters(free_fields(unclass(x)), call)
+  collect_parameters(network_fields_free(x), call)
   x
 }
 
@@ -146,7 +146,9 @@ print.amiss_network <- function(x, ...) on_stdout(x, {
 })
 
 #' @export
-free_parameters.amiss_network <- function(simulator) collect_parameters(free_fields(unclass(simulator)))
+free_parameters.amiss_network <- function(simulator) collect_parameters(network_fields_free(simulator))
+
+network_fields_free <- function(network) free_fields(unclass(network)[c("components", "before")])
 
 #' @export
 driver_names.amiss_network <- function(simulator) {

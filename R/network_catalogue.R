@@ -46,7 +46,7 @@ check_node <- function(name, network, what, call = rlang::caller_env()) {
 
 # Loss to the drivers (kW/K) and capacity (kWh/K) at the medians of the priors.
 house_size <- function(network) {
-  parameters <- collect_parameters(free_fields(unclass(network)))
+  parameters <- free_parameters(network)
   medians <- vapply(parameters, function(parameter) prior_quantile(parameter$prior, 0.5), 0)
   numbers <- coefficient_values(coefficient_table(network), t(medians))[, 1]
   nodes <- node_names(network)

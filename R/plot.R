@@ -39,6 +39,7 @@ plot.amiss_upgrade <- function(x, which = "fit", ...) {
 #' @rdname figures
 #' @export
 plot.amiss_attribution <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   draw(figure_attribution(list("the model" = x)))
 }
@@ -46,6 +47,7 @@ plot.amiss_attribution <- function(x, ...) {
 #' @rdname figures
 #' @export
 plot.amiss_discrepancy <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   draw(figure_discrepancy(list("the model" = x)))
 }
@@ -53,6 +55,7 @@ plot.amiss_discrepancy <- function(x, ...) {
 #' @rdname figures
 #' @export
 plot.amiss_calibration <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   draw(figure_parameters(list("the model" = x)))
 }
@@ -60,6 +63,7 @@ plot.amiss_calibration <- function(x, ...) {
 #' @rdname figures
 #' @export
 plot.amiss_ais <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   draw(figure_sampler(list("the model" = x)))
 }
@@ -67,6 +71,7 @@ plot.amiss_ais <- function(x, ...) {
 #' @rdname figures
 #' @export
 plot.amiss_measurements <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   draw(figure_measurements(x))
 }
@@ -81,6 +86,7 @@ autoplot.amiss_upgrade <- function(object, which = "fit", ...) {
 #' @rdname figures
 #' @export
 autoplot.amiss_attribution <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   figure_attribution(list("the model" = object))
 }
@@ -88,6 +94,7 @@ autoplot.amiss_attribution <- function(object, ...) {
 #' @rdname figures
 #' @export
 autoplot.amiss_discrepancy <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   figure_discrepancy(list("the model" = object))
 }
@@ -96,13 +103,14 @@ autoplot.amiss_discrepancy <- function(object, ...) {
 #' @export
 autoplot.amiss_calibration <- function(object, ...) {
   rlang::check_dots_empty()
-  check_parts(object, "object")
+  check_whole(object, "object")
   figure_parameters(list("the model" = object))
 }
 
 #' @rdname figures
 #' @export
 autoplot.amiss_ais <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   figure_sampler(list("the model" = object))
 }
@@ -110,6 +118,7 @@ autoplot.amiss_ais <- function(object, ...) {
 #' @rdname figures
 #' @export
 autoplot.amiss_measurements <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   figure_measurements(object)
 }
@@ -120,7 +129,7 @@ draw <- function(figure) {
 }
 
 upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
-  check_parts(upgrade, "object", call = call)
+  check_whole(upgrade, "object", call = call)
   if (is_several(upgrade$measurements)) {
     names <- names(upgrade$measurements$records)
     if (checkmate::test_choice(which, record_figure_names)) which <- paste(which, "of", names[1])

@@ -15,6 +15,7 @@ even_draws <- function(fit, n) {
 }
 
 weighted_quantile <- function(x, w, probs) {
+  if (length(x) == 1) return(rep(x, length(probs)))
   order <- order(x)
   cumulative <- cumsum(w[order]) / sum(w)
   stats::approx(cumulative, x[order], probs, rule = 2, ties = "ordered")$y
@@ -63,6 +64,7 @@ NULL
 #' @rdname posterior
 #' @export
 coef.amiss_fit <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   table <- parameter_table(object)
   stats::setNames(table$median, table$name)
@@ -71,6 +73,7 @@ coef.amiss_fit <- function(object, ...) {
 #' @rdname posterior
 #' @export
 confint.amiss_fit <- function(object, parm = NULL, level = 0.95, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   check_level(level, "level")
   names <- picked_parameters(object, parm)
@@ -98,6 +101,7 @@ picked_parameters <- function(fit, parm, call = rlang::caller_env()) {
 #' @rdname posterior
 #' @export
 vcov.amiss_fit <- function(object, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   stats::cov.wt(object$values, object$weights / sum(object$weights), method = "ML")$cov
 }
@@ -105,7 +109,7 @@ vcov.amiss_fit <- function(object, ...) {
 #' @rdname posterior
 #' @export
 tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   rlang::check_dots_empty()
   check_level(conf.level, "conf.level")
   ends <- stats::confint(x, level = conf.level)
@@ -143,6 +147,7 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
 #' posterior::summarise_draws(posterior::as_draws_df(fit), "mean", "sd")
 #' @export
 as.data.frame.amiss_fit <- function(x, row.names = NULL, optional = FALSE, draws = nrow(x$values), ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   as.data.frame(equal_draws(x, draws), row.names = row.names)
 }
@@ -150,6 +155,7 @@ as.data.frame.amiss_fit <- function(x, row.names = NULL, optional = FALSE, draws
 #' @rdname as.data.frame.amiss_fit
 #' @export
 as.matrix.amiss_fit <- function(x, draws = nrow(x$values), ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   equal_draws(x, draws)
 }
@@ -157,6 +163,7 @@ as.matrix.amiss_fit <- function(x, draws = nrow(x$values), ...) {
 #' @rdname as.data.frame.amiss_fit
 #' @exportS3Method posterior::as_draws_matrix
 as_draws_matrix.amiss_fit <- function(x, draws = nrow(x$values), ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   posterior::as_draws_matrix(equal_draws(x, draws))
 }
@@ -164,6 +171,7 @@ as_draws_matrix.amiss_fit <- function(x, draws = nrow(x$values), ...) {
 #' @rdname as.data.frame.amiss_fit
 #' @exportS3Method posterior::as_draws_df
 as_draws_df.amiss_fit <- function(x, draws = nrow(x$values), ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   posterior::as_draws_df(posterior::as_draws_matrix(equal_draws(x, draws)))
 }

@@ -11,6 +11,8 @@
 #'   was called there), all boundary conditions of the record and what else drives the simulator, one row for each
 #'   interval. Its target, if it has that column, is compared with
 #'   the prediction, and nothing is learned from it. A data frame has no warm-up: begin it before the rows that count.
+#'   It is checked as the record was: `missing` and `range` of [measurements()] hold, other codes for a missing value
+#'   are refused, and a warning names values far outside all others, readings that are stuck, and counters.
 #'   By default the record that was calibrated on.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both; every row of a data frame.
 #' @param draws Number of posterior draws.
@@ -116,7 +118,8 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   data <- plain_table(as.list(data), nrow(data))
   require_columns(data, c("time", terms$name), call)
   data <- with_switches(data, terms$name)
-  require_numeric(data, c(terms$name, intersect(m$target, names(data))), call)
+  compared <- c(terms$name, intersect(m$target, names(data)))
+  require_numeric(data, compared, call)
   time <- read_time(data$time, "time", m$time_format, m$time_zone, call)
   hours <- time_hours(time)
   step <- m$raw$step_h
@@ -125,6 +128,7 @@ new_record <- function(m, data, call = rlang::caller_env()) {
                   i = "Predict each part of a broken record on its own."), call = call)
   }
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, NA)], c("time", m$target))
+  data <- checked_values(m, data, compared, numeric_columns, terms$name[terms$circular], call)
   drivers <- as.matrix(data[numeric_columns])
   require_complete(drivers, terms$name, time, call = call)
   observed <- if (m$target %in% names(data)) as.numeric(data[[m$target]]) else rep(NA_real_, nrow(data))
@@ -136,13 +140,24 @@ new_record <- function(m, data, call = rlang::caller_env()) {
     utils::modifyList(coarse, list(y = numeric(length(coarse$y)))))
 }
 
+# The table as the record's own was read: its codes for a missing value and the range of its sensor hold here as well,
+# other codes are refused, and values that seem to be no measurements are told of.
+checked_values <- function(m, data, compared, numeric_columns, circular, call) {
+  data <- with_marks(data, union(compared, numeric_columns), m$target, m$missing, m$range)
+  if (!identical(m$missing, NA)) refuse_codes(data, compared, circular, call)
+  found <- table_findings(data[union(compared, numeric_columns)], m$target, circular, m$noise_sd * sqrt(m$per_step),
+                          m$per_step, m$findings)
+  warn_findings(found[found$id != "missing_code", ], "newdata")
+  data
+}
+
 # The lacking response at the rows of these uses (rows x kept draws), and what it leaves in calibration.
 carried_response <- function(fit, use, threads, record = fit$measurements) {
   rows <- rows_used(record, use)
   responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
   moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads, record)
            else matrix(0, length(rows), nrow(fit$withheld))
-  left <- stats::residuals(fit) - rowMeans(seen_response(fit))
+  left <- left_by_mean(fit) - rowMeans(seen_response(fit))
   list(response = lacking_response(fit, responses, moves),
        sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
 }
@@ -262,6 +277,7 @@ prediction_scores <- function(prediction) {
 #' head(simulate(fit, nsim = 3, seed = 1))
 #' @export
 simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) {
+  check_whole(object, "object")
   rlang::check_dots_empty()
   check_input(checkmate::check_count(nsim, positive = TRUE), "nsim")
   check_run_number(nsim, length(object$measurements$raw$hours), "nsim")

@@ -1,5 +1,6 @@
 # What cli says in an expression, on standard output: there capture.output() and R Markdown find it.
 on_stdout <- function(x, said) {
+  check_whole(x, "x", call = NULL)
   cat(cli::cli_fmt(said), sep = "\n")
   invisible(x)
 }

@@ -48,9 +48,31 @@ refuse_codes <- function(data, columns, circular, call = rlang::caller_env()) {
     codes <- unique(v[rows])
     abort_input(c(paste("{.val {column}} is {listed(format_each(codes), 'or')} in {rows_words(rows)}: a code for a",
                         "missing value."),
-                  i = "Give {.code missing = {value_code(codes)}} to set it to NA, or correct these rows.",
+                  i = paste(
+                    "Give {.code missing = {value_code(codes)}} to {.fun measurements}, which sets it to NA, or",
+                            "correct these rows."),
                   i = "If it was measured, {.code missing = NA} says that no value is a code."), call = call)
   }
+}
+
+# What a table shows that drives a simulator without being a record of its own: list(columns, ...) as record_findings()
+# has it. `known`: the findings of a record that say the same of it already.
+table_findings <- function(columns, target = "", circular = character(), noise_sd = NA_real_, per_step = 1,
+                           known = no_findings()) {
+  rows <- lengths(columns)[1]
+  found <- record_findings(list(columns = columns, target = target, conditions = setdiff(names(columns), target),
+                                circular = circular, use = rep("validate", rows), noise_sd = noise_sd,
+                                per_step = per_step))
+  told <- found$id %in% c("missing_code", "far_outside", "counter", "stuck")
+  found$says <- sub(" Give missing = .*", "", found$says)
+  found[told & !paste(found$id, found$column) %in% paste(known$id, known$column), ]
+}
+
+warn_findings <- function(found, name) {
+  if (!nrow(found)) return(invisible())
+  warn_input(c("{.arg {name}} holds {nrow(found)} kind{?s} of values that seem to be no measurements.",
+               stats::setNames(as_said(found$says), rep("x", nrow(found))),
+               i = "A simulator takes them as they are."))
 }
 
 # A record of one value can carry runs, but nothing can be learned of it.

@@ -156,7 +156,7 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
 
 # The ensemble of a region of the parameters' space; `emulator` knows that over the priors.
 regional_ensemble <- function(ensemble, region, emulator, measurements, runs, threads) {
-  unit <- region_design(region, runs, ensemble$seed)
+  unit <- region_design(region, runs, pick_seed(ensemble$seed))
   values <- unit_to_values(unit, ensemble$parameters)
   outputs <- simulate_measured(ensemble$simulator, values, measurements, "calibrate", threads)
   # The last of the runs that lie inside: those of checks, where the posterior was seen last.

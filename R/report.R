@@ -49,12 +49,16 @@ report <- function(x, file, quiet = TRUE) {
   on.exit(unlink(work, recursive = TRUE))
   source <- file.path(work, "report.Rmd")
   file.copy(report_path("templates", "report", "skeleton", "skeleton.Rmd"), source)
-  made <- rmarkdown::render(source, if (kind == "docx") "word_document" else "html_document", output_dir = work,
-                            intermediates_dir = work, params = list(result = x),
-                            envir = new.env(parent = globalenv()), quiet = quiet)
+  made <- render_report(x, source, work, kind, quiet)
   if (kind == "pdf") made <- print_page(made, file.path(work, "report.pdf"), browser)
   move_into_place(made, file)
   invisible(file)
+}
+
+render_report <- function(x, source, work, kind, quiet) {
+  rmarkdown::render(source, if (kind == "docx") "word_document" else "html_document", output_dir = work,
+                    intermediates_dir = work, params = list(result = x), envir = new.env(parent = globalenv()),
+                    quiet = quiet)
 }
 
 #' @rdname report
@@ -107,8 +111,9 @@ check_report_tools <- function(call = rlang::caller_env()) {
     abort_input(c("A report needs the R package {.pkg rmarkdown}, which is not installed.",
                   i = "Run {.code install.packages(\"rmarkdown\")}."), call = call)
   }
-  if (!rmarkdown::pandoc_available("2.0")) {
-    abort_input(c("A report needs pandoc 2.0 or later, which was not found.",
+  # A pandoc that cannot be started, for lack of memory perhaps, is an error there.
+  if (!tryCatch(rmarkdown::pandoc_available("2.0"), error = function(e) FALSE)) {
+    abort_input(c("A report needs pandoc 2.0 or later, which was not found or cannot be started.",
                   i = paste("Install it (Debian: {.code apt-get install pandoc}; others:",
                             "{.url https://pandoc.org/installing.html}), or work in RStudio, which brings it.")),
                 call = call)

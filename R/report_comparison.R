@@ -25,6 +25,7 @@
 #' summary(comparison)
 #' @export
 summary.amiss_comparison <- function(object, ...) {
+  check_whole(object, "object")
   no_doubt <-
     paste("The sampler passed its own checks for every model; bases and emulators are fine beside the noise; no",
           "parameter is at the edge of its range.")

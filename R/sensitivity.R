@@ -144,6 +144,7 @@ times_table <- function(expected, names, emulator, x) {
 
 #' @export
 print.amiss_sobol <- function(x, ...) {
+  check_whole(x, "x")
   shown <- order(-x$table$total)
   rounded <- function(values) format(round(values, 3), nsmall = 3)
   index <- function(order) paste(rounded(x$table[[order]]), "+-", rounded(index_error(x$table, order)))
@@ -164,6 +165,7 @@ index_error <- function(table, order) sqrt(rowSums(table[paste0(order, c("_sampl
 #' @param ... Not used: an argument that is not known is an error.
 #' @export
 tidy.amiss_sobol <- function(x, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   rows <- lapply(c("first", "total"), function(order) {
     error <- index_error(x$table, order)
@@ -178,6 +180,7 @@ tidy.amiss_sobol <- function(x, ...) {
 #' @param row.names,optional As [as.data.frame()] has them; `optional` is not used.
 #' @export
 as.data.frame.amiss_sobol <- function(x, row.names = NULL, optional = FALSE, ...) {
+  check_whole(x, "x")
   rlang::check_dots_empty()
   as.data.frame(x$table, row.names = row.names)
 }

@@ -150,7 +150,7 @@ check_columns_named <- function(boundary, call = rlang::caller_env()) {
 # Parameters made by free(), under their names.
 named_parameters <- function(parameters, call = rlang::caller_env()) {
   other <- Filter(function(x) !inherits(x, "amiss_free"), parameters)
-  for (one in parameters) if (inherits(one, "amiss_free")) check_parts(one, "...", call = call)
+  for (one in parameters) if (inherits(one, "amiss_free")) check_whole(one, "...", call = call)
   if (!length(parameters) || length(other)) {
     abort_input(c("Every parameter must be made by {.fun free}; got {if (length(other)) seen(other[[1]]) else 'none'}.",
                   i = "For example {.code free(\"gain\", uniform(0, 2))}."), call = call)
@@ -198,7 +198,7 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @export
 free_parameters <- function(simulator) {
   present(simulator)
-  if (!inherits(simulator, "amiss_ensemble")) check_simulator(simulator)
+  if (inherits(simulator, "amiss_ensemble")) check_whole(simulator, "simulator") else check_simulator(simulator)
   UseMethod("free_parameters")
 }
 
@@ -326,7 +326,7 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
                   i = "Make one with {.fun zone} or {.fun function_simulator}, or give runs with {.fun ensemble}."),
                   call = call)
   }
-  check_parts(simulator, "simulator", call = call)
+  check_whole(simulator, "simulator", call = call)
 }
 
 # Runs of simulators in this session, by which a study says what it cost.

@@ -26,13 +26,21 @@ read_table_file <- function(path, names, separator = NULL, decimal = NULL, call 
 check_table_options <- function(separator, decimal, call) {
   check_input(checkmate::check_string(separator, min.chars = 1, null.ok = TRUE), "separator",
               "Give the sign between two fields, or one of {.val {names(separators)}}.", call = call)
+  if (!is.null(separator) && !can_separate(known_separator(separator))) {
+    abort_input(c("{.arg separator} = {.val {separator}} is no sign that can stand between fields.",
+                  i = "Give one sign, or one of {.val {names(separators)}}."), call = call)
+  }
   check_input(checkmate::check_choice(decimal, c(".", ","), null.ok = TRUE), "decimal",
               "It is {.val .} or {.val ,}, in quotes.", call = call)
 }
 
+# One sign that no field begins or ends with; "" stands for spaces.
+can_separate <- function(sign) !nzchar(sign) || grepl("^([[:punct:]]|\t)$", sign) && !grepl("[\"'#]", sign) &&
+  nchar(sign, "bytes") == 1
+
 known_separator <- function(separator) {
   if (separator %in% names(separators)) return(separators[[separator]])
-  if (!nzchar(trimws(separator)) && separator != "\t") "" else separator
+  if (grepl("^ +$", separator)) "" else separator
 }
 
 # list(line, fields, separator): the first line with most of the names. A header may stand in a comment.
@@ -79,13 +87,12 @@ body_fields <- function(body, header, refuse) {
   ends <- fields_of_lines(body$text, header$separator)
   line <- body$number[!is.na(ends)]
   counts <- ends[!is.na(ends)]
+  far <- which(counts > most_fields(names))[1]
+  if (!is.na(far)) refuse("Line ", line[far], " has ", counts[far], " fields, its header ", length(names), ".")
   width <- max(counts, length(names))
   open <- function(w) refuse("A quotation mark is opened and not closed, perhaps in line ",
                              body$number[c(which(is.na(ends)), 1)[1]], ".")
-  columns <- tryCatch(scan(text = body$text, what = rep(list(""), width), sep = header$separator, quote = "\"",
-                           quiet = TRUE, fill = TRUE, multi.line = FALSE, na.strings = character(), comment.char = "",
-                           encoding = "UTF-8"), warning = open)
-  columns <- lapply(columns, trimws)
+  columns <- tryCatch(scan_fields(body$text, width, header$separator), warning = open)
   over <- Reduce(`|`, lapply(columns[-seq_len(length(names))], nzchar), rep(FALSE, length(counts)))
   # Nothing may stand after a last separator, unless what stands first could be a number for each row.
   counted <- identical(columns[[1]], format(seq_along(counts) - (columns[[1]][1] == "0"), trim = TRUE))
@@ -97,6 +104,15 @@ body_fields <- function(body, header, refuse) {
   last <- max(which(Reduce(`|`, lapply(columns, nzchar))), 0)
   lapply(columns, utils::head, last)
 }
+
+scan_fields <- function(text, width, separator) {
+  fields <- scan(text = text, what = rep(list(""), width), sep = separator, quote = "\"", quiet = TRUE, fill = TRUE,
+                 multi.line = FALSE, na.strings = character(), comment.char = "", encoding = "UTF-8")
+  lapply(fields, trimws)
+}
+
+# Nothing but separators may stand behind the last name. Of very many of them a table would be made first.
+most_fields <- function(names) 2 * length(names) + 1000
 
 # NA for a line that ends inside of a quotation.
 fields_of_lines <- function(lines, separator) {

@@ -1,6 +1,6 @@
 # An upgrade asked what a fitted model is asked: its last model answers.
 last_fit <- function(upgrade) {
-  check_parts(upgrade, "x", call = NULL)
+  check_whole(upgrade, "x", call = NULL)
   upgrade$models[[length(upgrade$models)]]$fit
 }
 
@@ -47,7 +47,7 @@ augment.amiss_upgrade <- function(x, data = NULL, newdata = NULL, ...) {
 #' @rdname fit
 #' @export
 glance.amiss_upgrade <- function(x, ...) {
-  check_parts(x, "x")
+  check_whole(x, "x")
   g <- x$gain
   data.frame(generics::glance(last_fit(x), ...), adopted = length(x$models) - 1L,
              named_cause = x$named_cause$mechanism %||% NA_character_, log10_bf = g$log10_bf,

@@ -169,7 +169,7 @@ new_zone <- function(components, extra, call = rlang::caller_env()) {
                   i = "Give for example {.fn zone_wall}, {.fn zone_window}, {.fn zone_heater}."),
                 call = call)
   }
-  for (one in components) check_parts(one, "...", call = call)
+  for (one in components) check_whole(one, "...", call = call)
   names(components) <- vapply(components, `[[`, "", "name")
   twice <- unique(names(components)[duplicated(names(components))])
   if (length(twice) > 0) {

@@ -58,6 +58,7 @@ zone_limits <- function() {
 is_free <- function(x) inherits(x, c("amiss_free", "amiss_scaled_free"))
 
 check_field <- function(value, rule, where, field, call) {
+  if (is.character(value)) check_readable(value, field, call)
   switch(rule$kind,
     number = check_number_field(value, rule, where, field, call),
     column = if (!(rule$optional && is.null(value)) && !checkmate::test_string(value, min.chars = 1)) {
@@ -72,7 +73,7 @@ check_field <- function(value, rule, where, field, call) {
 
 check_number_field <- function(value, rule, where, field, call) {
   if (is_free(value) || isTRUE(rule$missing) && checkmate::test_scalar_na(value)) return(invisible())
-  inside <- checkmate::test_number(value, finite = TRUE) && isTRUE(plain_number(value)) && value <= rule$upper &&
+  inside <- checkmate::test_number(value, finite = TRUE) && isTRUE(plain_number(value, TRUE)) && value <= rule$upper &&
     (if (rule$open) value > rule$lower else value >= rule$lower)
   if (inside) return(invisible())
   limits <- paste0(if (rule$open) "(" else "[", rule$lower, ", ", rule$upper, "]")
@@ -97,6 +98,9 @@ check_fields <- function(x, rules, where, call) {
 }
 
 check_component <- function(x, call) {
+  if (!x$type %in% setdiff(names(zone_fields), c("layer", "zone"))) {
+    abort_input("Component {.val {x$name}} is of the unknown type {.val {x$type}}.", call = call)
+  }
   check_fields(x, zone_fields[[x$type]], describe_component(x), call)
   if (!is.null(x$wind_speed) && is.null(x$wind_direction) && !checkmate::test_scalar_na(x$azimuth)) {
     abort_input("{describe_component(x)}: {.field wind_speed} needs {.field wind_direction} too.", call = call)
@@ -116,4 +120,6 @@ column_fields <- function(x) {
 
 check_zone <- function(zone, name = "zone", call = rlang::caller_env()) {
   check_object(zone, "amiss_zone", name, "Make one with {.fn zone}.", call = call)
+  check_fields(zone, zone_fields$zone, "zone", call)
+  for (one in zone$components) check_component(one, call)
 }

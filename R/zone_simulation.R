@@ -7,7 +7,8 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' @param zone A [zone()].
 #' @param values Matrix of M runs x P parameters with column names; every free parameter needs a column. `NULL` for a
 #'   zone without free parameters: one run.
-#' @param drivers Numeric matrix with column names, one row per interval: means over the interval.
+#' @param drivers Numeric matrix with column names, one row per interval: means over the interval. A warning names what
+#'   seems to be no measurement: codes for a missing value, values far outside all others, stuck readings, counters.
 #' @param step_s Length of an interval, s.
 #' @param hold Air temperature (degC) to be prescribed in each interval, `NA` where it is free; `NULL` for none.
 #'   Holding the first intervals at the measurement lets the walls forget their unknown past.
@@ -29,21 +30,30 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' @export
 simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, threads = 1L, control = list(),
                           flux = NULL) {
-  call <- rlang::current_env()
-  check_present(zone, drivers, step_s)
+  runs <- zone_runs(zone, values, drivers, step_s, hold, threads, control, flux)
+  read <- intersect(colnames(drivers), zone_boundary(zone))
+  warn_findings(table_findings(lapply(stats::setNames(nm = read), function(name) drivers[, name])), "drivers")
+  runs
+}
+
+# The same of drivers that a record has checked.
+zone_runs <- function(zone, values, drivers, step_s, hold, threads, control = list(), flux = NULL,
+                      call = rlang::caller_env()) {
+  check_present(zone, drivers, step_s, call = call)
   parameters <- names(zone_parameters(zone))
   if (is.null(values)) values <- matrix(0, 1, 0)
-  check_input(checkmate::check_matrix(values, mode = "numeric", any.missing = FALSE, min.rows = 1), "values")
+  check_input(checkmate::check_matrix(values, mode = "numeric", any.missing = FALSE, min.rows = 1), "values",
+              call = call)
   check_values(colnames(values), parameters, call)
   check_named_columns(values, "values", parameters, call)
   check_drivers(zone, drivers, call)
-  check_input(checkmate::check_number(step_s, lower = 1e-3, finite = TRUE), "step_s")
-  threads <- check_threads(threads)
+  check_input(checkmate::check_number(step_s, lower = 1e-3, finite = TRUE), "step_s", call = call)
+  threads <- check_threads(threads, call)
   if (is.null(hold)) hold <- numeric()
-  check_input(checkmate::check_numeric(hold), "hold")
+  check_input(checkmate::check_numeric(hold), "hold", call = call)
   if (!length(hold) %in% c(0, nrow(drivers)) || any(is.infinite(hold))) {
     abort_input(c("{.arg hold} must have one finite number or NA per row of the drivers; got {length(hold)} values.",
-                  i = "The drivers have {nrow(drivers)} rows."))
+                  i = "The drivers have {nrow(drivers)} rows."), call = call)
   }
   control <- check_zone_control(control, call)
   if (!is.null(flux)) control$flux_wall <- wall_number(zone, flux, "flux", call)
@@ -118,7 +128,7 @@ driver_names.amiss_zone <- function(simulator) zone_boundary(simulator)
 #' @export
 simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
   check_run_dots(...)
-  simulate_zone(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
+  zone_runs(simulator, values, drivers, step_s = 3600 * step_h, hold = hold, threads = threads)
 }
 
 #' Heat flux into a wall of a zone
@@ -161,6 +171,6 @@ driver_names.amiss_zone_flux <- function(simulator) union(zone_boundary(simulato
 simulate_runs.amiss_zone_flux <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
   check_run_dots(...)
   air <- if (!is.null(hold)) ifelse(is.na(hold), NA, drivers[, simulator$air])
-  simulate_zone(simulator$zone, values, drivers, step_s = 3600 * step_h, hold = air, threads = threads,
+  zone_runs(simulator$zone, values, drivers, step_s = 3600 * step_h, hold = air, threads = threads,
                 flux = simulator$wall)
 }

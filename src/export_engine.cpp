@@ -55,6 +55,8 @@ std::vector<HistoryParameters> make_points(const Rcpp::List& draws) {
   const std::vector<int> setting = Rcpp::as<std::vector<int>>(draws["setting"]);
   const VectorXd variance = Rcpp::as<VectorXd>(draws["variance"]);
   const MatrixXd t = Rcpp::as<MatrixXd>(draws["t"]);
+  if (static_cast<Eigen::Index>(setting.size()) != variance.size() || t.rows() != variance.size())
+    throw std::invalid_argument("points: setting, variance and t differ in number");
   std::vector<HistoryParameters> points;
   for (Eigen::Index i = 0; i < variance.size(); ++i)
     points.push_back({setting[static_cast<std::size_t>(i)], variance[i], t.row(i).transpose()});
@@ -148,8 +150,29 @@ Rcpp::List list_record(const RecordPosterior& record, const HistoryModel& model)
   return out;
 }
 
+// Refuses draws that name a setting or a condition that their model lacks, and numbers of draws beyond the
+// last.
+void check_draws(const Calibration& calibration, const std::deque<HistoryModel>& models) {
+  const Eigen::Index draws = calibration.posterior.log_likelihood.size();
+  for (const Eigen::Index kept : calibration.kept) {
+    if (kept < 0 || kept >= draws)
+      throw std::invalid_argument("calibration: a kept draw is none of its draws");
+  }
+  if (calibration.records.size() != models.size())
+    throw std::invalid_argument("calibration: it has other records than its data");
+  for (std::size_t r = 0; r < models.size(); ++r) {
+    const std::vector<HistoryParameters>& history = calibration.records[r].history;
+    if (static_cast<Eigen::Index>(history.size()) != draws)
+      throw std::invalid_argument("calibration: draws are missing");
+    for (const HistoryParameters& draw : history) {
+      if (draw.setting < 0 || draw.setting >= models[r].settings() || draw.t.size() != models[r].conditions())
+        throw std::invalid_argument("calibration: a draw is of another model");
+    }
+  }
+}
+
 // What the attribution needs of a calibration.
-Calibration make_calibration(const Rcpp::List& fit) {
+Calibration make_calibration(const Rcpp::List& fit, const Records& of) {
   Calibration calibration;
   calibration.posterior = convert::ais_summary(fit["posterior"]);
   calibration.kept = Rcpp::as<std::vector<Eigen::Index>>(fit["kept"]);
@@ -158,6 +181,7 @@ Calibration make_calibration(const Rcpp::List& fit) {
     calibration.records.back().history = make_points(record);
     calibration.records.back().tangent = convert::simulator(record["tangent"]);
   }
+  check_draws(calibration, of.models);
   return calibration;
 }
 
@@ -263,7 +287,7 @@ Rcpp::List attribute_(const Rcpp::List& records, int which, const Rcpp::List& fi
   const Records from(records, context);
   const auto own = static_cast<std::size_t>(which - 1);
   const Attribution result =
-      attribute(from.records, own, make_calibration(fit), attribution_options(control), context);
+      attribute(from.records, own, make_calibration(fit, from), attribution_options(control), context);
   using Rcpp::_;
   return Rcpp::List::create(_["sets"] = list_sets(result.sets, own), _["statistic"] = result.test.statistic,
                             _["p_value"] = result.test.p_value, _["adjusted"] = result.test.adjusted,
@@ -276,7 +300,8 @@ Rcpp::List attribute_(const Rcpp::List& records, int which, const Rcpp::List& fi
 Rcpp::List drop_conditions_(const Rcpp::List& records, const Rcpp::List& fit, const Rcpp::List& conditions,
                             const Rcpp::List& ais, const Rcpp::List& context_list) {
   const Context context = convert::context(context_list);
-  const DroppedSet dropped = drop(Records(records, context).records, make_calibration(fit),
+  const Records from(records, context);
+  const DroppedSet dropped = drop(from.records, make_calibration(fit, from),
                                   Rcpp::as<ConditionSet>(conditions), convert::ais_options(ais), context);
   using Rcpp::_;
   return Rcpp::List::create(_["lost"] = dropped.lost, _["standard_error"] = dropped.standard_error,

@@ -32,7 +32,7 @@ crude_catalogue <- function(states) {
   lag <- amiss::mechanism("heater lag", boundary = "heating", sentence = "The heater holds heat and gives it off later.",
                           edit = function(model) {
     model <- amiss::add_component(model, amiss::network_node("heater", capacity("C_heater", 0.005, 1)),
-                                  amiss::network_link("heater", "air", conductance = conductance("H_heater", 0.02, 2)))
+                                  amiss::network_link("heater", "air", conductance("H_heater", 0.02, 2)))
     amiss::change_component(model, "heating to air", to = "heater")
   })
   envelope <- do.call(one, c(list("envelope", c("heating", "Te"), "The envelope holds heat."), envelope_parts()))

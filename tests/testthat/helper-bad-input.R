@@ -31,19 +31,13 @@ bad_input_objects <- function() {
                        network_gain("air", "P"), output = "air")
   o$drivers <- cbind(Te = rep(5, 10), P = rep(100, 10))
   o$catalogue <- catalogue(mechanism("sun", identity, "Gv", "The sun shines in."))
+  o$upgrade <- quietly(upgrade_model(o$simulator, o$measurements, o$catalogue, runs = 10, seed = 1, quiet = TRUE,
+                                     control = list(calibration = o$calibration, rounds = 1, max_steps = 1)))
   o$folder <- tempfile("bad-input-")
   dir.create(o$folder)
   o$epw <- file.path(o$folder, "weather.epw")
   writeLines(c("LOCATION,A,-,DEU,None,0,48,11,1,0", rep("-", 6), "DATA PERIODS,1,1", "2001,1,1,1,60,?9,5"), o$epw)
   bad_input$objects <- o
-}
-
-# An object that has the parts of its class, and nothing in them.
-seeming <- function(class) {
-  parts <- object_parts[[class]]
-  object <- structure(stats::setNames(vector("list", length(parts)), parts), class = class)
-  object$format_version <- format_version
-  object
 }
 
 # One call of every exported function with all its arguments, as good ones; `list()` stands for what is never used.
@@ -61,7 +55,7 @@ valid_calls <- function() {
                  noise_sd = NULL, control = list(), seed = 1, threads = 1),
     attribute_discrepancy = list(fit = o$fit, control = list(), seed = 1, threads = 1),
     augment = list(x = o$fit, data = NULL, newdata = NULL),
-    autoplot = list(object = seeming("amiss_upgrade"), which = "fit"),
+    autoplot = list(object = o$upgrade, which = "fit"),
     bayes_factor = list(model = o$fit, reference = o$fit),
     beta_prior = list(shape1 = 1, shape2 = 1, lower = 0, upper = 1),
     bootstrap_noise = list(replicates = 50, detrend = FALSE, seed = 1),
@@ -136,9 +130,9 @@ valid_calls <- function() {
     render_run = list(simulator = o$program, values = c(gain = 0.5), folder = tempfile(), measurements = NULL,
                       segment = 1),
     rename_parameters = list(simulator = o$function_simulator, gain = "other"),
-    report = list(x = seeming("amiss_upgrade"), file = file.path(o$folder, "report.html"),
+    report = list(x = o$upgrade, file = file.path(o$folder, "report.html"),
                   quiet = TRUE),
-    report_fragment = list(x = seeming("amiss_upgrade"), parts = NULL, level = 2),
+    report_fragment = list(x = o$upgrade, parts = NULL, level = 2),
     response_mechanism = list(boundary = "Gv", measurements = o$measurements, unit = "W/m2", gain = NULL,
                               time_constant = NULL, reference = NULL, name = "sun"),
     responses = list(measurements = o$measurements, units = character()),
@@ -280,8 +274,8 @@ bad_study <- function(fields) {
   o <- bad_input_objects()
   utils::write.csv(o$record, file.path(o$folder, "data.csv"), row.names = FALSE)
   writeLines(
-    'function_simulator(function(values, drivers) drivers[, "Te"], free("gain", uniform(0, 1)), boundary = "Te")',
-             file.path(o$folder, "model.R"))
+    paste('function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],',
+          'free("gain", uniform(0, 1)), boundary = "Te")'), file.path(o$folder, "model.R"))
   writeLines('catalogue(mechanism("sun", identity, "Gv", "The sun."))', file.path(o$folder, "catalogue.R"))
   study <- list(study = "linear", data = "data.csv", time = "hour", target = "Ti", boundary = list("Te", "Gv"),
                 noise_sd = 0.1,
@@ -304,3 +298,8 @@ study_rows <- function(field, ..., pattern = field) unlist(
   lapply(list(...), function(value) bad("study", field, value, pattern)), recursive = FALSE)
 
 row_name <- function(row) sprintf("%s(%s = %s)", row$f, row$arg, substr(deparse1(row$value), 1, 60))
+
+# Arguments that take anything, or nothing.
+takes_all <- list(circular = "x", program_simulator = "version", glance = "x", tidy = "x", augment = "x",
+                  autoplot = "object",
+                  slopes = c("simulator", "values", "drivers", "step_h", "hold"))  # gives none to any

@@ -77,3 +77,14 @@ test_that("posterior takes the draws", {
   expect_lt(max(told$rhat), 1.05)
   expect_error(posterior::as_draws_df(fit, chains = 2), class = "rlib_error_dots_nonempty")
 })
+
+test_that("a mode of one draw is one", {
+  fit <- plain_linear_fit()
+  first <- which.min(fit$values[, "gain"])
+  fit$values[first, "gain"] <- fit$values[first, "gain"] - 0.1
+  fit$weights[first] <- 0.1 * sum(fit$weights[-first]) / 0.9
+  modes <- amiss:::parameter_modes(fit, "gain")
+  expect_identical(lengths(list(modes)), 2L)
+  expect_identical(modes[[1]]$lower95, fit$values[[first, "gain"]])
+  expect_identical(tidy(fit)$modes[2], 2L)
+})

@@ -221,3 +221,36 @@ test_that("simulated errors are those of the draws whose discrepancy is known", 
   fit$posterior$variance[-(fit$kept + 1)] <- NA
   expect_false(anyNA(simulate(fit, 32, seed = 1)))
 })
+
+# A table for predict(), in which one column is changed.
+new_table <- function(column, rows, value) {
+  data <- linear_data()[1:96, ]
+  new <- data.frame(time = data$hour, data[c("Te", "Gv", "Ti")])
+  new[rows, column] <- value
+  new
+}
+
+test_that("a table to predict is checked as the record was", {
+  fit <- plain_linear_fit()
+  expect_no_warning(predict(fit, new_table("Te", 1, 10)))
+  for (code in c(-9999, -999, -99.9, 9999, 1e30, 32767)) for (column in c("Te", "Ti")) {
+    expect_error(predict(fit, new_table(column, 20:23, code)), "rows 20 to 23: a code for a missing value",
+                 class = "amiss_error_input")
+  }
+  expect_warning(predict(fit, new_table("Te", 40, 500)), "Te is 500 in row 40, far outside",
+                 class = "amiss_warning_input")
+  expect_warning(augment(fit, newdata = new_table("Gv", 30, 1e5)), "Gv is 1e\\+05", class = "amiss_warning_input")
+  expect_warning(predict(fit, new_table("Te", 30:70, 11.7)), "stuck", class = "amiss_warning_input")
+})
+
+test_that("codes and the range that the record declares hold in a table to predict", {
+  fit <- plain_linear_fit()
+  fit$measurements <- linear_measurements(missing = -9999, range = c(-Inf, 35))
+  table <- predict(fit, new_table("Ti", 20:23, -9999))
+  expect_true(all(is.na(table$observed[20:23])))
+  expect_true(is.na(predict(fit, new_table("Ti", 30, 36))$observed[30]))
+  expect_error(predict(fit, new_table("Te", 20:23, -9999)), "missing or infinite", class = "amiss_error_input")
+  fit$measurements <- linear_measurements(missing = NA)
+  expect_no_warning(table <- predict(fit, new_table("Te", 20:23, -9999)))
+  expect_lt(table$mean[20], -1000)
+})

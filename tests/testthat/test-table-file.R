@@ -121,3 +121,21 @@ test_that("a study says what separates its fields and decimals, and names a valu
   writeLines(replace(table, 8, paste(replace(fields, target, "****"), collapse = ",")), file.path(folder, "data.csv"))
   expect_error(read_study(path, trust = TRUE), "Ti.*row 7 holds \"\\*\\*\\*\\*\"", class = "amiss_error_input")
 })
+
+test_that("what cannot stand between fields is no separator", {
+  path <- withr::local_tempfile(lines = c("hour,Ti,Te", paste(1:20, 1:20, 1:20, sep = ",")))
+  for (bad in c("[a", "ab", "a", "1", "\"", "#", "\u00e9", "\n", ",,")) {
+    expect_error(read_table_file(path, c("hour", "Ti", "Te"), bad), "separator", class = "amiss_error_input")
+  }
+  expect_identical(read_table_file(path, c("hour", "Ti", "Te"), "comma"),
+                   read_table_file(path, c("hour", "Ti", "Te"), ","))
+})
+
+test_that("a line of a great many fields is refused before a table is made of it", {
+  lines <- c("hour,Ti,Te", paste(1:20, 1:20, 1:20, sep = ","))
+  lines[10] <- strrep(",", 1e5)
+  path <- withr::local_tempfile(lines = lines)
+  stand_in(scan_fields = function(...) stop("a table is made"))
+  expect_error(read_table_file(path, c("hour", "Ti", "Te")), "Line 10 has 100001 fields, its header 3",
+               class = "amiss_error_input")
+})

@@ -190,3 +190,15 @@ test_that("the engine reads every field of the table, and refuses a component or
   opening$components[[1]]$exposure <- "windy"
   expect_error(run(opening), "unknown exposure 'windy'")
 })
+
+test_that("drivers that seem to be no measurements are told of", {
+  room <- zone(zone_infiltration("leak", 0.5, "Te"), volume = 10)
+  te <- 5 + sin(1:96 / 4)
+  expect_no_warning(simulate_zone(room, drivers = cbind(Te = te, unread = -9999), step_s = 900))
+  for (value in c(-9999, 700)) {
+    expect_warning(simulate_zone(room, drivers = cbind(Te = replace(te, 5, value)), step_s = 900),
+                   paste0("Te is ", value, " in row 5"), class = "amiss_warning_input")
+  }
+  # A record has checked its own.
+  expect_no_warning(simulate_runs(room, matrix(0, 1, 0), cbind(Te = replace(te, 5, 700)), step_h = 0.25))
+})
