@@ -48,6 +48,7 @@ epw_weather <- function(template, columns, file = "weather.epw", instant = chara
   }
   check_input(checkmate::check_string(file, min.chars = 1), "file")
   check_inside(c(file = file))
+  check_input(checkmate::check_character(instant, any.missing = FALSE), "instant", "Name some of {.arg columns}.")
   check_input(checkmate::check_subset(instant, names(columns)), "instant", "Name some of {.arg columns}.")
   check_input(checkmate::check_number(utc_offset, lower = -14, upper = 14, null.ok = TRUE), "utc_offset",
               "It is in hours.")

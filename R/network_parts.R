@@ -111,7 +111,7 @@ check_part_field <- function(value, rule, where, field, call) {
                   i = if (rule$optional) "Use {.code NULL} for none."), call = call)
   }
   if (is_free(value)) return(check_prior_inside(value, rule, where, field, call))
-  number <- isTRUE(plain_number(value)) && checkmate::test_number(value)
+  number <- isTRUE(plain_number(value, single = TRUE)) && checkmate::test_number(value)
   if (number && (is.finite(value) || rule$infinite && value == Inf) && inside_rule(value, rule)) return(invisible())
   abort_input("{where}: {.field {field}} must be one number {rule_words(rule)} or {.fn free}; got {seen(value)}.",
               call = call)

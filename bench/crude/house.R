@@ -29,8 +29,8 @@ crude_catalogue <- function(states) {
     amiss::mechanism(name, boundary = boundary, sentence = sentence,
                      edit = function(model) do.call(amiss::add_component, c(list(model), parts)))
   }
-  lag <- amiss::mechanism("heater lag", boundary = "heating", sentence = "The heater holds heat and gives it off later.",
-                          edit = function(model) {
+  later <- "The heater holds heat and gives it off later."
+  lag <- amiss::mechanism("heater lag", boundary = "heating", sentence = later, edit = function(model) {
     model <- amiss::add_component(model, amiss::network_node("heater", capacity("C_heater", 0.005, 1)),
                                   amiss::network_link("heater", "air", conductance("H_heater", 0.02, 2)))
     amiss::change_component(model, "heating to air", to = "heater")
