@@ -46,7 +46,7 @@ object_shapes <- list(
   check = c(passed = "flag[1]", verdict = "text[1]", ratio = "number[1]", mean = "?real"),
   trust = c(trusted = "flag[1]", verdict = "text[1]"),
   amiss_fit = c(emulator = "amiss_emulator", measurements = "amiss_measurements", control = "list", rows = "real[n]",
-                priors = "list", values = "real[k,p]", weights = "real[k]", posterior = ":posterior",
+                priors = "list", values = "values[k,u]", weights = "real[k]", posterior = ":posterior",
                 log_evidence = "estimate[1]", standard_error = "estimate[1]", interval = "number[2]", trust = ":trust",
                 seed = "number[1]", check = "?:check", best = "?list"),
   amiss_calibration = c(posterior = ":history_posterior", priors = ":history_priors", control = ":history_control",
@@ -88,7 +88,7 @@ object_shapes <- list(
   amiss_joint_attribution = c(records = "each:amiss_attribution", table = "table", groups = "list"),
   amiss_discrepancy = c(series = "table", responses = "real[n,b]", segment = "real[n]", target = "text[1]",
                         unit = "text[1]"),
-  amiss_sobol = c(table = "table", unexplained = "number[1]", points = "real[1]", replicates = "real[1]",
+  amiss_sobol = c(table = "table", unexplained = "?number[1]", points = "?real[1]", replicates = "?real[1]",
                   by_time = "?any"))
 
 # Objects with a format_version; the others are written by the package's functions in a session, and not kept.

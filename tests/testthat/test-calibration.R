@@ -169,6 +169,8 @@ test_that("a record with no more rows than the basis has vectors is refused", {
   expect_identical(ncol(emulator$basis$vectors), 19L)  # never as many as rows
   emulator$basis$vectors <- cbind(emulator$basis$vectors, cos(1:20), sin(1:20))
   emulator$spread <- rbind(emulator$spread, 0, 0)
+  emulator$processes$coefficients <- cbind(emulator$processes$coefficients, 0, 0)
+  emulator$processes$hyperparameters <- emulator$processes$hyperparameters[c(1:19, 19, 19), , drop = FALSE]
   emulator$basis$discarded_sd[] <- 0
   expect_error(calibrate(emulator, m, quick_ais, seed = 1), "20 rows, no more than the 21 basis vectors",
                class = "amiss_error_input")

@@ -94,6 +94,6 @@ test_that("Sobol indices stay on the canvas", {
   table <- data.frame(parameter = c("a", "b", "c"), first = c(0.6, 0.2, 0), first_sampling = 0.02, first_emulator = 0.1,
                       total = c(0.7, 0.3, 0.02), total_sampling = 0.01, total_emulator = 0.05,
                       label = c("conductivity of the insulation of all outer walls", "g", "air changes per hour"))
-  indices <- structure(list(table = table), class = "amiss_sobol")
+  indices <- structure(list(format_version = format_version, table = table), class = "amiss_sobol")
   for (width in widths) expect_true(edges_blank(ggplot2::autoplot(indices), width), info = width)
 })
