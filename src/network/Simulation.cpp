@@ -187,14 +187,10 @@ class Stepper {
     run.output[r] = moved_[nodes_];
   }
 
-  // What inputs bring to each quantity, one a column: a product by vectors is faster than one by matrices, as the
-  // block is tall and narrow.
+  // What inputs bring to each quantity, one a column.
   void force(const Eigen::Map<const MatrixXd>& p, Index from, Index count) {
     first_ = from;
-    forcing_.resize(count, p.rows());
-    for (Index i = 0; i < p.rows(); ++i) {
-      forcing_.col(i).noalias() = inputs_.middleRows(from, count) * p.row(i).tail(inputs_.cols()).transpose();
-    }
+    forcing_.noalias() = inputs_.middleRows(from, count) * p.rightCols(inputs_.cols()).transpose();
   }
 
   RowPropagators& propagators_;
