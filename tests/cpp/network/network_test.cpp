@@ -201,6 +201,32 @@ TEST(Network, SlopesAreThoseOfCentralDifferences) {
   }
 }
 
+TEST(Network, SlopesOfAFlowAndAfterAHoldAreThoseOfDifferences) {
+  House house(false);
+  house.coefficients.start << 19.0, 14.0, 30.0;
+  Network flow = house.network;  // from the air to the wall
+  flow.output = {{-1, {0, -1}, 1.0, 0, -1}, {-1, {1, -1}, -1.0, 0, -1}};
+  VectorXd hold = VectorXd::Constant(60, kNaN);
+  hold.segment(20, 5).setConstant(21.0);
+  Coefficients direction = zero_like(house.coefficients);
+  direction.element[0] = 1;
+  for (const Network& network : {flow, house.network}) {
+    for (const bool mean : {false, true}) {
+      const Options options = hourly(true, mean);
+      const auto run = simulate(network, house.coefficients, {direction}, house.drivers, hold, options);
+      const auto moved = [&](double by) {
+        Coefficients c = house.coefficients;
+        c.element[0] += by;
+        return simulate(network, c, {}, house.drivers, hold, options).output;
+      };
+      const VectorXd differences = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+      // As above: rounding over 2e-5.
+      EXPECT_LT((run.slopes.col(0) - differences).cwiseAbs().maxCoeff(),
+                1e-6 * (1 + differences.cwiseAbs().maxCoeff()));
+    }
+  }
+}
+
 TEST(Network, ASecondModulatorChangesNothing) {
   House house(true);
   const auto series =
