@@ -14,9 +14,9 @@ simulate_runs.amiss_network <- function(simulator, values, drivers, step_h, hold
 #' @export
 slopes.amiss_network <- function(simulator, values, drivers, step_h, hold = NULL, ...) {
   call <- rlang::current_env()
-  parameters <- names(free_parameters(simulator))
+  parameters <- names(parameters_of(simulator))
   check_named_columns(values, "values", parameters)
-  check_named_columns(drivers, "drivers", driver_names(simulator))
+  check_named_columns(drivers, "drivers", named_drivers(simulator))
   run <- network_request(simulator, drivers, step_h, hold, call)
   table <- coefficient_table(simulator)
   at <- values[1, , drop = FALSE]
@@ -30,7 +30,7 @@ slopes.amiss_network <- function(simulator, values, drivers, step_h, hold = NULL
 # What the engine is given beside numbers.
 network_request <- function(network, drivers, step_h, hold, call) {
   check_network_joined(network, call)
-  needed <- driver_names(network)
+  needed <- named_drivers(network)
   drivers <- drivers[, needed, drop = FALSE]
   storage.mode(drivers) <- "double"
   gaps <- needed[!apply(is.finite(drivers), 2, all)]
@@ -115,9 +115,9 @@ coefficient_table <- function(network) {
   exchanges <- Filter(function(part) part$type != "node", parts)
   fields <- c(lapply(exchanges, element), lapply(nodes, `[[`, "capacity"),
               lapply(nodes, function(node) node$start %||% NaN),
-              lapply(driver_names(network), function(driver) network$before[[driver]] %||% NaN))
+              lapply(named_drivers(network), function(driver) network$before[[driver]] %||% NaN))
   inverse <- c(vapply(exchanges, function(part) !is.null(part$resistance), NA),
-               logical(2 * length(nodes) + length(driver_names(network))))
+               logical(2 * length(nodes) + length(named_drivers(network))))
   scaled <- vapply(fields, inherits, NA, "amiss_scaled_free")
   free <- vapply(fields, is_free, NA)
   data.frame(value = vapply(seq_along(fields), function(i) if (free[i]) NA_real_ else as.numeric(fields[[i]]), 0),

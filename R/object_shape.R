@@ -150,20 +150,34 @@ shape_fault <- function(x, parts, sizes, within) {
 }
 
 part_fault <- function(value, expected, sizes, name) {
-  if (startsWith(expected, "?")) {
-    if (is.null(value)) return(NULL)
-    expected <- substring(expected, 2)
-  }
-  kind <- sub("\\[.*", "", expected)
-  if (startsWith(kind, ":")) return(object_fault(value, substring(kind, 2), paste0(name, "$"), sizes))
-  many <- grepl("^(each|some):", kind)
-  right <- if (many) is.list(value) && (length(value) || startsWith(kind, "each")) else is_kind(value, kind)
-  if (!right || !has_size(value, sub("^[^[]*", "", expected), sizes)) {
-    return(list(part = name, value = value, expected = kind))
-  }
-  if (many) return(each_fault(value, substring(kind, 6), name))
-  if (startsWith(kind, "amiss_")) object_fault(value, shapes_of(value), paste0(name, "$"))
+  part <- part_read(expected)
+  if (part$optional && is.null(value)) return(NULL)
+  kind <- part$kind
+  if (part$form == "shape") return(object_fault(value, part$shape, paste0(name, "$"), sizes))
+  many <- part$form %in% c("each", "some")
+  right <- if (many) is.list(value) && (length(value) || part$form == "each") else is_kind(value, kind)
+  if (!right || !has_size(value, part$size, sizes)) return(list(part = name, value = value, expected = kind))
+  if (many) return(each_fault(value, part$shape, name))
+  if (part$form == "class") object_fault(value, shapes_of(value), paste0(name, "$"))
 }
+
+# A part as it is written above, read: whether it is optional, its kind, what is of this shape, and its size. Each is
+# read once in a session.
+part_read <- function(expected) {
+  known <- parts_read[[expected]]
+  if (!is.null(known)) return(known)
+  written <- sub("^[?]", "", expected)
+  kind <- sub("\\[.*", "", written)
+  form <- if (startsWith(kind, "amiss_")) "class" else if (!grepl(":", kind)) "plain"
+          else if (startsWith(kind, ":")) "shape" else sub(":.*", "", kind)
+  size <- gsub("^[^[]*|[][]", "", written)
+  part <- list(optional = startsWith(expected, "?"), kind = kind, form = form, shape = sub(".*:", "", kind),
+               size = strsplit(size, ",", fixed = TRUE)[[1]])
+  parts_read[[expected]] <- part
+  part
+}
+
+parts_read <- new.env(parent = emptyenv())
 
 each_fault <- function(values, shape, name) {
   for (i in seq_along(values)) {
@@ -187,15 +201,13 @@ is_kind <- function(value, kind) {
          "function" = is.function(value), inherits(value, strsplit(kind, "|", fixed = TRUE)[[1]]))
 }
 
-# `size` as "[n,2]". A letter is bound by the first part that has it.
+# `size` as c("n", "2"). A letter is bound by the first part that has it.
 has_size <- function(value, size, sizes) {
-  if (!nzchar(size)) return(TRUE)
-  size <- strsplit(gsub("[][]", "", size), ",", fixed = TRUE)[[1]]
+  if (!length(size)) return(TRUE)
   own <- if (length(size) > 1) dim(value) else length(value)
   if (length(own) != length(size)) return(FALSE)
   for (i in seq_along(size)) {
-    wanted <- suppressWarnings(as.integer(size[i]))
-    if (is.na(wanted)) wanted <- sizes[[size[i]]]
+    wanted <- if (grepl("^[0-9]", size[i])) as.integer(size[i]) else sizes[[size[i]]]
     if (is.null(wanted)) sizes[[size[i]]] <- own[i]
     else if (own[i] != wanted) return(FALSE)
   }

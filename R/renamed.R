@@ -44,7 +44,7 @@ print.amiss_renamed <- function(x, ...) on_stdout(x, {
 
 #' @export
 free_parameters.amiss_renamed <- function(simulator) {
-  parameters <- free_parameters(simulator$simulator)
+  parameters <- parameters_of(simulator$simulator)
   at <- match(names(simulator$to), names(parameters))
   names(parameters)[at] <- simulator$to
   for (name in simulator$to) {
@@ -71,7 +71,7 @@ edited <- function(simulator, edit, call = rlang::caller_env()) {
 }
 
 #' @export
-driver_names.amiss_renamed <- function(simulator) driver_names(simulator$simulator)
+driver_names.amiss_renamed <- function(simulator) named_drivers(simulator$simulator)
 
 #' @export
 simulate_runs.amiss_renamed <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {

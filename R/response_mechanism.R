@@ -186,20 +186,20 @@ without_responses <- function(model) {
 
 #' @export
 free_parameters.amiss_responding <- function(simulator) {
-  c(free_parameters(without_responses(simulator)),
+  c(parameters_of(without_responses(simulator)),
     do.call(c, lapply(attr(simulator, "responses"), `[[`, "parameters")))
 }
 
 #' @export
 driver_names.amiss_responding <- function(simulator) {
-  union(driver_names(without_responses(simulator)), vapply(attr(simulator, "responses"), `[[`, "", "boundary"))
+  union(named_drivers(without_responses(simulator)), vapply(attr(simulator, "responses"), `[[`, "", "boundary"))
 }
 
 #' @export
 simulate_runs.amiss_responding <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
   base <- without_responses(simulator)
-  runs <- simulate_runs(base, values[, names(free_parameters(base)), drop = FALSE],
-                        drivers[, driver_names(base), drop = FALSE], step_h, hold, threads, ...)
+  runs <- simulate_runs(base, values[, names(parameters_of(base)), drop = FALSE],
+                        drivers[, named_drivers(base), drop = FALSE], step_h, hold, threads, ...)
   rows <- seq_len(nrow(drivers))
   for (response in attr(simulator, "responses")) {
     runs <- runs + response_runs(response, drivers[, response$boundary], step_h * rows, rows == 1, values)

@@ -216,10 +216,15 @@ simulate_runs <- function(simulator, values, drivers, step_h, hold = NULL, threa
   UseMethod("simulate_runs")
 }
 
+# The same generics for simulators that have been checked: a run need not check its simulator thrice.
+parameters_of <- function(simulator) UseMethod("free_parameters")
+
+named_drivers <- function(simulator) UseMethod("driver_names")
+
 check_run_request <- function(simulator, values, drivers, step_h, hold, threads, call = rlang::caller_env()) {
   check_simulator(simulator, call)
-  check_named_columns(values, "values", names(free_parameters(simulator)), call)
-  check_named_columns(drivers, "drivers", driver_names(simulator), call)
+  check_named_columns(values, "values", names(parameters_of(simulator)), call)
+  check_named_columns(drivers, "drivers", named_drivers(simulator), call)
   check_input(checkmate::check_number(step_h, lower = 1e-9, finite = TRUE), "step_h", call = call)
   check_input(checkmate::check_numeric(hold, null.ok = TRUE), "hold", call = call)
   if (!length(hold) %in% c(0, nrow(drivers))) {
@@ -401,7 +406,7 @@ simulated_rows <- function(measurements, rows) {
 
 check_driver_columns <- function(simulator, measurements, call) {
   present <- colnames(measurements$raw$drivers)
-  absent <- setdiff(driver_names(simulator), present)
+  absent <- setdiff(named_drivers(simulator), present)
   if (!length(absent)) return(invisible())
   abort_input(c("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the measurements do not have.",
                 i = "Columns there: {.val {present}}."), call = call)
@@ -409,7 +414,7 @@ check_driver_columns <- function(simulator, measurements, call) {
 
 # Runs over rows of the raw record, all of one segment.
 simulate_rows <- function(simulator, values, raw, rows, threads, call) {
-  needed <- driver_names(simulator)
+  needed <- named_drivers(simulator)
   for (column in needed) {
     bad <- rows[!is.finite(raw$drivers[rows, column])]
     if (length(bad)) {

@@ -26,7 +26,7 @@ measured_slopes <- function(simulator, values, measurements) {
   out <- matrix(0, length(measurements$y), ncol(values), dimnames = list(NULL, colnames(values)))
   raw <- measurements$raw
   for (within in simulated_rows(measurements, rows)) {
-    needed <- driver_names(simulator)
+    needed <- named_drivers(simulator)
     hold <- ifelse(raw$use[within] == "warmup", raw$y[within], NA_real_)
     fine <- slopes(simulator, values, raw$drivers[within, needed, drop = FALSE], raw$step_h, hold,
                    time = raw$time[within], segment = raw$segment[within[1]])

@@ -126,10 +126,6 @@ extended_simulators <- function(mechanism, state) {
   extended
 }
 
-parameters_of <- function(simulator) {
-  if (inherits(simulator, "amiss_ensemble")) simulator$parameters else free_parameters(simulator)
-}
-
 # An edit that could be made on the base model may not be possible on top of what was adopted: then the loop
 # goes on without it.
 can_extend <- function(mechanism, state, brought) {
