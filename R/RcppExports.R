@@ -49,8 +49,8 @@ tangent_given_ <- function(data, priors, points, x0, run, slopes, context) {
     .Call(`_amiss_tangent_given_`, data, priors, points, x0, run, slopes, context)
 }
 
-draws_within_ <- function(mean, covariance, limit, start, n, seed) {
-    .Call(`_amiss_draws_within_`, mean, covariance, limit, start, n, seed)
+draws_within_ <- function(mean, covariance, lower, upper, start, n, seed) {
+    .Call(`_amiss_draws_within_`, mean, covariance, lower, upper, start, n, seed)
 }
 
 response_evidence_ <- function(data, priors, tangent, responses, ais, context) {

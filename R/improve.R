@@ -22,7 +22,7 @@ with_local_runs <- function(model, least, context) {
   if (n <= 0) return(model)
   seed <- context$seed + nrow(model$runs$z)  # each time others
   unit <- region_design(model$region, n, seed)
-  with_runs(model, from_unit(unit, model$flat), context)$model
+  with_runs(model, from_unit(unit, model$space), context)$model
 }
 
 is_inside <- function(model) succeeded(model) & straight_distance(model) <= 1
@@ -41,9 +41,7 @@ least_local <- function(model) {
 # Of its runs, how far out they lie in the straightened coordinates of the region: 1 is where it ends.
 # A run at the end of a flat prior, infinitely far in normal coordinates, is near in these.
 straight_distance <- function(model) {
-  straight <- straightened(model$region)
-  apart <- (t(model$runs$z) - straight$z) / straight$slope
-  sqrt(colSums(forwardsolve(model$region$root, apart)^2)) / model$region$radius
+  sqrt(colSums(along_axes(model$region, model$space, model$runs$z)^2)) / model$region$radius
 }
 
 # The posterior of the model by the runs there are. Where it reaches the end of its region, the region
@@ -89,9 +87,8 @@ without_failing <- function(model, fits) {
   failed <- !succeeded(model)
   near <- straight_distance(model) <= 2
   if (!any(failed & near)) return(fits)
-  straight <- straightened(model$region)
-  scaled <- function(z) forwardsolve(model$region$root, (t(z) - straight$z) / straight$slope)
-  draws <- scaled(from_unit(joint_unit(model, fits), model$flat))
+  scaled <- function(z) along_axes(model$region, model$space, z)
+  draws <- scaled(from_unit(joint_unit(model, fits), model$space))
   runs <- scaled(model$runs$z[near, , drop = FALSE])
   nearest <- apply(draws, 2, function(draw) which.min(colSums((runs - draw)^2)))
   possible <- !failed[near][nearest]
@@ -145,7 +142,7 @@ least_reference <- function(model) {
 with_centre <- function(model) {
   at <- which.min(ifelse(succeeded(model), straight_distance(model), Inf))
   slopes <- secant_slopes(model, at, least_reference(model))
-  way <- straightened(model$region)$z - model$runs$z[at, ]
+  way <- straightened(model$region, model$space)$z - model$runs$z[at, ]
   model$centre <- list(output = model$runs$outputs[, at] + (slopes %*% way)[, 1], slopes = slopes)
   model
 }
@@ -190,11 +187,11 @@ record_ensemble <- function(model, k, region) {
   wanted <- nearest[seq_len(max(inside, min(least_training(own), sum(is.finite(distance)))))]
   wanted <- sort(wanted[!duplicated(model$runs$z[wanted, own, drop = FALSE])])
   parameters <- model$parameters[own]
-  unit <- unname(to_unit(model$runs$z[wanted, own, drop = FALSE], model$flat[own]))
+  unit <- unname(to_unit(model$runs$z[wanted, own, drop = FALSE], model$space[own, ]))
   ensemble <- new_ensemble(parameters, unit, unit_to_values(unit, parameters),
                            model$runs$outputs[rows, wanted, drop = FALSE], model$simulators[[k]], NA,
                            region, hours = record$measurements$hours[record$rows])
-  per_unit <- straightened(region)$slope * region$root
+  per_unit <- straightened(region, model$space[own, ])$slope * region$root
   ensemble$tangent <- list(centre = model$centre$output[rows],
                            slopes = model$centre$slopes[rows, own, drop = FALSE] %*% per_unit)
   ensemble
@@ -207,7 +204,7 @@ least_training <- function(own) max(6, length(own) + 3)
 check_by_runs <- function(model, fits, n, context) {
   drawn <- even_draws(fits[[1]], n)
   draws <- unique(drawn)
-  z <- from_unit(joint_unit(model, fits)[draws, , drop = FALSE], model$flat)
+  z <- from_unit(joint_unit(model, fits)[draws, , drop = FALSE], model$space)
   made <- with_runs(model, z, context)
   model <- made$model
   draws <- draws[seq_along(made$at)]
@@ -239,6 +236,7 @@ verify_model <- function(model, context, before = NULL, rounds = context$control
     filled <- sum(fills(found$model))
     if (filled < least / 2 && !is_spent(context)) {  # the region has moved away from its runs
       model <- found$model
+      least <- least_local(model)
       next
     }
     checks <- if (is.null(before)) rules$first_check else rules$check_runs
@@ -246,6 +244,7 @@ verify_model <- function(model, context, before = NULL, rounds = context$control
     model <- found$model
     if (round < rounds && misses_least(model, found$fits) && !is_spent(context)) {
       model <- moved_to_least(model, context)
+      least <- least_local(model)
       best <- before <- NULL
       next
     }
@@ -322,7 +321,7 @@ with_fit <- function(model, fits, level, rounds, context) {
 # The run of least squares, of each record.
 best_runs <- function(model) {
   at <- model$least$at
-  unit <- to_unit(model$runs$z[at, , drop = FALSE], model$flat)
+  unit <- to_unit(model$runs$z[at, , drop = FALSE], model$space)
   Map(function(own, rows) {
     parameters <- model$parameters[own]
     list(values = unit_to_values(unit[, own, drop = FALSE], parameters), output = model$runs$outputs[rows, at])
@@ -346,7 +345,7 @@ not_agreed <- function(trust, modes) {
 # probable as the draws of the posterior that were run, but without draws: a mode that was lost.
 confirmed_modes <- function(model, modes, fits) {
   modes$agree <- modes$agree || sum(straight_distance(model)[modes$ends] <= 1) > 1
-  z <- t(from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$flat))
+  z <- t(from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$space))
   empty <- !mapply(function(at, covariance) {
     apart <- forwardsolve(t(chol(covariance)), z - model$runs$z[at, ])
     any(colSums(apart^2) < 4 * (nrow(z) + 4))
@@ -367,7 +366,7 @@ values_under <- function(model, fits, at) {
                                 model$runs$outputs[rows, rep(at, each = length(draws)), drop = FALSE], 1)
     apply(matrix(log_l, length(draws)), 2, log_mean_exp)
   }, fits, model$rows)
-  Reduce(`+`, each) - 0.5 * rowSums(model$runs$z[at, !model$flat, drop = FALSE]^2)
+  Reduce(`+`, each) - 0.5 * rowSums(model$runs$z[at, !model$space$flat, drop = FALSE]^2)
 }
 
 # The base model from its first run to its verified posterior.

@@ -22,13 +22,12 @@ new_model <- function(simulators, records, name = "base", parent = NULL, mechani
   check_one_prior(each)
   parameters <- do.call(c, each)
   parameters <- parameters[!duplicated(names(parameters))]
-  flat <- are_flat(parameters)
+  space <- coordinates_of(parameters)
   sizes <- vapply(records, function(record) length(record$rows), 0L)
   held <- vapply(records, function(record) length(record$held), 0L)
   blocks <- function(sizes) split(seq_len(sum(sizes)), factor(rep(seq_along(sizes), sizes), seq_along(sizes)))
   list(name = name, parent = parent, mechanism = mechanism, simulators = simulators,
-       records = records, parameters = parameters, flat = flat,
-       limit = ifelse(flat, flat_limit, rules$farthest),
+       records = records, parameters = parameters, space = space,
        own = lapply(each, function(p) match(names(p), names(parameters))),
        rows = unname(blocks(sizes)), held_rows = unname(blocks(held)),
        target = unlist(lapply(records, function(record) record$data$y), use.names = FALSE),
@@ -41,7 +40,7 @@ new_model <- function(simulators, records, name = "base", parent = NULL, mechani
 # Its runs at points (one a row), as far as the budget goes, a failed one NaN: list(model, at), the
 # numbers of the runs.
 with_runs <- function(model, z, context) {
-  z <- pmin(pmax(z, rep(-model$limit, each = nrow(z))), rep(model$limit, each = nrow(z)))
+  z <- pmin(pmax(z, rep(model$space$lower, each = nrow(z))), rep(model$space$upper, each = nrow(z)))
   left <- floor(max(0, runs_left(context)) / length(model$simulators))
   z <- z[seq_len(min(nrow(z), left)), , drop = FALSE]
   at <- nrow(model$runs$z) + seq_len(nrow(z))
@@ -56,7 +55,7 @@ bind_runs <- function(runs, more) {
 
 # A record is run once at points that differ in nothing of its own.
 run_at <- function(model, z, context) {
-  unit <- to_unit(z, model$flat)
+  unit <- to_unit(z, model$space)
   each <- Map(function(simulator, record, own) {
     values <- unit_to_values(unit[, own, drop = FALSE], model$parameters[own])
     key <- apply(values, 1, rlang::hash)

@@ -37,7 +37,7 @@ with_scouts <- function(model, context) {
   n <- max(0, (model$scouts %||% (rules$scouts_base + rules$scouts_parameter * p)) - nrow(model$runs$z))
   if (n == 0) return(model)
   unit <- with_seed(context$seed, lhs::randomLHS(n, p))
-  model <- with_runs(model, from_unit(unit, model$flat), context)$model
+  model <- with_runs(model, from_unit(unit, model$space), context)$model
   check_some_succeeded(model)
   for (rows in model$rows) check_runs_change(model$runs$outputs[rows, succeeded(model), drop = FALSE])
   model
@@ -47,7 +47,7 @@ check_some_succeeded <- function(model, call = rlang::caller_env()) {
   if (sum(succeeded(model)) >= min(3, nrow(model$runs$z))) return(invisible())
   n <- nrow(model$runs$z)
   failed <- which(!succeeded(model))
-  unit <- to_unit(model$runs$z[failed[1], , drop = FALSE], model$flat)
+  unit <- to_unit(model$runs$z[failed[1], , drop = FALSE], model$space)
   abort_input(c("{length(failed)} of {n} runs over the priors hold values that are not finite.",
                 x = paste("The first is run {failed[1]} at",
                           "{point_words(unit_to_values(unit, model$parameters))}."),
@@ -111,8 +111,8 @@ region_of_modes <- function(model, modes, seed) {
   value <- vapply(modes, function(mode) mode$value %||% 0, 0)
   modes <- modes[value > max(value) - rules$mode_depth]
   draws <- lapply(modes, function(mode) {
-    draws_within(mode$mean, mode$covariance, model$limit, region_draws, seed)
+    draws_within(mode$mean, mode$covariance, model$space, region_draws, seed)
   })
-  unit <- to_unit(do.call(rbind, draws), model$flat)
+  unit <- to_unit(do.call(rbind, draws), model$space)
   region_of_draws(unit, rep(1, nrow(unit)), model$parameters)
 }

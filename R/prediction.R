@@ -181,11 +181,11 @@ moves_at <- function(fit, use, threads, record = fit$measurements) {
 # The simulator's slopes at other rows, at the run of least squares.
 slopes_at <- function(fit, use, threads, record) {
   parameters <- fit$emulator$parameters
-  flat <- are_flat(parameters)
+  space <- coordinates_of(parameters)
   z <- fit$emulator$moves$z
-  step <- rules$search_difference * difference_side(z)
+  step <- rules$search_difference * difference_side(z, space)
   around <- rbind(z, matrix(z, length(z), length(z), byrow = TRUE) + diag(step, length(z)))
-  runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, flat), parameters), use, threads, record)
+  runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, space), parameters), use, threads, record)
   if (!all(is.finite(runs))) {
     abort_numerical("The simulator failed beside its best run at these rows.")
   }

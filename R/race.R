@@ -32,8 +32,9 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
   model
 }
 
-# A search from the most promising start of the first look. An extension holds the present model, with its
-# mechanism switched off, and cannot be worse: if the search ends below that, it goes on from the next start.
+# A search from the most promising start of the first look. An extension holds the present model, with its mechanism
+# switched off, and cannot be worse: if the search ends below that, or no nearer to the record, it goes on from the next
+# start.
 search_trial <- function(looked, context) {
   model <- looked$model
   best <- NULL
@@ -44,10 +45,18 @@ search_trial <- function(looked, context) {
     others <- c(best$at, looked$off_at)
     value <- values_at(model, c(search$at, others), search$history, search$moves, context)
     if (is.null(best) || value[1] > value[2]) best <- search
-    if (is_spent(context) || all(value[1] >= value[-1]) && search$status %in% c("converged", "futile")) break
+    is_done <- all(value[1] >= value[-1]) && search$status %in% c("converged", "futile")
+    if (is_spent(context) || is_done && comes_nearer(model, search$least$at, looked$off_at)) break
   }
   best$model <- model
   best
+}
+
+# Whether a run is decisively nearer to the record than the one without the mechanism.
+comes_nearer <- function(model, at, off_at) {
+  if (is.null(off_at)) return(TRUE)
+  misfit <- squared_misfit(model)[c(at, off_at)]
+  misfit[1] < misfit[2] - rules$decisive * log(10) * squared_nats(model, misfit[2])
 }
 
 # A first look: what is new at its ends and between, all else as in the present model. It shows where the
@@ -65,8 +74,7 @@ look_at_mechanism <- function(model, present, off, context) {
     z[, new] <- values
     z
   }
-  flat <- model$flat[match(new, names(model$parameters))]
-  values <- first_values(length(new), flat, model$limit[match(new, names(model$parameters))])
+  values <- first_values(model$space[match(new, names(model$parameters)), ])
   if (!is.null(off)) values <- values[colSums(t(values) != off) > 0, , drop = FALSE]  # known already
   made <- with_runs(model, place(values), context)
   model <- made$model
@@ -83,22 +91,19 @@ look_at_mechanism <- function(model, present, off, context) {
   if (!is.null(off) && setequal(kept, old)) {
     model <- inherit_runs(model, present, off)
     off_at <- present$present$at
-    fine <- c(off_at, fine + ncol(present$runs$outputs))
+    fine <- c(off_at, fine[change >= rules$off_change] + ncol(present$runs$outputs))
   }
   starts <- lapply(fine, function(at) list(at = at, slopes = slopes_in(model, at, fine, new, slopes)))
   value <- vapply(starts, profile_value, 0, model, present, context)
   list(model = model, silent = FALSE, off = off, off_at = off_at, starts = starts[order(-value)])
 }
 
-# Values of n new parameters for the first look: all at their lower ends, all at their upper ends, and
-# between.
-first_values <- function(n, flat, limit) {
+# Values of new parameters for the first look: all at their lower ends, all at their upper ends, and between.
+first_values <- function(space) {
+  n <- nrow(space)
   if (n == 0) return(matrix(0, 1, 0))
-  between <- if (n == 1) matrix(0) else {
-    unit <- with_seed(n, lhs::randomLHS(2 * n - 1, n))
-    from_unit(unit, flat)
-  }
-  rbind(-limit, limit, between)
+  between <- if (n == 1) matrix(0.5) else with_seed(n, lhs::randomLHS(2 * n - 1, n))
+  rbind(space$lower, space$upper, from_unit(between, space))
 }
 
 # Where the first look shows the output of the present model: a value of each new parameter, or NULL.
@@ -125,7 +130,7 @@ profile_value <- function(start, model, present, context) {
   history <- present$present$history
   moves <- moves_of(model, start)
   tangent <- tangent_given(model, model$runs$z[at, ], model$runs$outputs[, at], slopes, history, moves, context)
-  z <- within_limits(tangent$mean, solve(tangent$covariance), model$limit)
+  z <- within_limits(tangent$mean, solve(tangent$covariance), model$space)
   output <- model$runs$outputs[, at] + slopes %*% (z - model$runs$z[at, ])
   values_of(model, output, rbind(z), history, moves, context)
 }
@@ -252,7 +257,7 @@ widened_trial <- function(trial, present, bar, context) {
   model <- trial
   p <- length(model$parameters)
   unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
-  model <- with_runs(model, from_unit(unit, model$flat), context)$model
+  model <- with_runs(model, from_unit(unit, model$space), context)$model
   own <- list(at = trial$mode, slopes = secant_slopes(model, trial$mode, least_reference(model)), least = trial$least)
   own[c("mean", "covariance", "history", "moves")] <- tangent_at(model, own$at, own$slopes,
                                                                moves_of(model, own$least), context)

@@ -88,7 +88,7 @@ with_known_runs <- function(model, ensembles) {
   if (length(n) > 1) return(model)  # of some records runs failed
   unit <- matrix(0.5, n, length(model$parameters))
   for (k in seq_along(ensembles)) unit[, model$own[[k]]] <- ensembles[[k]]$unit
-  z <- from_unit(unit, model$flat)
+  z <- from_unit(unit, model$space)
   colnames(z) <- names(model$parameters)
   held <- matrix(NaN, nrow(model$runs$held), n)
   outputs <- do.call(rbind, lapply(unname(ensembles), `[[`, "outputs"))

@@ -8,14 +8,25 @@ new_region <- function(centre, root, radius, parameters) {
   list(centre = centre, root = root, radius = radius, uniform = are_flat(parameters))
 }
 
-# The straightened coordinates s of the engine's Region in those of coordinates.R: the point z at s = c,
-# and dz/ds.
-straightened <- function(region) {
+# The straightened coordinates s of the engine's Region in those of coordinates.R: the point z at s = c, and dz/ds
+# there. Of a flat prior s is linear in z, of any other it is the normal quantile.
+straightened <- function(region, space) {
   spread <- sqrt(1 + rowSums(region$root^2))
   side <- stats::pnorm(region$centre / spread)
   slope <- stats::dnorm(region$centre / spread) / spread
-  list(z = ifelse(region$uniform, 2 * flat_limit * (side - 0.5), region$centre),
-       slope = ifelse(region$uniform, 2 * flat_limit * slope, 1))
+  z <- from_unit(rbind(stats::pnorm(region$centre)), space)[1, ]
+  list(z = ifelse(region$uniform, 2 * flat_limit * (side - 0.5), z),
+       slope = ifelse(region$uniform, 2 * flat_limit * slope, per_normal(z, space)))
+}
+
+# Of points z (one a row), how far they lie from the centre of a region in its straightened coordinates, along its axes
+# (one a column).
+along_axes <- function(region, space, z) {
+  straight <- straightened(region, space)
+  apart <- t(to_normal(to_unit(z, space))) - region$centre
+  flat <- region$uniform
+  apart[flat, ] <- (t(z[, flat, drop = FALSE]) - straight$z[flat]) / straight$slope[flat]
+  forwardsolve(region$root, apart)
 }
 
 # The ellipsoid that holds a posterior, wider by `growth` if that is not trusted.

@@ -59,7 +59,8 @@ with_given_slopes <- function(search) {
 # Slopes by differences cost a run a parameter: they are worth it if steps failed in a row, or if as many were made and
 # some of them were poor.
 needs_slopes <- function(search) {
-  search$failed == rules$renew_after || search$poor >= rules$renew_after && search$since >= length(search$model$flat)
+  enough <- search$since >= length(search$model$parameters)
+  search$failed == rules$renew_after || search$poor >= rules$renew_after && enough
 }
 
 # The posterior under the tangent, with error and discrepancy sampled under it.
@@ -77,8 +78,8 @@ moves_of <- function(model, least) sweep(least$slopes, 2, normal_units(model, le
 
 normal_units <- function(model, least) {
   open <- left_open(model, least)
-  draws <- draws_within(open$mean, open$covariance, model$limit, rules$open_draws, 1)
-  vapply(seq_len(ncol(draws)), function(j) sqrt(mean(per_normal(draws[, j], model$flat[j])^2)), 0)
+  draws <- draws_within(open$mean, open$covariance, model$space, rules$open_draws, 1)
+  vapply(seq_len(ncol(draws)), function(j) sqrt(mean(per_normal(draws[, j], model$space[j, ])^2)), 0)
 }
 
 # The parameters by least squares in units of the noise.
@@ -91,7 +92,7 @@ left_open <- function(model, least) {
 # What its optimum would gain.
 promised_by <- function(search) {
   precision <- solve(search$covariance)
-  way <- within_limits(search$mean, precision, search$model$limit) - search$model$runs$z[search$at, ]
+  way <- within_limits(search$mean, precision, search$model$space) - search$model$runs$z[search$at, ]
   sum(way * (precision %*% way)) / 2
 }
 
@@ -107,7 +108,7 @@ propose <- function(search, context) {
   tried <- rbind(z)
   outputs <- cbind(line$output)
   for (inner in seq_len(rules$bent_steps)) {
-    to <- step_within(best, z, search$trusted, model$limit, bent$scale)
+    to <- step_within(best, z, search$trusted, model$space, bent$scale)
     line <- along(bent, to - z)
     moved <- max(abs(to - tried[nrow(tried), ]))
     tried <- rbind(tried, to)
@@ -139,7 +140,7 @@ misfit_of <- function(search, outputs, z, context) {
 
 squared_misfit <- function(model, outputs = model$runs$outputs, z = model$runs$z) {
   misfit <- 0.5 * colSums(((outputs - model$target) / model$noise)^2) +
-    0.5 * rowSums(z[, !model$flat, drop = FALSE]^2)
+    0.5 * rowSums(z[, !model$space$flat, drop = FALSE]^2)
   ifelse(is.finite(misfit), misfit, Inf)
 }
 
@@ -157,23 +158,23 @@ squares_of_line <- function(search, z, line, context) {
     mean <- found$mean
   } else {
     slopes <- line$slopes / model$noise
-    prior <- ifelse(model$flat, rules$flat_precision, 1)
+    prior <- ifelse(model$space$flat, rules$flat_precision, 1)
     precision <- crossprod(slopes) + diag(prior, length(z))
     pull <- crossprod(slopes, (model$target - line$output) / model$noise)[, 1] - prior * z
     mean <- z + solve(precision, pull)
   }
-  way <- within_limits(mean, precision, model$limit) - z
+  way <- within_limits(mean, precision, model$space) - z
   list(mean = mean, precision = precision,
        promised = sum((mean - z) * (precision %*% way)) - 0.5 * sum(way * (precision %*% way)))
 }
 
 # Its optimum no farther than `trusted` from z, by as much damping as that takes.
-step_within <- function(squares, z, trusted, limit, scale) {
+step_within <- function(squares, z, trusted, space, scale) {
   damped <- function(damping) {
     damping <- damping * scale^2
     precision <- squares$precision + diag(damping, length(z))
     target <- solve(precision, squares$precision %*% squares$mean + damping * z)[, 1]
-    within_limits(target, precision, limit)
+    within_limits(target, precision, space)
   }
   is_near <- function(to) sum((scale * (to - z))^2) <= trusted^2
   to <- damped(0)
@@ -255,7 +256,7 @@ difference_slopes <- function(model, at, context) {
     list(model = made$model, slopes = slopes)
   }
   asked <- names(z)
-  side <- difference_side(z)
+  side <- difference_side(z, model$space)
   found <- seen(model, rules$search_difference * side)
   if (is.null(found$slopes)) return(found)
   flat <- asked[colSums(found$slopes^2) == 0]
@@ -269,9 +270,9 @@ difference_slopes <- function(model, at, context) {
 
 # Those that the simulators give themselves, for a unit of z; NULL unless all do.
 given_slopes <- function(model, z) {
-  unit <- to_unit(rbind(z), model$flat)
+  unit <- to_unit(rbind(z), model$space)
   by <- 1e-4
-  ends <- lapply(c(-by, by), function(step) to_unit(rbind(z + step), model$flat))
+  ends <- lapply(c(-by, by), function(step) to_unit(rbind(z + step), model$space))
   slopes <- matrix(0, length(model$target), length(z), dimnames = list(NULL, names(z)))
   for (k in seq_along(model$simulators)) {
     own <- model$own[[k]]
@@ -279,14 +280,14 @@ given_slopes <- function(model, z) {
     value <- function(unit) unit_to_values(unit[, own, drop = FALSE], parameters)
     seen <- measured_slopes(model$simulators[[k]], value(unit), model$records[[k]]$measurements)
     if (is.null(seen)) return(NULL)
-    way <- from_unit(ends[[2]], model$flat) - from_unit(ends[[1]], model$flat)
+    way <- from_unit(ends[[2]], model$space) - from_unit(ends[[1]], model$space)
     per_z <- as.numeric(value(ends[[2]]) - value(ends[[1]])) / way[, own]
     slopes[model$rows[[k]], own] <- sweep(seen, 2, per_z, "*")
   }
   slopes
 }
 
-difference_side <- function(z) ifelse(z > 1, -1, 1)
+difference_side <- function(z, space) ifelse(z > pmin(1, space$upper - rules$wide_difference), -1, 1)
 
 # The simulator about a run, from slopes known elsewhere and from the runs near it. With s the way from the run, J0 the
 # reference slopes and A fitted to the runs,

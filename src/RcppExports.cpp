@@ -179,18 +179,19 @@ BEGIN_RCPP
 END_RCPP
 }
 // draws_within_
-Eigen::MatrixXd draws_within_(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& limit, const Eigen::VectorXd& start, int n, double seed);
-RcppExport SEXP _amiss_draws_within_(SEXP meanSEXP, SEXP covarianceSEXP, SEXP limitSEXP, SEXP startSEXP, SEXP nSEXP, SEXP seedSEXP) {
+Eigen::MatrixXd draws_within_(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, const Eigen::VectorXd& start, int n, double seed);
+RcppExport SEXP _amiss_draws_within_(SEXP meanSEXP, SEXP covarianceSEXP, SEXP lowerSEXP, SEXP upperSEXP, SEXP startSEXP, SEXP nSEXP, SEXP seedSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;
     Rcpp::RNGScope rcpp_rngScope_gen;
     Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type mean(meanSEXP);
     Rcpp::traits::input_parameter< const Eigen::MatrixXd& >::type covariance(covarianceSEXP);
-    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type limit(limitSEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type lower(lowerSEXP);
+    Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type upper(upperSEXP);
     Rcpp::traits::input_parameter< const Eigen::VectorXd& >::type start(startSEXP);
     Rcpp::traits::input_parameter< int >::type n(nSEXP);
     Rcpp::traits::input_parameter< double >::type seed(seedSEXP);
-    rcpp_result_gen = Rcpp::wrap(draws_within_(mean, covariance, limit, start, n, seed));
+    rcpp_result_gen = Rcpp::wrap(draws_within_(mean, covariance, lower, upper, start, n, seed));
     return rcpp_result_gen;
 END_RCPP
 }
@@ -388,7 +389,7 @@ static const R_CallMethodDef CallEntries[] = {
     {"_amiss_drop_conditions_", (DL_FUNC) &_amiss_drop_conditions_, 5},
     {"_amiss_tangent_posterior_", (DL_FUNC) &_amiss_tangent_posterior_, 8},
     {"_amiss_tangent_given_", (DL_FUNC) &_amiss_tangent_given_, 7},
-    {"_amiss_draws_within_", (DL_FUNC) &_amiss_draws_within_, 6},
+    {"_amiss_draws_within_", (DL_FUNC) &_amiss_draws_within_, 7},
     {"_amiss_response_evidence_", (DL_FUNC) &_amiss_response_evidence_, 6},
     {"_amiss_run_likelihood_", (DL_FUNC) &_amiss_run_likelihood_, 5},
     {"_amiss_fmu_run_", (DL_FUNC) &_amiss_fmu_run_, 2},

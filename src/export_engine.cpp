@@ -336,10 +336,10 @@ Rcpp::List tangent_given_(const Rcpp::List& data, const Rcpp::List& priors, cons
 // Draws of a normal distribution between -limit and limit.
 // [[Rcpp::export]]
 Eigen::MatrixXd draws_within_(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
-                              const Eigen::VectorXd& limit, const Eigen::VectorXd& start, int n,
-                              double seed) {
+                              const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+                              const Eigen::VectorXd& start, int n, double seed) {
   Stream stream(static_cast<std::uint64_t>(seed), kWithinLimits, 0);
-  return draws_within(mean, covariance, limit, start, n, stream);
+  return draws_within(mean, covariance, lower, upper, start, n, stream);
 }
 
 // Evidence of a calibration's tangent and of the responses (N x k) to a change of the simulator.

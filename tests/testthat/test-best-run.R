@@ -55,23 +55,25 @@ test_that("the discrepancy keeps out of the slopes there, in normal quantiles, w
 
 test_that("a parameter moves as it does over all that least squares leaves open, not at one run", {
   # At 1.6 of sqrt(3), known to one standard deviation.
-  model <- list(runs = list(z = matrix(1.6), outputs = matrix(1:4)), target = 1:4, noise = rep(1, 4), flat = TRUE,
-                limit = sqrt(3))
+  space <- amiss:::coordinates_of(list(free("k", uniform(0, 1))))
+  model <- list(runs = list(z = matrix(1.6), outputs = matrix(1:4)), target = 1:4, noise = rep(1, 4), space = space)
   unit <- amiss:::normal_units(model, list(at = 1, slopes = matrix(0.5, 4)))
   z <- seq(-sqrt(3), sqrt(3), length.out = 2001)[-c(1, 2001)]
   weight <- dnorm(z, 1.6, 1)
-  exact <- sqrt(sum(weight * amiss:::per_normal(z, rep(TRUE, 1999))^2) / sum(weight))
+  exact <- sqrt(sum(weight * amiss:::per_normal(z, space[rep(1, 1999), ])^2) / sum(weight))
   # Of 400 independent draws: three standard errors of the root of a mean square, each of about 2 %.
   expect_equal(unit, exact, tolerance = 0.06)
-  expect_gt(unit, 2 * amiss:::per_normal(1.6, TRUE))
+  expect_gt(unit, 2 * amiss:::per_normal(1.6, space))
 })
 
 test_that("a parameter pressed against the end of a flat prior moves nothing; the middle moves most", {
   ends <- amiss:::flat_limit * c(-1, 1)
-  expect_equal(amiss:::per_normal(ends, c(TRUE, TRUE)), c(0, 0))
-  expect_equal(amiss:::per_normal(c(0, 2), c(TRUE, FALSE)), c(2 * sqrt(3) * dnorm(0), 1))
+  flat <- amiss:::coordinates_of(list(free("a", uniform(0, 1)), free("b", uniform(0, 1))))
+  mixed <- amiss:::coordinates_of(list(free("a", uniform(0, 1)), free("b", normal(0, 1))))
+  expect_equal(amiss:::per_normal(ends, flat), c(0, 0))
+  expect_equal(amiss:::per_normal(c(0, 2), mixed), c(2 * sqrt(3) * dnorm(0), 1))
   # Rounded past its end it is at it.
-  expect_silent(past <- amiss:::per_normal(ends * (1 + 1e-12), c(TRUE, TRUE)))
+  expect_silent(past <- amiss:::per_normal(ends * (1 + 1e-12), flat))
   expect_equal(past, c(0, 0))
 })
 

@@ -148,7 +148,7 @@ test_that("a search runs no record again for a parameter that it does not have",
   expect_equal(calls - before, c(Ti = 3, flux = 2))
   expect_true(all(sloped$slopes[sloped$model$rows[[2]], c(2, 3)] == 0))
   z <- found$model$runs$z[found$modes[[1]]$at, , drop = FALSE]
-  estimate <- amiss:::unit_to_values(amiss:::to_unit(z, found$model$flat), found$model$parameters)
+  estimate <- amiss:::unit_to_values(amiss:::to_unit(z, found$model$space), found$model$parameters)
   # Base and offset are one to the record; what their priors say of them leaves the sum where it is.
   expect_equal(c(estimate[1, "gain"], sum(estimate[1, c("base", "offset")])), c(gain = 0.4, 20), tolerance = 0.01,
                ignore_attr = TRUE)

@@ -10,7 +10,7 @@ test_that("a step that fails shrinks the trusted distance to the least value of 
 })
 
 test_that("slopes are taken again after failures in a row, or once they have had as many steps as they cost", {
-  search <- list(failed = 0, poor = 0, since = 0, model = list(flat = rep(FALSE, 5)))
+  search <- list(failed = 0, poor = 0, since = 0, model = list(parameters = letters[1:5]))
   with <- function(...) amiss:::needs_slopes(utils::modifyList(search, list(...)))
   expect_false(with(since = 20))
   expect_true(with(failed = rules$renew_after))

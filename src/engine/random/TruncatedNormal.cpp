@@ -21,8 +21,9 @@ constexpr int kForgotten = 50;
 // Draws along lines through a point z = mean + root white.
 class Walk {
  public:
-  Walk(const VectorXd& mean, const MatrixXd& root, const VectorXd& limit, const VectorXd& start)
-      : root_(root), limit_(limit), z_(start) {
+  Walk(const VectorXd& mean, const MatrixXd& root, const VectorXd& lower, const VectorXd& upper,
+       const VectorXd& start)
+      : root_(root), lower_(lower), upper_(upper), z_(start) {
     white_ = root_.triangularView<Eigen::Lower>().solve(start - mean);
   }
 
@@ -32,13 +33,13 @@ class Walk {
     double lower = -kInfinity, upper = kInfinity;
     for (Index i = 0; i < way.size(); ++i) {
       if (way[i] == 0.0) continue;
-      const double one = (-limit_[i] - z_[i]) / way[i], other = (limit_[i] - z_[i]) / way[i];
+      const double one = (lower_[i] - z_[i]) / way[i], other = (upper_[i] - z_[i]) / way[i];
       lower = std::max(lower, std::min(one, other));
       upper = std::min(upper, std::max(one, other));
     }
     const double length =
         truncated_quantile(u, -white_.dot(direction), std::min(lower, 0.0), std::max(upper, 0.0));
-    z_ = (z_ + length * way).cwiseMax(-limit_).cwiseMin(limit_);
+    z_ = (z_ + length * way).cwiseMax(lower_).cwiseMin(upper_);
     white_ += length * direction;
   }
 
@@ -46,7 +47,8 @@ class Walk {
 
  private:
   const MatrixXd& root_;
-  const VectorXd& limit_;
+  const VectorXd& lower_;
+  const VectorXd& upper_;
   VectorXd z_, white_;
 };
 
@@ -64,14 +66,14 @@ double truncated_quantile(double u, double centre, double lower, double upper) {
   return std::min(std::max(centre + boost::math::quantile(boost::math::normal(), within), lower), upper);
 }
 
-MatrixXd draws_within(const VectorXd& mean, const MatrixXd& covariance, const VectorXd& limit,
-                      const VectorXd& start, int n, Stream& stream) {
+MatrixXd draws_within(const VectorXd& mean, const MatrixXd& covariance, const VectorXd& lower,
+                      const VectorXd& upper, const VectorXd& start, int n, Stream& stream) {
   const Index p = mean.size();
   const MatrixXd root = covariance.llt().matrixL();
   // Where the distribution is white, these directions move one coordinate each.
   const MatrixXd axes =
       root.triangularView<Eigen::Lower>().solve(MatrixXd::Identity(p, p)).colwise().normalized();
-  Walk walk(mean, root, limit, start);
+  Walk walk(mean, root, lower, upper, start);
   MatrixXd draws(n, p);
   for (int i = -kForgotten; i < n; ++i) {
     for (Index j = 0; j < p; ++j) {
