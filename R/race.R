@@ -91,9 +91,11 @@ look_at_mechanism <- function(model, present, off, context) {
   if (!is.null(off) && setequal(kept, old)) {
     model <- inherit_runs(model, present, off)
     off_at <- present$present$at
-    fine <- c(off_at, fine[change >= rules$off_change] + ncol(present$runs$outputs))
+    fine <- c(off_at, fine + ncol(present$runs$outputs))
+    change <- c(Inf, change)
   }
-  starts <- lapply(fine, function(at) list(at = at, slopes = slopes_in(model, at, fine, new, slopes)))
+  apart <- if (is.null(off_at)) fine else fine[change >= rules$off_change]  # switched off it is one start
+  starts <- lapply(apart, function(at) list(at = at, slopes = slopes_in(model, at, fine, new, slopes)))
   value <- vapply(starts, profile_value, 0, model, present, context)
   list(model = model, silent = FALSE, off = off, off_at = off_at, starts = starts[order(-value)])
 }
@@ -280,8 +282,8 @@ widened_trial <- function(trial, present, bar, context) {
   trial
 }
 
-# If a step ends without a winner, though much of the error is left: trials searched again, the one nearest to the
-# record first, until one of them wins.
+# If a step ends without a cause of the error, though much of it is left: trials searched again, the one nearest to the
+# record first, until one of them is its cause.
 second_look <- function(present, trials, context) {
   for (name in nearest_first(trials)) {
     if (is_spent(context)) break
@@ -293,7 +295,7 @@ second_look <- function(present, trials, context) {
       lower_bound(trials[[name]], present) > context$control$decisive
     if (!is_near) next
     trials <- race(present, trials, context)
-    if (has_winner(trials, present, context)) return(trials)
+    if (has_cause(trials, present, context)) return(trials)
   }
   race(present, trials, context)
 }
@@ -303,8 +305,24 @@ nearest_first <- function(trials) {
   names(searched)[order(vapply(searched, least_error, 0))]
 }
 
-has_winner <- function(trials, present, context) {
-  may_be_adopted(best_trial(trial_table(trials, present, names(trials))), context$control)
+# Whether a trial may be adopted that leaves little of the error beyond the noise.
+has_cause <- function(trials, present, context) {
+  best <- best_trial(trial_table(trials, present, names(trials)))
+  if (!may_be_adopted(best, context$control)) return(FALSE)
+  winner <- trials[[best$mechanism]]
+  !leaves_much(winner) || left_over_noise(winner)^2 - 1 < rules$cause_leaves * (left_over_noise(present)^2 - 1)
+}
+
+# Whether what the simulation leaves at its best is large beside the noise; fitted parameters are no agreement. Of given
+# runs there are no others to look at.
+leaves_much <- function(model) {
+  model$level != "given" && left_over_noise(model) > rules$large_remainder
+}
+
+left_over_noise <- function(model) {
+  n <- length(model$target)
+  left <- over_noise(model, model$runs$outputs[, model$least$at] - model$target)
+  left * sqrt(n / max(1, n - length(model$parameters)))
 }
 
 # All trials on the present model and those in front verified: list(trials, present).

@@ -22,7 +22,7 @@ next_step <- function(state, context) {
   trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
   trials <- race(state$present, trials, context)
   table <- trial_table(trials, state$present, left)
-  if (!may_be_adopted(best_trial(table), context$control) && asks_again(state, context)) {
+  if (asks_again(state) && !has_cause(trials, state$present, context)) {
     trials <- second_look(state$present, trials, context)
     table <- trial_table(trials, state$present, left)
   }
@@ -40,12 +40,8 @@ next_step <- function(state, context) {
   state
 }
 
-# Whether nothing was found yet, though so much of the error is left that a mechanism of the catalogue may have been
-# missed.
-asks_again <- function(state, context) {
-  none_yet <- length(state$models) == 1 && state$present$level != "given"
-  none_yet && remaining_error(last_model(state$models), state$started$measurements)$large
-}
+# Whether nothing was adopted yet, though so much of the error is left that mechanisms of the catalogue may be missed.
+asks_again <- function(state) length(state$models) == 1 && leaves_much(state$present)
 
 # Mechanisms that were not adopted and can be applied on top of what was.
 mechanisms_left <- function(state) {

@@ -87,10 +87,14 @@ added_parameters <- function(fit, parent) {
 }
 
 # The row of highest evidence among the mechanisms that may be adopted: they were verified, the simulation's own error
-# falls with them, and they do not lose to an unknown response. No row if there is none.
+# falls with them, and they do not lose to an unknown response. Of decisive ones that it does not lead decisively, the
+# one that does best beside an unknown response: a stand-in explains no more than that does. No row if there is none.
 best_trial <- function(table) {
   open <- table[table$judged_by == "runs" & !keeps_error(table) & !is_refuted(table), ]
-  open[which.max(open$log10_bf), ]
+  lead <- open[which.max(open$log10_bf), ]
+  if (!nrow(lead)) return(lead)
+  near <- open[open$log10_bf >= max(lead$log10_bf - rules$decisive, rules$decisive) & open$lower95 > 0, ]
+  if (nrow(near)) near[which.max(near$beside_unknown), ] else lead
 }
 
 may_be_adopted <- function(best, control) {
