@@ -305,12 +305,15 @@ nearest_first <- function(trials) {
   names(searched)[order(vapply(searched, least_error, 0))]
 }
 
-# Whether a trial may be adopted that leaves little of the error beyond the noise.
+# Whether a trial may be adopted that takes the error away.
 has_cause <- function(trials, present, context) {
   best <- best_trial(trial_table(trials, present, names(trials)))
-  if (!may_be_adopted(best, context$control)) return(FALSE)
-  winner <- trials[[best$mechanism]]
-  !leaves_much(winner) || left_over_noise(winner)^2 - 1 < rules$cause_leaves * (left_over_noise(present)^2 - 1)
+  may_be_adopted(best, context$control) && takes_error(trials[[best$mechanism]], present)
+}
+
+# Whether a model leaves little of the error, or of what was beyond the noise.
+takes_error <- function(model, present) {
+  !leaves_much(model) || left_over_noise(model)^2 - 1 < rules$cause_leaves * (left_over_noise(present)^2 - 1)
 }
 
 # Whether what the simulation leaves at its best is large beside the noise; fitted parameters are no agreement. Of given

@@ -425,14 +425,44 @@ test_that("what is adopted was verified, lowers the error, and leads by a decisi
   expect_equal(amiss:::best_trial(both)$log10_bf, 3)
 })
 
+test_that("of decisive mechanisms with one evidence that is adopted which does best beside an unknown response", {
+  row <- function(mechanism, log10_bf, beside_unknown, lower95 = log10_bf - 0.2) {
+    data.frame(mechanism, log10_bf, lower95, judged_by = "runs", error_ratio = 0.5, beside_unknown)
+  }
+  best <- function(...) amiss:::best_trial(rbind(...))$mechanism
+  expect_equal(best(row("stand-in", 52.8, -1.6), row("cause", 52.4, 15.5)), "cause")
+  # One that leads decisively is adopted.
+  expect_equal(best(row("leader", 52.8, -1.6), row("other", 50.7, 15.5)), "leader")
+  # One that is not decisive itself is not.
+  expect_equal(best(row("leader", 2.5, -1), row("other", 1.9, 1.5)), "leader")
+  expect_equal(best(row("leader", 2.5, -1), row("other", 2.4, 1.5, lower95 = -0.1)), "leader")
+})
+
+test_that("a winner is the cause if it leaves little of the error beyond the noise", {
+  # Twelve rows of noise 1 and two parameters: an RMS of e counts as e sqrt(12 / 10).
+  model <- function(rms, level = "verified") {
+    list(level = level, target = rep(0, 12), noise = rep(1, 12), parameters = 1:2, least = list(at = 1),
+         runs = list(outputs = matrix(rms * rep(c(-1, 1), 6))))
+  }
+  large <- rules$large_remainder / sqrt(12 / 10)
+  expect_true(amiss:::leaves_much(model(1.01 * large)))
+  expect_false(amiss:::leaves_much(model(0.99 * large)))
+  expect_false(amiss:::leaves_much(model(9, level = "given")))
+  cause <- function(before, after) amiss:::takes_error(model(after), model(before))
+  expect_true(cause(8, 1))
+  expect_true(cause(8, 2))  # leaves 4.8 - 1 of 76.8 - 1
+  expect_false(cause(8, 3))  # 10.8 - 1
+})
+
 test_that("the first look is at the ends of what is new and between", {
-  one <- amiss:::first_values(1, TRUE, sqrt(3))
+  space <- amiss:::coordinates_of(list(free("a", uniform(0, 1)), free("b", normal(0, 1))))
+  one <- amiss:::first_values(space[1, ])
   expect_equal(unname(one[, 1]), c(-1, 1, 0) * sqrt(3))
-  two <- amiss:::first_values(2, c(TRUE, FALSE), c(sqrt(3), 4))
+  two <- amiss:::first_values(space)
   expect_equal(dim(two), c(5, 2))
   expect_equal(two[1:2, ], rbind(-c(sqrt(3), 4), c(sqrt(3), 4)), ignore_attr = TRUE)
-  expect_identical(two, amiss:::first_values(2, c(TRUE, FALSE), c(sqrt(3), 4)))
-  expect_equal(dim(amiss:::first_values(0, logical(), numeric())), c(1, 0))
+  expect_identical(two, amiss:::first_values(space))
+  expect_equal(dim(amiss:::first_values(space[0, ])), c(1, 0))
 })
 
 # ---- rules and options
