@@ -17,8 +17,8 @@ are_flat <- function(parameters) {
   vapply(parameters, function(p) is_flat(p$prior), NA, USE.NAMES = FALSE)
 }
 
-# The coordinates of parameters, one a row: whether they are `flat`; the probability `below` and `within` the limits of
-# the others before they were cut; where z ends, of the others at `rules$farthest` or at their limits.
+# The coordinates of parameters, one a row: whether the prior is `flat`; of any other the probability `below` and
+# `within` its limits before it was cut; and where z ends, `lower` and `upper`.
 coordinates_of <- function(parameters) {
   flat <- are_flat(parameters)
   cut <- vapply(parameters, function(p) untruncated_cdf(p$prior, c(p$prior$lower, p$prior$upper)), numeric(2))

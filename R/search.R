@@ -287,7 +287,11 @@ given_slopes <- function(model, z) {
   slopes
 }
 
-difference_side <- function(z, space) ifelse(z > pmin(1, space$upper - rules$wide_difference), -1, 1)
+# Upwards, but where that would leave the prior.
+difference_side <- function(z, space) {
+  room <- rules$wide_difference
+  ifelse(z > pmax(pmin(1, space$upper - room), space$lower + room), -1, 1)
+}
 
 # The simulator about a run, from slopes known elsewhere and from the runs near it. With s the way from the run, J0 the
 # reference slopes and A fitted to the runs,

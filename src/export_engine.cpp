@@ -333,7 +333,7 @@ Rcpp::List tangent_given_(const Rcpp::List& data, const Rcpp::List& priors, cons
   return Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);
 }
 
-// Draws of a normal distribution between -limit and limit.
+// Draws of a normal distribution between `lower` and `upper`.
 // [[Rcpp::export]]
 Eigen::MatrixXd draws_within_(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
                               const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,

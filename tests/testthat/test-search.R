@@ -64,6 +64,25 @@ test_that("a prior is flat if it is uniform, or wider than its limits", {
   expect_false(flat(normal(0, 1, -2, 2)))
 })
 
+test_that("differences stay within priors that are cut, at either end", {
+  space <- space_of(normal(0, 1, -2, 2), normal(0, 1, lower = 1, upper = 2.5), uniform(0, 1), normal(0, 1))
+  for (z in list(space$lower, space$upper, (space$lower + space$upper) / 2)) {
+    for (step in c(rules$search_difference, rules$wide_difference)) {
+      to <- z + step * amiss:::difference_side(z, space)
+      expect_true(all(to > space$lower - 1e-9 & to < space$upper + 1e-9))
+    }
+  }
+})
+
+test_that("runs lie as far out in a region as their points of the unit cube do, if no prior is flat", {
+  parameters <- list(a = free("a", normal(0, 1, -2, 0.5)), b = free("b", lognormal(0, 1)))
+  unit <- withr::with_seed(5, matrix(runif(400), 200))
+  region <- amiss:::region_of_draws(unit, rep(1, 200), parameters)
+  space <- amiss:::coordinates_of(parameters)
+  apart <- amiss:::along_axes(region, space, amiss:::from_unit(unit, space))
+  expect_equal(sqrt(colSums(apart^2)) / region$radius, amiss:::region_distance(region, unit), tolerance = 1e-9)
+})
+
 # The most probable point in a box, by trying every set of coordinates at their ends.
 brute_force <- function(mean, precision, limit) {
   p <- length(mean)
