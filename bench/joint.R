@@ -1,9 +1,10 @@
 #!/usr/bin/env Rscript
-# Records calibrated together, on the Twin Houses: (a) temperature and heat flux into the west wall of N2, and (b) the
-# temperatures of N2 and O5 at once with shared walls, O5's model with the sun through its open blinds and a door, an
-# infiltration and a start of its own. For each: how
-# much narrower the parameters get, the evidence of sharing them (a decision of its own: that of all records together
-# against the product of those of each), and which conditions drive the discrepancies.
+# Records calibrated together, on the Twin Houses: (a) temperature and heat flux into the west wall
+# of N2, and (b) the temperatures of N2 and O5 at once with shared walls, O5's model with the sun
+# through its open blinds and a door, an infiltration and a start of its own. For each: how much
+# narrower the parameters get, the evidence of sharing them (a decision of its own: that of all
+# records together against the product of those of each), and which conditions drive the
+# discrepancies.
 # Usage: Rscript bench/joint.R [--threads 2] [--seed 1] [--runs 150] [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -21,15 +22,18 @@ house <- function(name) read_study(file.path(folder, paste0("twinhouse_", name, 
 beside <- function(name, target, unit, noise_sd) {
   fields <- yaml::read_yaml(file.path(folder, paste0("twinhouse_", name, ".yml")))
   data <- utils::read.csv(file.path(folder, fields$data), stringsAsFactors = FALSE)
-  measurements(data, time = fields$time, target = target, boundary = as.character(unlist(fields$boundary)),
-               noise_sd = noise_sd, average = fields$average_h, calibrate = data$phase == "rolbs",
-               validate = data$phase == "freefloat", warmup = fields$warmup_h, unit = unit, name = paste(name, target))
+  measurements(data, time = fields$time, target = target,
+               boundary = as.character(unlist(fields$boundary)), noise_sd = noise_sd,
+               average = fields$average_h, calibrate = data$phase == "rolbs",
+               validate = data$phase == "freefloat", warmup = fields$warmup_h, unit = unit,
+               name = paste(name, target))
 }
 n2 <- house("N2")
 o5 <- house("O5")
 sun <- o5$catalogue[["south solar aperture"]]
 
-# The houses have the same walls; what people, doors and the summer before them did to each is its own.
+# The houses have the same walls; what people, doors and the summer before them did to each is its
+# own.
 of_o5 <- rename_parameters(sun$edit(o5$model), door = "door O5", ach = "ach O5",
                            initial_wall_offset = "initial_wall_offset O5")
 
@@ -46,9 +50,10 @@ studied <- lapply(cases, function(case) {
   alone <- Map(function(ensemble, m) {
     calibrate_refined(ensemble, m, control = control, seed = seed, threads = threads, quiet = TRUE)
   }, ensembles, case$measurements)
-  joint <- calibrate_jointly(ensembles, case$measurements, control = control, seed = seed, threads = threads,
-                             quiet = TRUE)
-  list(alone = alone, joint = joint, attribution = attribute_discrepancy(joint, asked, seed = seed, threads = threads))
+  joint <- calibrate_jointly(ensembles, case$measurements, control = control, seed = seed,
+                             threads = threads, quiet = TRUE)
+  list(alone = alone, joint = joint,
+       attribution = attribute_discrepancy(joint, asked, seed = seed, threads = threads))
 })
 
 rows <- do.call(rbind, unname(Map(function(name, s) {
@@ -56,8 +61,8 @@ rows <- do.call(rbind, unname(Map(function(name, s) {
   do.call(rbind, unname(Map(function(record, fit) {
     own <- confint(fit)
     both <- together[rownames(own), , drop = FALSE]
-    data.frame(case = name, record = record, parameter = rownames(own), alone_lower = own[, 1], alone_upper = own[, 2],
-               joint_lower = both[, 1], joint_upper = both[, 2],
+    data.frame(case = name, record = record, parameter = rownames(own), alone_lower = own[, 1],
+               alone_upper = own[, 2], joint_lower = both[, 1], joint_upper = both[, 2],
                width = (both[, 2] - both[, 1]) / (own[, 2] - own[, 1]), row.names = NULL)
   }, names(s$alone), s$alone)))
 }, names(studied), studied)))
@@ -65,12 +70,13 @@ evidence <- do.call(rbind, unname(Map(function(name, s) {
   each <- sum(vapply(s$alone, `[[`, 0, "log_evidence"))
   predicted <- suppressWarnings(predict(s$joint, use = "validate"))
   rmse <- vapply(predicted, function(p) sqrt(mean((p$observed - p$mean)^2, na.rm = TRUE)), 0)
-  data.frame(case = name, log10_shared = (s$joint$log_evidence - each) / log(10), trusted = s$joint$trust$trusted,
-             runs = s$joint$runs_made + runs * length(s$alone),
+  data.frame(case = name, log10_shared = (s$joint$log_evidence - each) / log(10),
+             trusted = s$joint$trust$trusted, runs = s$joint$runs_made + runs * length(s$alone),
              rmse_held_out = paste(names(rmse), signif(rmse, 3), collapse = ", "))
 }, names(studied), studied)))
 print(rows, digits = 3)
 print(evidence, digits = 3)
 for (s in studied) print(s$attribution)
 write_rows(list(parameters = rows, evidence = evidence,
-                attribution = lapply(studied, function(s) s$attribution$table)), option("out", "joint.json"))
+                attribution = lapply(studied, function(s) s$attribution$table)),
+           option("out", "joint.json"))

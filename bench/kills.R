@@ -2,12 +2,13 @@
 # Does a study that is killed go on to the same result, and leave nothing behind?
 # Usage: Rscript bench/kills.R --out FILE [--kills 40] [--seed 1]
 #
-# A small study with `exec/amiss run`, once with an R function as its simulator and once with a program (awk). It runs
-# alone first (without the work of a report and of figures). Then R is killed (SIGKILL) at random moments of its way,
-# again and again; after each fifth kill the same command goes on to its end. It holds if after each kill what stands
-# under the names of results is whole, if each end is the result of the study that was left alone (`result.json` but for
-# its seconds), and if then no process of the study, no folder of a run and no file but the results is left. FILE gets a
-# row for each simulator: kills, ends, and how many of each broke this.
+# A small study with `exec/amiss run`, once with an R function as its simulator and once with a
+# program (awk). It runs alone first (without the work of a report and of figures). Then R is killed
+# (SIGKILL) at random moments of its way, again and again; after each fifth kill the same command
+# goes on to its end. It holds if after each kill what stands under the names of results is whole,
+# if each end is the result of the study that was left alone (`result.json` but for its seconds),
+# and if then no process of the study, no folder of a run and no file but the results is left. FILE
+# gets a row for each simulator: kills, ends, and how many of each broke this.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -59,10 +60,12 @@ write_study <- function(kind) {
   writeLines(quick_parts, file.path(folder, "profile.R"))
   writeLines(models[[kind]], file.path(folder, "model.R"))
   writeLines(sprintf("catalogue(mechanism('sun', boundary = 'Gv', sentence = 'The sun shines in.',
-                                          edit = function(model) %s))", suns[[kind]]), file.path(folder, "catalogue.R"))
-  yaml::write_yaml(list(study = "killed", data = "data.csv", time = "hour", target = "Ti", boundary = list("Te", "Gv"),
-                        noise_sd = 0.1, calibrate = "hour <= 90", validate = "hour > 90", model = "model.R",
-                        catalogue = "catalogue.R", runs = 20, seed = 4,
+                                          edit = function(model) %s))", suns[[kind]]),
+             file.path(folder, "catalogue.R"))
+  yaml::write_yaml(list(study = "killed", data = "data.csv", time = "hour", target = "Ti",
+                        boundary = list("Te", "Gv"), noise_sd = 0.1, calibrate = "hour <= 90",
+                        validate = "hour > 90", model = "model.R", catalogue = "catalogue.R",
+                        runs = 20, seed = 4,
                         control = list(max_steps = 1, attribution = list(surrogates = 99))),
                    file.path(folder, "study.yml"))
   folder
@@ -76,13 +79,15 @@ command <- system.file("exec", "amiss", package = "amiss")
 quick_parts <- c(
   "setHook(packageEvent('amiss', 'onLoad'), function(...) {",
   "  change <- function(name, value) utils::assignInNamespace(name, value, 'amiss')",
-  "  change('report', function(x, file, ...) writeLines(c(rep('a line of the report', 1e5), '</html>'), file))",
+  paste("  change('report', function(x, file, ...)",
+        "writeLines(c(rep('a line of the report', 1e5), '</html>'), file))"),
   "  change('save_figure', function(figure, path, ...) writeLines(rep('a figure', 1e4), path))",
   "})")
 
 start <- function(folder, out) {
   processx::process$new(file.path(R.home("bin"), "Rscript"),
-                        c(command, "run", file.path(folder, "study.yml"), "--out", out, "--trust", "--quiet"),
+                        c(command, "run", file.path(folder, "study.yml"), "--out", out, "--trust",
+                          "--quiet"),
                         wd = folder, stdout = file.path(folder, "log"), stderr = "2>&1",
                         env = c("current", R_LIBS = paste(.libPaths(), collapse = ":"),
                                 R_PROFILE_USER = file.path(folder, "profile.R")))
@@ -100,8 +105,10 @@ is_whole <- function(out, reference) {
   there <- dir(out)
   tryCatch({
     json <- !"result.json" %in% there || identical(found(out), reference)
-    rds <- !"result.rds" %in% there || inherits(readRDS(file.path(out, "result.rds")), "amiss_upgrade")
-    page <- !"report.html" %in% there || any(grepl("</html>", readLines(file.path(out, "report.html"), warn = FALSE)))
+    rds <- !"result.rds" %in% there ||
+      inherits(readRDS(file.path(out, "result.rds")), "amiss_upgrade")
+    page <- !"report.html" %in% there ||
+      any(grepl("</html>", readLines(file.path(out, "report.html"), warn = FALSE)))
     json && rds && page
   }, error = function(e) FALSE)
 }
@@ -121,9 +128,10 @@ processes_of <- function(folder) {
 # What is left but sources, kept runs and results.
 left_behind <- function(folder, out) {
   results <- c("figures", "report.html", "result.json", "result.rds")
-  c(setdiff(grep("^earlier-", dir(out, all.files = TRUE, no.. = TRUE), value = TRUE, invert = TRUE), results),
-    grep("^[0-9a-f]{32}[.]rds$", dir(file.path(folder, "runs"), all.files = TRUE, no.. = TRUE), value = TRUE,
-         invert = TRUE))
+  c(setdiff(grep("^earlier-", dir(out, all.files = TRUE, no.. = TRUE), value = TRUE, invert = TRUE),
+            results),
+    grep("^[0-9a-f]{32}[.]rds$", dir(file.path(folder, "runs"), all.files = TRUE, no.. = TRUE),
+         value = TRUE, invert = TRUE))
 }
 
 killed_study <- function(kind) {
@@ -131,12 +139,13 @@ killed_study <- function(kind) {
   on.exit(unlink(folder, recursive = TRUE))
   alone <- file.path(folder, "alone")
   seconds <- system.time(start(folder, alone)$wait())[["elapsed"]]
-  if (!file.exists(file.path(alone, "result.json"))) stop(paste(readLines(file.path(folder, "log")), collapse = "\n"))
+  if (!file.exists(file.path(alone, "result.json")))
+    stop(paste(readLines(file.path(folder, "log")), collapse = "\n"))
   reference <- found(alone)
-  cat(sprintf("%s: %.0f s when left alone; named %s\n", kind, seconds, reference$named_cause$mechanism %||% "nothing"))
-  row <- list(simulator = kind, seconds_alone = seconds, kills = 0, in_vain = 0, not_whole = 0, ends = 0,
-              other_result = 0,
-              processes_left = 0, files_left = 0)
+  cat(sprintf("%s: %.0f s when left alone; named %s\n", kind, seconds,
+              reference$named_cause$mechanism %||% "nothing"))
+  row <- list(simulator = kind, seconds_alone = seconds, kills = 0, in_vain = 0, not_whole = 0,
+              ends = 0, other_result = 0, processes_left = 0, files_left = 0)
   try_out <- file.path(folder, "out")
   end <- function() {
     start(folder, try_out)$wait()

@@ -1,5 +1,5 @@
-# Command line of a benchmark: --name value, and --smoke for the smallest work that goes through all of it
-# (tools/smoke). Sourced by the commands of this folder.
+# Command line of a benchmark: --name value, and --smoke for the smallest work that goes through all
+# of it (tools/smoke). Sourced by the commands of this folder.
 arguments <- commandArgs(trailingOnly = TRUE)
 smoke <- "--smoke" %in% arguments
 arguments <- arguments[arguments != "--smoke"]
@@ -13,8 +13,8 @@ option <- function(name, default = NULL, smallest = default) {
 
 write_rows <- function(rows, out) {
   part <- paste0(out, ".part")
-  jsonlite::write_json(rows, part, auto_unbox = TRUE, na = "null", null = "null", digits = NA, pretty = TRUE,
-                       dataframe = "rows")
+  jsonlite::write_json(rows, part, auto_unbox = TRUE, na = "null", null = "null", digits = NA,
+                       pretty = TRUE, dataframe = "rows")
   if (!file.rename(part, out)) stop(out, " cannot be written", call. = FALSE)
   message("written to ", out)
 }

@@ -2,10 +2,11 @@
 # How large a record can be.
 # Usage: Rscript bench/size.R --out FILE [--only quarters,minutes]
 #
-# A year of 15-minute steps (35,040) and one of minutes (525,600), 100 runs each, from the measurements to the
-# attribution, each in an R session of its own with one thread. FILE gets a row for each stage and their sum: seconds,
-# and the most memory that the session had held by its end (MB, resident). Required: a year of minutes below 4 GB and
-# ten minutes, one of 15-minute steps below 500 MB and one minute.
+# A year of 15-minute steps (35,040) and one of minutes (525,600), 100 runs each, from the
+# measurements to the attribution, each in an R session of its own with one thread. FILE gets a row
+# for each stage and their sum: seconds, and the most memory that the session had held by its end
+# (MB, resident). Required: a year of minutes below 4 GB and ten minutes, one of 15-minute steps
+# below 500 MB and one minute.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -21,7 +22,8 @@ whole_line <- function(steps, step_h, runs) {
   stage <- function(name, code) {
     seconds <- system.time(value <- code)[["elapsed"]]
     status <- grep("^VmHWM", readLines("/proc/self/status"), value = TRUE)
-    rows[[name]] <<- data.frame(stage = name, seconds, peak_mb = as.numeric(gsub("[^0-9]", "", status)) / 1024)
+    rows[[name]] <<- data.frame(stage = name, seconds,
+                                peak_mb = as.numeric(gsub("[^0-9]", "", status)) / 1024)
     value
   }
   slow <- function(x, hours) {
@@ -30,13 +32,17 @@ whole_line <- function(steps, step_h, runs) {
   }
   set.seed(1)
   hour <- step_h * seq_len(steps)
-  data <- data.frame(hour, Te = 8 + 5 * sin(2 * pi * hour / 24) + 8 * sin(2 * pi * hour / 8760) +
-                             slow(stats::rnorm(steps, 0, 20), 24),
-                     Gv = pmax(0, sin(2 * pi * (hour - 6) / 24)) * (300 + 150 * sin(2 * pi * hour / 53)))
+  data <- data.frame(
+    hour, Te = 8 + 5 * sin(2 * pi * hour / 24) + 8 * sin(2 * pi * hour / 8760) +
+               slow(stats::rnorm(steps, 0, 20), 24),
+    Gv = pmax(0, sin(2 * pi * (hour - 6) / 24)) * (300 + 150 * sin(2 * pi * hour / 53)))
   run <- function(values, drivers) 20 + values[["gain"]] * slow(drivers[, "Te"], values[["hours"]])
-  data$Ti <- run(c(gain = 0.4, hours = 6), as.matrix(data)) + 0.002 * slow(data$Gv, 3) + stats::rnorm(steps, 0, 0.1)
-  simulator <- function_simulator(run, free("gain", uniform(0, 1)), free("hours", uniform(2, 12)), boundary = "Te")
-  set <- stage("measurements", measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1))
+  data$Ti <- run(c(gain = 0.4, hours = 6), as.matrix(data)) + 0.002 * slow(data$Gv, 3) +
+    stats::rnorm(steps, 0, 0.1)
+  simulator <- function_simulator(run, free("gain", uniform(0, 1)), free("hours", uniform(2, 12)),
+                                  boundary = "Te")
+  set <- stage("measurements", measurements(data, time = "hour", target = "Ti",
+                                            boundary = ~ Te + Gv, noise_sd = 0.1))
   made <- stage("simulate_design", simulate_design(simulator, set, runs = runs, seed = 1))
   emulator <- stage("train_emulator", train_emulator(made, set))
   fit <- stage("calibrate", calibrate(emulator, set, seed = 1))

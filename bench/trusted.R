@@ -1,8 +1,9 @@
 #!/usr/bin/env Rscript
-# How often "trusted" is false: posteriors whose evidence is known, drawn at random, sampled by ais() once each. A row
-# for each: kind, dimension, exact log evidence, estimate, standard error, whether it is trusted, and the share of the
-# first of two modes. The last lines count what is trusted, and what is trusted and wrong by more than three standard
-# errors or half a decade, of each kind and in all.
+# How often "trusted" is false: posteriors whose evidence is known, drawn at random, sampled by
+# ais() once each. A row for each: kind, dimension, exact log evidence, estimate, standard error,
+# whether it is trusted, and the share of the first of two modes. The last lines count what is
+# trusted, and what is trusted and wrong by more than three standard errors or half a decade, of
+# each kind and in all.
 # Usage: Rscript bench/trusted.R [--posteriors 500] [--seed 1] [--workers 1] [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -21,8 +22,8 @@ normal_log_density <- function(x, centre, by) {
 
 random_rotation <- function(d) qr.Q(qr(matrix(stats::rnorm(d * d), d)))
 
-# Each: list(f, mass), the log-likelihood of rows and the log of its integral over the cube. What a normal density has
-# outside is below 1e-9 of it, but for `truncated`.
+# Each: list(f, mass), the log-likelihood of rows and the log of its integral over the cube. What a
+# normal density has outside is below 1e-9 of it, but for `truncated`.
 kinds <- list(
   modes = function(d) {  # of unequal width and mass
     share <- sample(c(0.5, 0.8, 0.95), 1)
@@ -59,7 +60,8 @@ kinds <- list(
     sd <- 10^stats::runif(d, -2, 1)
     centre <- stats::runif(d, -8, 8)
     beyond <- sample(d, sample(d, 1))
-    centre[beyond] <- sign(centre[beyond]) * (half_width + sd[beyond] * stats::runif(length(beyond), 0, 5))
+    centre[beyond] <-
+      sign(centre[beyond]) * (half_width + sd[beyond] * stats::runif(length(beyond), 0, 5))
     # From whichever end loses no digits.
     inside <- stats::pnorm(-half_width, -abs(centre), sd, lower.tail = FALSE, log.p = TRUE)
     outside <- stats::pnorm(half_width, -abs(centre), sd, lower.tail = FALSE, log.p = TRUE)
@@ -69,7 +71,8 @@ kinds <- list(
   constant = function(d) {
     value <- stats::runif(1, -1000, 1000)
     rounding <- sample(c(0, 1e-13), 1)
-    list(f = function(x) value * (1 + rounding * sin(1e5 * x[, 1])), mass = value + d * log(2 * half_width))
+    list(f = function(x) value * (1 + rounding * sin(1e5 * x[, 1])),
+         mass = value + d * log(2 * half_width))
   })
 
 one_posterior <- function(k) {
@@ -81,20 +84,23 @@ one_posterior <- function(k) {
   exact <- case$mass - d * log(2 * half_width)
   result <- suppressWarnings(ais(function(x) case$f(unname(x)), priors, seed = k))
   off <- result$log_evidence - exact
-  found <- if (is.null(case$is_first)) NA else sum(result$weights[case$is_first(unname(result$draws))])
-  data.frame(seed = k, kind, d, exact, off, standard_error = result$standard_error, estimator = result$estimator,
-             trusted = result$trusted, share = case$share %||% NA, found,
-             wrong = abs(off) > max(3 * result$standard_error, 1e-6) && abs(off) > 0.02 || abs(off) > 0.5 * log(10),
-             evaluations = result$evaluations)
+  found <- if (is.null(case$is_first)) NA
+           else sum(result$weights[case$is_first(unname(result$draws))])
+  data.frame(seed = k, kind, d, exact, off, standard_error = result$standard_error,
+             estimator = result$estimator, trusted = result$trusted, share = case$share %||% NA,
+             found, wrong = abs(off) > max(3 * result$standard_error, 1e-6) && abs(off) > 0.02 ||
+                            abs(off) > 0.5 * log(10), evaluations = result$evaluations)
 }
 
 `%||%` <- function(x, otherwise) if (is.null(x)) otherwise else x
 
-table <- do.call(rbind, parallel::mclapply(first + seq_len(posteriors) - 1L, one_posterior, mc.cores = workers))
+table <- do.call(rbind, parallel::mclapply(first + seq_len(posteriors) - 1L, one_posterior,
+                                           mc.cores = workers))
 count <- function(rows) {
-  data.frame(posteriors = nrow(rows), trusted = sum(rows$trusted), false = sum(rows$trusted & rows$wrong),
-             wrong = sum(rows$wrong))
+  data.frame(posteriors = nrow(rows), trusted = sum(rows$trusted),
+             false = sum(rows$trusted & rows$wrong), wrong = sum(rows$wrong))
 }
 each <- lapply(split(table, table$kind), count)
-print(cbind(kind = c(names(each), "all"), do.call(rbind, c(unname(each), list(count(table))))), row.names = FALSE)
+print(cbind(kind = c(names(each), "all"), do.call(rbind, c(unname(each), list(count(table))))),
+      row.names = FALSE)
 write_rows(table, option("out", "trusted.json"))

@@ -1,10 +1,13 @@
-# Line coverage of R by the tests of tools/coverage-tests.R, with that of C++ as gcovr told it. The compiled code is not
-# instrumented anew: it is that of build/library. Usage: Rscript tools/coverage.R CPP.csv OUT LEAST
+# Line coverage of R by the tests of tools/coverage-tests.R, with that of C++ as gcovr told it. The
+# compiled code is not instrumented anew: it is that of build/library.
+# Usage: Rscript tools/coverage.R CPP.csv OUT LEAST
 arguments <- commandArgs(trailingOnly = TRUE)
 cpp <- utils::read.csv(arguments[1])
-cpp <- data.frame(language = "C++", file = cpp$filename, lines = cpp$line_total, covered = cpp$line_covered)
+cpp <- data.frame(language = "C++", file = cpp$filename, lines = cpp$line_total,
+                  covered = cpp$line_covered)
 
-# Functions of the installed package are traced in place; processes that tests start are not counted.
+# Functions of the installed package are traced in place; processes that tests start are not
+# counted.
 suppressPackageStartupMessages({
   library(testthat)
   library(amiss)
@@ -24,4 +27,5 @@ total <- stats::aggregate(cbind(lines, covered) ~ language, table, sum)
 total$percent <- round(100 * total$covered / total$lines, 1)
 print(total, row.names = FALSE)
 low <- total$language[total$percent < as.numeric(arguments[3])]
-if (length(low)) stop("less than ", arguments[3], " % of the lines of ", paste(low, collapse = " and "), call. = FALSE)
+if (length(low)) stop("less than ", arguments[3], " % of the lines of ",
+                      paste(low, collapse = " and "), call. = FALSE)

@@ -1,11 +1,13 @@
-# Says in plain words what the result.json of each folder given holds: the cause named and the gain measured.
+# Says in plain words what the result.json of each folder given holds: the cause named and the gain
+# measured.
 `%||%` <- function(x, y) if (is.null(x) || length(x) == 0) y else x
 
 odds <- function(log10_bf) {
   size <- if (is.finite(log10_bf) && abs(log10_bf) < 6) {
     format(signif(10^abs(log10_bf), 2), big.mark = ",", scientific = FALSE)
   } else "over a million"
-  sprintf("odds of %s to 1 %s it (log10 Bayes factor %.1f)", size, if (log10_bf >= 0) "for" else "against", log10_bf)
+  sprintf("odds of %s to 1 %s it (log10 Bayes factor %.1f)", size,
+          if (log10_bf >= 0) "for" else "against", log10_bf)
 }
 
 from_to <- function(what, pair, unit = "") {
@@ -35,8 +37,8 @@ describe_gain <- function(gain) {
     from_to("Error (RMSE) on data held out", numbers(gain$rmse_validation)),
     if (length(coverage) %in% 1:2 && !anyNA(coverage)) {
       sprintf("Share of data held out within the 95 %% band: %s",
-              paste0(sprintf("%.0f %%", 100 * coverage), if (length(coverage) == 2) c(" before", " after"),
-                     collapse = ", "))
+              paste0(sprintf("%.0f %%", 100 * coverage),
+                     if (length(coverage) == 2) c(" before", " after"), collapse = ", "))
     })
 }
 
@@ -44,5 +46,6 @@ for (folder in commandArgs(trailingOnly = TRUE)) {
   result <- jsonlite::read_json(file.path(folder, "result.json"), simplifyVector = TRUE)
   cat(basename(folder), "\n", sep = "")
   lines <- c(describe_cause(result$named_cause, result$diagnosis), describe_gain(result$gain))
-  writeLines(c(strwrap(lines, width = 100, indent = 2, exdent = 4), paste0("  Report: ", folder, "/report.html"), ""))
+  writeLines(c(strwrap(lines, width = 100, indent = 2, exdent = 4),
+               paste0("  Report: ", folder, "/report.html"), ""))
 }

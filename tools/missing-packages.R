@@ -16,7 +16,8 @@ if (runtime) {  # the package itself and its report
   name <- c(name, "roxygen2", "lintr")
   minimum <- c(minimum, "7.2.0", "3.0.0")
 }
-# Workers of the hidden-effect benchmark, a random forest among its rivals, sessions of bench/size.R.
+# Workers of the hidden-effect benchmark, a random forest among its rivals, sessions of
+# bench/size.R.
 if (arguments[2] == "bench") {
   extra <- c("future", "future.apply", "ranger", "callr")
   name <- c(name, extra)

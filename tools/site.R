@@ -3,7 +3,8 @@ quick <- identical(commandArgs(trailingOnly = TRUE), "quick")
 options(pkgdown.internet = FALSE)
 # Links to packages that are named but not installed would be sought in CRAN's list.
 if (exists("CRAN_urls", asNamespace("downlit"))) {
-  utils::assignInNamespace("CRAN_urls", function() data.frame(Package = character(), URL = character()), "downlit")
+  utils::assignInNamespace(
+    "CRAN_urls", function() data.frame(Package = character(), URL = character()), "downlit")
 }
 place <- list(destination = "build/site")
 if (quick) {
@@ -14,5 +15,6 @@ if (quick) {
   pkgdown::build_articles_index(site)
   pkgdown::build_news(site, preview = FALSE)
 } else {
-  pkgdown::build_site(devel = FALSE, preview = FALSE, install = FALSE, new_process = FALSE, override = place)
+  pkgdown::build_site(devel = FALSE, preview = FALSE, install = FALSE, new_process = FALSE,
+                      override = place)
 }

@@ -1,10 +1,12 @@
-# One draw of all unknowns from their priors and of a record given them, from the models as they are written down
-# (vignette "What the engine computes"), with explicit N x N matrices: nothing is shared with the engine but the
-# emulator's prediction and the seed of the fictitious condition.
+# One draw of all unknowns from their priors and of a record given them, from the models as they are
+# written down (vignette "What the engine computes"), with explicit N x N matrices: nothing is
+# shared with the engine but the emulator's prediction and the seed of the fictitious condition.
 
-draw_precision <- function(n, priors) stats::rgamma(n, priors$noise_shape, priors$noise_shape * priors$noise_sd^2)
+draw_precision <- function(n, priors)
+  stats::rgamma(n, priors$noise_shape, priors$noise_shape * priors$noise_sd^2)
 
-# Equations (5) and (6): the noise is drawn for each coefficient (or once for all), and again for the rest.
+# Equations (5) and (6): the noise is drawn for each coefficient (or once for all), and again for
+# the rest.
 draw_paper <- function(world, control, fictitious) {
   m <- world$measurements
   k <- world$emulator$basis$vectors
@@ -18,7 +20,8 @@ draw_paper <- function(world, control, fictitious) {
   alpha <- stats::rbeta(length(m$conditions) + 1, control$alpha[1], control$alpha[2])
   t2 <- stats::rbeta(1, control$t2[1], control$t2[2])
   outside_lambda <- draw_precision(1, priors)
-  covariance <- kernel_covariance(cbind(m$boundary, fictitious), c(m$condition, length(alpha)), alpha, t2)
+  covariance <- kernel_covariance(cbind(m$boundary, fictitious), c(m$condition, length(alpha)),
+                                  alpha, t2)
   v <- stats::rnorm(n) %*% chol(covariance + diag(1 / outside_lambda, n))
   outside <- stats::lm.fit(k, as.numeric(v))$residuals
   list(y = as.numeric(k %*% coefficients) + outside,
@@ -27,7 +30,8 @@ draw_paper <- function(world, control, fictitious) {
        outside = c(stats::setNames(alpha, alpha_names(m)), t2 = t2, lambda = outside_lambda))
 }
 
-lambda_names <- function(lambda) if (length(lambda) == 1) "lambda*" else sprintf("lambda*_%d", seq_along(lambda))
+lambda_names <- function(lambda)
+  if (length(lambda) == 1) "lambda*" else sprintf("lambda*_%d", seq_along(lambda))
 alpha_names <- function(m) sprintf("alpha(%s)", c(m$conditions, "fictitious"))
 
 # zeta of (6): (1 - t2) / t2 prod_s alpha_s^(4 d_s^2), distances on the condition's own range.
@@ -36,12 +40,14 @@ kernel_covariance <- function(x, condition, alpha, t2) {
   for (s in seq_along(alpha)) {
     own <- x[, condition == s, drop = FALSE]
     width <- max(apply(own, 2, function(column) diff(range(column))))
-    for (j in seq_len(ncol(own))) zeta <- zeta * alpha[s]^(4 * (outer(own[, j], own[, j], "-") / width)^2)
+    for (j in seq_len(ncol(own)))
+      zeta <- zeta * alpha[s]^(4 * (outer(own[, j], own[, j], "-") / width)^2)
   }
   zeta
 }
 
-# The history model: one sigma, one error setting and one reach for the whole record, the discrepancy in all directions.
+# The history model: one sigma, one error setting and one reach for the whole record, the
+# discrepancy in all directions.
 draw_history <- function(world, control) {
   m <- world$measurements
   emulator <- world$emulator
@@ -49,16 +55,19 @@ draw_history <- function(world, control) {
   n <- nrow(k)
   unit <- stats::runif(length(emulator$parameters))
   w <- coefficients_at(emulator, unit)
-  variance <- 1 / draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)) +
-    mean(emulator$basis$discarded_sd^2)
+  variance <-
+    1 / draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)) +
+      mean(emulator$basis$discarded_sd^2)
   level <- sample(length(control$error_ratios), length(control$error_times), replace = TRUE)
   reach <- sample(length(control$reach), 1)
   included <- stats::runif(length(m$conditions)) < control$inclusion
   strength <- ifelse(included, (control$amplitude * stats::rcauchy(length(m$conditions)))^2, 0)
 
-  error <- error_covariance(m$hours[m$use == "calibrate"], control$error_times, control$error_ratios[level])
+  error <- error_covariance(m$hours[m$use == "calibrate"], control$error_times,
+                            control$error_ratios[level])
   phi <- standardised_responses(m, control$time_constants)
-  coefficients <- stats::rnorm(ncol(phi$x), 0, sqrt(strength[phi$condition] / length(control$time_constants)))
+  coefficients <- stats::rnorm(ncol(phi$x), 0,
+                               sqrt(strength[phi$condition] / length(control$time_constants)))
   response <- phi$x %*% coefficients
   if (is.finite(control$reach[reach])) {
     ratio <- k %*% world$spread %*% t(k) / (control$reach[reach] * m$noise_sd^2)
@@ -71,10 +80,12 @@ draw_history <- function(world, control) {
   list(y = as.numeric(y), joint = c(stats::setNames(unit, names(emulator$parameters)), truth))
 }
 
-# Covariance of the emulated coefficients over the priors, by many points: how far the simulator can move.
+# Covariance of the emulated coefficients over the priors, by many points: how far the simulator can
+# move.
 simulator_spread <- function(emulator, points = 20000) {
   set.seed(1)
-  w <- amiss:::emulated_coefficients(emulator, matrix(stats::runif(points * length(emulator$parameters)), points))
+  w <- amiss:::emulated_coefficients(
+    emulator, matrix(stats::runif(points * length(emulator$parameters)), points))
   stats::cov(w$mean) + diag(colMeans(w$variance), ncol(w$mean))
 }
 
@@ -83,7 +94,8 @@ t_names <- function(m) sprintf("t(%s)", m$conditions)
 
 error_covariance <- function(hours, times, ratios) {
   distance <- abs(outer(hours, hours, "-"))
-  Reduce(`+`, Map(function(time, ratio) ratio * exp(-distance / time), times, ratios), diag(length(hours)))
+  Reduce(`+`, Map(function(time, ratio) ratio * exp(-distance / time), times, ratios),
+         diag(length(hours)))
 }
 
 # First-order responses r' = (x - r) / tau to a condition that is held over each step, standardised.

@@ -1,5 +1,6 @@
-# Reads changed files until it is ended: Rscript reader.R FOLDER FIRST. Each case has the number of its seed. The folder
-# gets the file that is being read (case.KIND), its number and kind (now), and a line for each that was (cases.tsv).
+# Reads changed files until it is ended: Rscript reader.R FOLDER FIRST. Each case has the number of
+# its seed. The folder gets the file that is being read (case.KIND), its number and kind (now), and
+# a line for each that was (cases.tsv).
 suppressPackageStartupMessages(library(amiss))
 words <- commandArgs(TRUE)
 work <- words[1]
@@ -17,21 +18,29 @@ comma <- function(x) gsub(".", ",", format(x, trim = TRUE), fixed = TRUE)
 stamps <- format(as.POSIXct("2024-03-30", tz = "UTC") + 3600 * hour, "%d.%m.%Y %H:%M")
 tables <- list(
   paste(c("hour,Te,Gv,Ti", do.call(paste, c(record, sep = ","))), collapse = "\n"),
-  paste(c("# logger 7", "hour;Te;Gv;Ti", "h;degC;W/m2;degC", do.call(paste, c(lapply(record, comma), sep = ";"))),
-        collapse = "\r\n"),
-  paste(c("hour\tTe\tGv\tTi", paste(stamps, record$Te, record$Gv, record$Ti, sep = "\t")), collapse = "\n"))
+  paste(c("# logger 7", "hour;Te;Gv;Ti", "h;degC;W/m2;degC",
+          do.call(paste, c(lapply(record, comma), sep = ";"))), collapse = "\r\n"),
+  paste(c("hour\tTe\tGv\tTi", paste(stamps, record$Te, record$Gv, record$Ti, sep = "\t")),
+        collapse = "\n"))
 writeLines(tables[[1]], file.path(work, "data.csv"))
 writeLines('function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
-                               free("gain", uniform(0, 1)), boundary = "Te")', file.path(work, "model.R"))
-writeLines('list(a = function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
-                                        free("gain", uniform(0, 1)), boundary = "Te"))', file.path(work, "models.R"))
-writeLines('catalogue(mechanism("sun", identity, "Gv", "The sun."))', file.path(work, "catalogue.R"))
+                               free("gain", uniform(0, 1)), boundary = "Te")',
+           file.path(work, "model.R"))
+writeLines(
+  'list(a = function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+                                        free("gain", uniform(0, 1)), boundary = "Te"))',
+  file.path(work, "models.R"))
+writeLines('catalogue(mechanism("sun", identity, "Gv", "The sun."))',
+           file.path(work, "catalogue.R"))
 head <- "study: linear\ndata: data.csv\ntime: hour\ntarget: Ti\nboundary: [Te, Gv]\nnoise_sd: 0.1\n"
 loop <- "model: model.R\ncatalogue: catalogue.R\nruns: 20\nseed: 7\n"
 studies <- list(
-  paste0(head, loop, "calibrate: hour <= 45\nvalidate: hour > 45 & Te < 30\nwarmup_h: 2\nmissing: [-9999, 85]\n",
-         "control:\n  max_steps: 1\n  calibration: {ais: {groups: 4}, error_ratios: [0, 1e0]}\n"),
-  paste0(head, loop, "records:\n  east: {target: Ti}\n  west:\n    noise_sd: 0.2\n    range: [-.inf, 40]\n"),
+  paste0(
+    head, loop,
+    "calibrate: hour <= 45\nvalidate: hour > 45 & Te < 30\nwarmup_h: 2\nmissing: [-9999, 85]\n",
+    "control:\n  max_steps: 1\n  calibration: {ais: {groups: 4}, error_ratios: [0, 1e0]}\n"),
+  paste0(head, loop,
+         "records:\n  east: {target: Ti}\n  west:\n    noise_sd: 0.2\n    range: [-.inf, 40]\n"),
   paste0(head, "models: models.R\nmethod: history\nruns: 20\ntitle: 'A \"quoted\" title'\n"))
 outputs <- paste(c("hour,Ti", paste(hour, record$Ti, sep = ",")), collapse = "\n")
 
@@ -39,15 +48,18 @@ outputs <- paste(c("hour,Ti", paste(hour, record$Ti, sep = ",")), collapse = "\n
 
 numbers_in <- function(path) {
   bytes <- readBin(path, "raw", file.size(path))
-  if (length(bytes) > 1 && bytes[1] %in% as.raw(c(0xfe, 0xff)) && bytes[2] %in% as.raw(c(0xfe, 0xff))) {
+  if (length(bytes) > 1 && bytes[1] %in% as.raw(c(0xfe, 0xff)) &&
+      bytes[2] %in% as.raw(c(0xfe, 0xff))) {
     bytes <- bytes[bytes != as.raw(0)]
   }
   text <- iconv(rawToChar(bytes[bytes != as.raw(0)]), "latin1", "UTF-8")
   fields <- unlist(strsplit(text, "[\t\r\n;|\"]+"))
-  words <- trimws(unique(c(fields, unlist(strsplit(fields, ",", fixed = TRUE)), unlist(strsplit(fields, "[ ,]+")))))
+  words <- trimws(unique(c(fields, unlist(strsplit(fields, ",", fixed = TRUE)),
+                           unlist(strsplit(fields, "[ ,]+")))))
   plain <- gsub("[ '\u00a0]", "", words)
   plain <- sub("([0-9.,])([+-][0-9]{3})$", "\\1e\\2", chartr("dD", "ee", plain))
-  forms <- c(words, plain, gsub(",", "", plain), sub(",", ".", gsub(".", "", plain, fixed = TRUE), fixed = TRUE),
+  forms <- c(words, plain, gsub(",", "", plain),
+             sub(",", ".", gsub(".", "", plain, fixed = TRUE), fixed = TRUE),
              sub(",", ".", plain, fixed = TRUE))
   unique(stats::na.omit(suppressWarnings(as.numeric(forms))))
 }
@@ -63,7 +75,8 @@ check_numbers <- function(values, path) {
 
 read_table <- function(path) {
   yaml <- file.path(work, "of-table.yml")
-  writeLines(c(paste0("data: ", basename(path)), sub("data: data.csv\n", "", paste0(head, loop))), yaml)
+  writeLines(c(paste0("data: ", basename(path)), sub("data: data.csv\n", "", paste0(head, loop))),
+             yaml)
   study <- read_study(yaml, trust = TRUE)
   raw <- study$measurements$raw
   check_numbers(raw$y, path)
@@ -77,9 +90,10 @@ read_yaml <- function(path) {
 }
 
 read_output <- function(path) {
-  program <- program_simulator(c("awk", "-v", "gain={{gain}}", "{ print }", path), free("gain", uniform(0, 1)),
-                               output = c(file = "stdout.txt", column = "Ti"), time_limit = 5, version = case,
-                               cache = file.path(work, "cache"))
+  program <- program_simulator(c("awk", "-v", "gain={{gain}}", "{ print }", path),
+                               free("gain", uniform(0, 1)),
+                               output = c(file = "stdout.txt", column = "Ti"), time_limit = 5,
+                               version = case, cache = file.path(work, "cache"))
   runs <- simulate_runs(program, cbind(gain = 0.5), cbind(Te = record$Te), step_h = 1)
   unlink(file.path(work, "cache"), recursive = TRUE)
   if (!all(is.finite(runs))) rlang::abort("a run that failed", class = "amiss_error")
@@ -95,7 +109,8 @@ outcome <- function(read, path) {
     suppressWarnings(suppressMessages(read(path)))
     list("read", "")
   }, amiss_error = function(e) list("refused", ""),
-  error = function(e) list("wrong", paste(class(e)[1], conditionMessage(e), deparse1(conditionCall(e)))))
+     error = function(e)
+       list("wrong", paste(class(e)[1], conditionMessage(e), deparse1(conditionCall(e)))))
 }
 
 cases <- file(file.path(work, "cases.tsv"), "a")
@@ -103,7 +118,8 @@ repeat {
   set.seed(case)
   kind <- sample(names(good), 1, prob = c(4, 4, 1))
   path <- file.path(work, paste0("case.", kind))
-  writeBin(changed_bytes(charToRaw(sample(good[[kind]], 1)[[1]]), lapply(unlist(good), charToRaw)), path)
+  writeBin(changed_bytes(charToRaw(sample(good[[kind]], 1)[[1]]), lapply(unlist(good), charToRaw)),
+           path)
   writeLines(paste(case, kind), file.path(work, "now"))
   seconds <- system.time(came <- outcome(read_of[[kind]], path))[["elapsed"]]
   if (came[[1]] == "wrong") {

@@ -1,5 +1,6 @@
-# The families of worlds: how one is drawn, what may be hidden, and whether the rivals, which are made for buildings
-# whose output follows their boundary conditions smoothly, are asked as well. Sourced after the files of the families.
+# The families of worlds: how one is drawn, what may be hidden, and whether the rivals, which are
+# made for buildings whose output follows their boundary conditions smoothly, are asked as well.
+# Sourced after the files of the families.
 
 families <- list(
   box = list(draw = draw_world, kinds = world_kinds, mechanisms = catalogue_kinds, rivals = TRUE),

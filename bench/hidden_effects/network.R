@@ -1,15 +1,18 @@
-# Grey-box thermal networks of a house: nodes with a heat capacity, resistances between them, and three boundary
-# conditions: outdoor temperature Te (degC), sun Gv (W/m2) and heating P (kW). Capacities in kWh/K, resistances in K/kW,
-# apertures in m2. Base models lack five things, which are the mechanisms; each of these adds its node, links or gains,
-# and its parameters, to whatever network it is given.
+# Grey-box thermal networks of a house: nodes with a heat capacity, resistances between them, and
+# three boundary conditions: outdoor temperature Te (degC), sun Gv (W/m2) and heating P (kW).
+# Capacities in kWh/K, resistances in K/kW, apertures in m2. Base models lack five things, which are
+# the mechanisms; each of these adds its node, links or gains, and its parameters, to whatever
+# network it is given.
 
 network_conditions <- c("Te", "Gv", "P")
 
-# About a decade: within a factor of root ten of the centre, either lognormal with nine tenths of its mass or more in
-# there, or flat in the logarithm (a lognormal so wide that the truncation is all that is left of it).
+# About a decade: within a factor of root ten of the centre, either lognormal with nine tenths of
+# its mass or more in there, or flat in the logarithm (a lognormal so wide that the truncation is
+# all that is left of it).
 decade <- function(name, centre, unit, label, flat) {
   sdlog <- if (flat) 10 else log(10) / 4
-  amiss::free(name, amiss::lognormal(log(centre), sdlog, centre / sqrt(10), centre * sqrt(10)), unit, label)
+  amiss::free(name, amiss::lognormal(log(centre), sdlog, centre / sqrt(10), centre * sqrt(10)),
+              unit, label)
 }
 
 # How much there is of a mechanism, from nothing on.
@@ -26,7 +29,8 @@ add_node <- function(network, node, capacity, share = 1) {
   network
 }
 
-# A resistance between two nodes, or a node and the air outside; `conductance` if the parameter is its inverse.
+# A resistance between two nodes, or a node and the air outside; `conductance` if the parameter is
+# its inverse.
 add_link <- function(network, from, to, parameter, conductance = FALSE) {
   link <- data.frame(from = from, to = to, parameter = parameter, conductance = conductance)
   network$links <- rbind(network$links, link)
@@ -40,16 +44,16 @@ add_gain <- function(network, node, driver, factor, parameter = NA_character_) {
   network
 }
 
-# Base networks. The envelope is one node or a chain of them, a roof or a floor stands beside it; some of the heating
-# may go to the inner surface of the wall; the sun may already reach the floor.
-network_topologies <- c("one wall", "lined wall", "layered wall", "thick wall", "wall and roof", "wall and floor",
-                        "sunny floor")
+# Base networks. The envelope is one node or a chain of them, a roof or a floor stands beside it;
+# some of the heating may go to the inner surface of the wall; the sun may already reach the floor.
+network_topologies <- c("one wall", "lined wall", "layered wall", "thick wall", "wall and roof",
+                        "wall and floor", "sunny floor")
 
 #' @param scale Size of the house: capacities and conductances grow with it.
 #' @param radiant Share of the heating that reaches the inner surface of the wall.
 base_network <- function(topology, scale = 1, flat = FALSE, radiant = 0) {
-  network <- list(topology = topology, scale = scale, flat = flat, pieces = character(), parameters = list(),
-                  fixed = c(R_ground = 12 / scale), start = c(held = 20))
+  network <- list(topology = topology, scale = scale, flat = flat, pieces = character(),
+                  parameters = list(), fixed = c(R_ground = 12 / scale), start = c(held = 20))
   capacity <- function(network, name, centre, label) {
     add_parameter(network, decade(name, centre * scale, "kWh/K", label, flat))
   }
@@ -97,18 +101,21 @@ base_network <- function(topology, scale = 1, flat = FALSE, radiant = 0) {
     network <- add_link(network, "floor", "outside", "R_ground")
   }
   if (topology == "sunny floor") {
-    network <- add_parameter(network, decade("A_floor", 2 * scale, "m2", "solar aperture towards the floor", flat))
+    network <- add_parameter(network, decade("A_floor", 2 * scale, "m2",
+                                             "solar aperture towards the floor", flat))
     network <- add_gain(network, "floor", "Gv", 1e-3, "A_floor")
   }
   if (radiant > 0) network <- add_gain(network, inner, "P", radiant)
   add_gain(network, "air", "P", 1 - radiant)
 }
 
-# The air was held at a temperature before the record began; what outdoor temperature the rest remembers is not known.
+# The air was held at a temperature before the record began; what outdoor temperature the rest
+# remembers is not known.
 with_past <- function(network, held, first_day) {
   network$start[["held"]] <- held
   prior <- amiss::normal(first_day, 1.5, first_day - 4.5, first_day + 4.5)
-  add_parameter(network, amiss::free("remembered", prior, "degC", "outdoor temperature that the walls remember"))
+  add_parameter(network, amiss::free("remembered", prior, "degC",
+                                     "outdoor temperature that the walls remember"))
 }
 
 # The mechanisms. The first parameter of each is its extent, zero where the mechanism is absent.
@@ -120,7 +127,8 @@ network_pieces <- list(
   },
   "heater state" = function(network) {
     capacity <- extent("C_heater", 3 * network$scale, "kWh/K", "capacity of the heater")
-    resistance <- decade("R_heater", 0.6 / network$scale, "K/kW", "resistance between heater and air", network$flat)
+    resistance <- decade("R_heater", 0.6 / network$scale, "K/kW",
+                         "resistance between heater and air", network$flat)
     network <- add_parameter(add_parameter(network, capacity), resistance)
     network <- add_link(add_node(network, "heater", "C_heater"), "heater", "air", "R_heater")
     network$gains$node[network$gains$driver == "P" & network$gains$node == "air"] <- "heater"
@@ -128,27 +136,34 @@ network_pieces <- list(
   },
   "interior mass" = function(network) {
     capacity <- extent("C_mass", 8 * network$scale, "kWh/K", "capacity of the mass inside")
-    resistance <- decade("R_mass", 0.8 / network$scale, "K/kW", "resistance between air and mass", network$flat)
+    resistance <- decade("R_mass", 0.8 / network$scale, "K/kW", "resistance between air and mass",
+                         network$flat)
     network <- add_parameter(add_parameter(network, capacity), resistance)
     add_link(add_node(network, "mass", "C_mass"), "air", "mass", "R_mass")
   },
   "envelope leak" = function(network) {
-    network <- add_parameter(network, extent("H_leak", 0.15 * network$scale, "kW/K", "direct loss to the outdoor air"))
+    network <- add_parameter(network, extent("H_leak", 0.15 * network$scale, "kW/K",
+                                             "direct loss to the outdoor air"))
     add_link(network, "air", "outside", "H_leak", conductance = TRUE)
   },
   "sun on the envelope" = function(network) {
-    aperture <- extent("A_wall", 10 * network$scale, "m2", "solar aperture towards the wall's outer layer")
+    aperture <- extent("A_wall", 10 * network$scale, "m2",
+                       "solar aperture towards the wall's outer layer")
     network <- add_parameter(network, aperture)
     add_gain(network, network$outermost, "Gv", 1e-3, "A_wall")
   })
 
-network_boundary <- list("solar gain on the air" = "Gv", "heater state" = "P", "interior mass" = c("P", "Te", "Gv"),
-                         "envelope leak" = "Te", "sun on the envelope" = "Gv")
+network_boundary <- list("solar gain on the air" = "Gv", "heater state" = "P",
+                         "interior mass" = c("P", "Te", "Gv"), "envelope leak" = "Te",
+                         "sun on the envelope" = "Gv")
 
 network_sentences <- c(
-  "solar gain on the air" = "Sun enters through windows and warms the air, which the model leaves out.",
-  "heater state" = "The heater stores heat and gives it off with a delay that the model leaves out.",
-  "interior mass" = "The house holds mass, in exchange with the air alone, that the model leaves out.",
+  "solar gain on the air" =
+    "Sun enters through windows and warms the air, which the model leaves out.",
+  "heater state" =
+    "The heater stores heat and gives it off with a delay that the model leaves out.",
+  "interior mass" =
+    "The house holds mass, in exchange with the air alone, that the model leaves out.",
   "envelope leak" = "Heat passes from the air to outdoors directly, past the mass of the envelope.",
   "sun on the envelope" = "The sun warms the outside of the wall, which the model leaves out.")
 
@@ -158,14 +173,15 @@ network_plan <- function(network) {
   place <- function(node) ifelse(node == "outside", 0L, match(node, nodes))
   links <- network$links
   gains <- network$gains
-  list(n = length(nodes), capacity = network$nodes$capacity, share = network$nodes$share, from = place(links$from),
-       to = place(links$to), resistance = links$parameter, conductance = links$conductance,
-       gain_node = place(gains$node), gain_driver = match(gains$driver, network_conditions), gain_factor = gains$factor,
+  list(n = length(nodes), capacity = network$nodes$capacity, share = network$nodes$share,
+       from = place(links$from), to = place(links$to), resistance = links$parameter,
+       conductance = links$conductance, gain_node = place(gains$node),
+       gain_driver = match(gains$driver, network_conditions), gain_factor = gains$factor,
        gain_parameter = gains$parameter, fixed = network$fixed, start = network$start)
 }
 
-# Temperature of the air, averaged over each step, driven by conditions that are constant over a step: exact, mode by
-# mode. The truth is computed so, the models are the package's own networks.
+# Temperature of the air, averaged over each step, driven by conditions that are constant over a
+# step: exact, mode by mode. The truth is computed so, the models are the package's own networks.
 network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
   n <- plan$n
   values <- c(values, plan$fixed)
@@ -185,7 +201,8 @@ network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
       loss[i, j] <- loss[j, i] <- loss[i, j] - conductance[l]
     }
   }
-  # Steady before the record: the air was held, the rest between it and what it remembers of outdoors.
+  # Steady before the record: the air was held, the rest between it and what it remembers of
+  # outdoors.
   held <- plan$start[["held"]]
   outdoors <- values[["remembered"]]
   start <- c(held, solve(loss[-1, -1, drop = FALSE], gain[-1, 1] * outdoors - loss[-1, 1] * held))
@@ -193,7 +210,8 @@ network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
     parameter <- plan$gain_parameter[l]
     i <- plan$gain_node[l]
     j <- plan$gain_driver[l]
-    gain[i, j] <- gain[i, j] + plan$gain_factor[l] * if (is.na(parameter)) 1 else values[[parameter]]
+    gain[i, j] <- gain[i, j] +
+      plan$gain_factor[l] * if (is.na(parameter)) 1 else values[[parameter]]
   }
   modes <- eigen(root * loss * rep(root, each = n), symmetric = TRUE)
   rate <- pmax(modes$values, 1e-12)
@@ -226,7 +244,8 @@ network_simulator <- function(network, step, parameters = network$parameters) {
   }
   place <- function(node) if (node == "outside") "Te" else node
   nodes <- Map(function(node, capacity, share) {
-    amiss::network_node(node, field(capacity, share), start = if (node == "air") network$start[["held"]])
+    amiss::network_node(node, field(capacity, share),
+                        start = if (node == "air") network$start[["held"]])
   }, network$nodes$node, network$nodes$capacity, network$nodes$share)
   links <- Map(function(from, to, parameter, conductance) {
     if (conductance) amiss::network_link(from, place(to), conductance = field(parameter))
@@ -245,7 +264,8 @@ network_simulator <- function(network, step, parameters = network$parameters) {
   built
 }
 
-# The model with one more piece; parameters that it has, whatever their priors have become, stay as they are.
+# The model with one more piece; parameters that it has, whatever their priors have become, stay as
+# they are.
 network_with <- function(model, piece) {
   network <- network_pieces[[piece]](model$network)
   network$pieces <- c(network$pieces, piece)
@@ -256,13 +276,15 @@ network_with <- function(model, piece) {
 
 network_catalogue <- function() {
   one <- function(piece) {
-    amiss::mechanism(piece, boundary = network_boundary[[piece]], edit = function(model) network_with(model, piece),
+    amiss::mechanism(piece, boundary = network_boundary[[piece]],
+                     edit = function(model) network_with(model, piece),
                      sentence = network_sentences[[piece]])
   }
   do.call(amiss::catalogue, lapply(names(network_pieces), one))
 }
 
-# Weather and heating, on a grid finer than the models' step; heating switches at the ends of their steps.
+# Weather and heating, on a grid finer than the models' step; heating switches at the ends of their
+# steps.
 draw_network_weather <- function(days, step, fine) {
   climate <- climates[[sample.int(length(climates), 1)]]
   record <- list(days = days, step_h = step / fine, seed = sample.int(1e9, 1))
@@ -278,12 +300,15 @@ draw_network_base <- function() {
 }
 
 # Standard deviation of the mean of some values of noise in a row, for unit noise.
-averaged_noise <- function(count, ar1) sqrt(mean(ar1^abs(outer(seq_len(count), seq_len(count), "-"))))
+averaged_noise <- function(count, ar1)
+  sqrt(mean(ar1^abs(outer(seq_len(count), seq_len(count), "-"))))
 
 true_unit <- function(parameters) stats::runif(length(parameters), 0.15, 0.85)
 
-#' As draw_world(): seed, and what may be fixed. `second_zone`: truth has one that the model lacks (wrong.R).
-draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, second_zone = FALSE) {
+#' As draw_world(): seed, and what may be fixed. `second_zone`: truth has one that the model lacks
+#' (wrong.R).
+draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL,
+                               second_zone = FALSE) {
   set.seed(seed, kind = "Mersenne-Twister", normal.kind = "Inversion", sample.kind = "Rejection")
   effects <- names(network_pieces)
   drawn_kind <- sample(c("none", effects), 1, prob = c(1 / 8, rep(7 / 40, 5)))
@@ -298,7 +323,8 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
   network <- draw_network_base()
   fine <- 5L
   weather <- draw_network_weather(days, step, fine)
-  network <- with_past(network, stats::runif(1, 18, 23), mean(weather[seq_len(24 * fine / step), "Te"]))
+  network <- with_past(network, stats::runif(1, 18, 23),
+                       mean(weather[seq_len(24 * fine / step), "Te"]))
   base <- network_simulator(network, step)
   hours <- seq_len(round(24 * days / step)) * step
   warmup <- if (days < 10) 24 else 48
@@ -320,8 +346,8 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
     plain <- run_truth(real$simulator, real$values)
     adapted <- list(unit = unit)
     if (second_zone) {
-      # An effect counts beside what the wrong base makes of the truth without one; what it cannot is to show in the
-      # noise: a room that leaves the base nearly right is drawn again.
+      # An effect counts beside what the wrong base makes of the truth without one; what it cannot
+      # is to show in the noise: a room that leaves the base nearly right is drawn again.
       adapted <- adapt_to(base, plain, drivers, rows, list(unit, rep(0.5, length(unit))))
       noise <- min(max(adapted$rms / sample(c(2, 4, 8), 1), limits[1]), limits[2])
       if (adapted$rms < 2 * limits[1] && attempt < 20) next
@@ -339,21 +365,24 @@ draw_network_world <- function(seed, kind = NULL, strength = NULL, days = NULL, 
   hidden <- list(noise = noise, achieved = 0, effect = 0)
   effect_values <- list()
   if (kind != "none") {
-    hidden <- hide_effect(effect_at, base, adapted$unit, drivers, rows, strength, noise, limits, most)
+    hidden <- hide_effect(effect_at, base, adapted$unit, drivers, rows, strength, noise, limits,
+                          most)
     effect_values[[kind]] <- c(at_size(hidden$size), size = hidden$size)
   }
   clean <- plain + hidden$effect
-  data <- data.frame(hour = hours, drivers, Ti = clean + draw_noise(length(clean), hidden$noise, ar1))
+  data <- data.frame(hour = hours, drivers,
+                     Ti = clean + draw_noise(length(clean), hidden$noise, ar1))
   average <- step * c(1, 2, 4)[findInterval(length(rows), c(0, 500, 1000))]
   noise_sd <- hidden$noise * averaged_noise(average / step, ar1)
   measured <- suppressMessages(
-    amiss::measurements(data, time = "hour", target = "Ti", boundary = network_conditions, noise_sd = noise_sd,
-                        average = if (average > step) average, warmup = warmup, calibrate = calibrate,
-                        validate = !calibrate, name = kind, unit = "K"))
-  list(seed = seed, family = "network", kind = kind, kinds = setdiff(kind, "none"), strength = strength,
-       achieved = hidden$achieved, noise = hidden$noise, ar1 = ar1, days = days, values = values,
-       effects = effect_values, clean = clean, data = data, measurements = measured, base = base,
-       catalogue = network_catalogue(),
-       true_boundary = as.character(unlist(network_boundary[setdiff(kind, "none")], use.names = FALSE)),
+    amiss::measurements(data, time = "hour", target = "Ti", boundary = network_conditions,
+                        noise_sd = noise_sd, average = if (average > step) average, warmup = warmup,
+                        calibrate = calibrate, validate = !calibrate, name = kind, unit = "K"))
+  list(seed = seed, family = "network", kind = kind, kinds = setdiff(kind, "none"),
+       strength = strength, achieved = hidden$achieved, noise = hidden$noise, ar1 = ar1,
+       days = days, values = values, effects = effect_values, clean = clean, data = data,
+       measurements = measured, base = base, catalogue = network_catalogue(),
+       true_boundary = as.character(unlist(network_boundary[setdiff(kind, "none")],
+                                           use.names = FALSE)),
        misfit = if (second_zone) adapted$rms / hidden$noise)
 }

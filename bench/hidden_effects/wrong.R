@@ -1,15 +1,17 @@
-# Worlds whose base model is wrong in structure besides: whatever its parameters, something is left. In half of them an
-# effect of the catalogue is hidden as well.
-# - "one layer for three": the box of worlds.R, whose walls have three layers, fitted with walls of one
-#   (paper_box("M1")).
-# - "one zone for two": a network of network.R with a room behind a door that the model does not have and nobody
-#   measures.
+# Worlds whose base model is wrong in structure besides: whatever its parameters, something is left.
+# In half of them an effect of the catalogue is hidden as well.
+# - "one layer for three": the box of worlds.R, whose walls have three layers, fitted with walls of
+#   one (paper_box("M1")).
+# - "one zone for two": a network of network.R with a room behind a door that the model does not
+#   have and nobody measures.
 
-# A second room: its air, its wall, the door, and part of the heating. Its numbers belong to the truth alone.
+# A second room: its air, its wall, the door, and part of the heating. Its numbers belong to the
+# truth alone.
 with_second_zone <- function(base) {
   network <- base$network
   scale <- network$scale
-  values <- exp(stats::runif(4, log(0.5), log(2))) * c(1, 4, 1, 4) * c(scale, scale, 1 / scale, 1 / scale)
+  values <-
+    exp(stats::runif(4, log(0.5), log(2))) * c(1, 4, 1, 4) * c(scale, scale, 1 / scale, 1 / scale)
   names(values) <- c("C_room", "C_room_wall", "R_room_inside", "R_room_outside")
   values[["H_door"]] <- scale * exp(stats::runif(1, log(0.05), log(0.5)))
   share <- stats::runif(1, 0, 0.5)
@@ -44,10 +46,12 @@ draw_wrong_world <- function(seed, kind = NULL, strength = NULL, days = NULL, st
   world
 }
 
-# Its misfit, as that of the other: RMS of what its parameters leave of the truth without an effect, over the noise.
+# Its misfit, as that of the other: RMS of what its parameters leave of the truth without an effect,
+# over the noise.
 one_layer_for_three <- function(world) {
   offset <- amiss::free("initial_wall_offset", amiss::normal(0, 1, -3, 3), "K")
-  world$base <- amiss::change_component(amiss::paper_box("M1"), "zone", initial_wall_offset = offset)
+  world$base <- amiss::change_component(amiss::paper_box("M1"), "zone",
+                                        initial_wall_offset = offset)
   m <- world$measurements
   m$raw$y <- simulate_truth(amiss::paper_box("M2"), world$values, world$data)
   whole <- !is.na(m$block)

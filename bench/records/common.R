@@ -5,8 +5,8 @@ one_pole <- function(x, hours, step_h) {
   as.numeric(stats::filter((1 - kept) * x, kept, method = "recursive", init = x[1]))
 }
 
-# Steps of an hour or less; rain, a schedule, a valve that rests at its ends and a heater at full power are conditions
-# too, and are no faults.
+# Steps of an hour or less; rain, a schedule, a valve that rests at its ends and a heater at full
+# power are conditions too, and are no faults.
 draw_room <- function(seed) {
   set.seed(seed)
   step_h <- sample(c(1, 1, 0.5, 0.25), 1)
@@ -22,11 +22,12 @@ draw_room <- function(seed) {
   data$P <- 1000 * pmin(1, pmax(0, need))
   memory <- sample(c(0, 3, 8), 1)
   noise <- stats::runif(1, 0.05, 0.2)
-  true <- c(o = stats::runif(1, 16, 20), g = stats::runif(1, 0.3, 0.7), s = stats::runif(1, 0.003, 0.008),
-            h = stats::runif(1, 1, 4))
+  true <- c(o = stats::runif(1, 16, 20), g = stats::runif(1, 0.3, 0.7),
+            s = stats::runif(1, 0.003, 0.008), h = stats::runif(1, 1, 4))
   ar <- sample(c(0, 0, 0.5), 1)
   error <- noise * sqrt(1 - ar^2) * as.numeric(stats::filter(stats::rnorm(n), ar, "recursive"))
-  world <- list(data = data, step_h = step_h, memory = memory, noise = noise, true = true, warmup = 5 * memory,
+  world <- list(data = data, step_h = step_h, memory = memory, noise = noise, true = true,
+                warmup = 5 * memory,
                 conditions = c("Te", "Gv", "P", "Ws", "circular(Wd)", "Lw", "rain", "set", "valve"))
   world$clean <- simulate_room(true, data, memory, step_h)
   world$error <- error
@@ -35,7 +36,8 @@ draw_room <- function(seed) {
 }
 
 simulate_room <- function(values, drivers, memory, step_h) {
-  driven <- values[["g"]] * drivers[, "Te"] + values[["s"]] * drivers[, "Gv"] + values[["h"]] * drivers[, "P"] / 1000
+  driven <- values[["g"]] * drivers[, "Te"] + values[["s"]] * drivers[, "Gv"] +
+    values[["h"]] * drivers[, "P"] / 1000
   values[["o"]] + if (memory > 0) one_pole(driven, memory, step_h) else driven
 }
 
@@ -43,8 +45,9 @@ room_model <- function(world) {
   memory <- world$memory
   step_h <- world$step_h
   function_simulator(function(values, drivers) simulate_room(values, drivers, memory, step_h),
-                     free("o", uniform(14, 22)), free("g", uniform(0, 1)), free("s", uniform(0, 0.02)),
-                     free("h", uniform(0, 8)), boundary = c("Te", "Gv", "P"))
+                     free("o", uniform(14, 22)), free("g", uniform(0, 1)),
+                     free("s", uniform(0, 0.02)), free("h", uniform(0, 8)),
+                     boundary = c("Te", "Gv", "P"))
 }
 
 added <- function(name, boundary, parameter, f) {
@@ -78,10 +81,13 @@ room_catalogue <- function(step_h) {
 
 judge_room <- function(world) {
   data <- world$data
-  m <- measurements(data, time = "hour", target = "Ti", boundary = world$conditions, noise_sd = world$noise,
-                    warmup = world$warmup, validate = data$hour > 0.75 * max(data$hour))
-  quick <- list(max_steps = 1, calibration = list(ais = list(precision = 0.3)), attribution = list(surrogates = 19))
-  upgrade <- upgrade_model(room_model(world), m, room_catalogue(world$step_h), control = quick, seed = 1, quiet = TRUE)
+  m <- measurements(data, time = "hour", target = "Ti", boundary = world$conditions,
+                    noise_sd = world$noise, warmup = world$warmup,
+                    validate = data$hour > 0.75 * max(data$hour))
+  quick <- list(max_steps = 1, calibration = list(ais = list(precision = 0.3)),
+                attribution = list(surrogates = 19))
+  upgrade <- upgrade_model(room_model(world), m, room_catalogue(world$step_h), control = quick,
+                           seed = 1, quiet = TRUE)
   told <- summary(upgrade)
   list(verdict = told$verdict, faults = names(told$record), says = unname(told$record))
 }

@@ -15,8 +15,9 @@ some_rows <- function(v, share = 0.015) sort(sample(length(v), max(3, ceiling(sh
 coded <- function(codes) function(v, world) replace(v, some_rows(v), sample(codes, 1))
 
 stuck <- function(v, world) {
-  rows <- sample(which(seq_along(v) > world$warmup / world$step_h & seq_along(v) < 0.55 * length(v)), 1) +
-    seq_len(round(30 / world$step_h))
+  rows <-
+    sample(which(seq_along(v) > world$warmup / world$step_h & seq_along(v) < 0.55 * length(v)), 1) +
+      seq_len(round(30 / world$step_h))
   replace(v, rows, v[rows[1]])
 }
 
@@ -34,10 +35,12 @@ clock_hours <- function(world) sample(c(-1, 1), 1) * sample(c(1, 1, 2, 24), 1)
 
 repeated <- function(v, world) v[4 * ((seq_along(v) - 1) %/% 4) + 1]
 
-# With noise so small that what a fault changes is three times as large, as what does not show is no fault.
+# With noise so small that what a fault changes is three times as large, as what does not show is no
+# fault.
 visible <- function(put) function(world) {
   faulty <- put(world)
-  changed <- faulty$data$Ti - world$data$Ti + simulate_room(world$true, world$data, world$memory, world$step_h) -
+  changed <- faulty$data$Ti - world$data$Ti +
+    simulate_room(world$true, world$data, world$memory, world$step_h) -
     simulate_room(world$true, faulty$data, world$memory, world$step_h)
   smaller <- min(1, sqrt(mean(changed^2)) / (3 * world$noise))
   faulty$data$Ti <- faulty$data$Ti - (1 - smaller) * world$error
@@ -51,8 +54,9 @@ faults <- list(
   code_driver = list(put = in_driver(coded(c(-9999, -999, -99.9, 9999, 32767, 1e30, 150))),
                      right = c("missing_code", "far_outside")),
   code_direction = list(put = in_driver(coded(c(990, 999, -999)), "Wd"), right = "missing_code"),
-  range_target = list(put = in_target(function(v, world) pmin(v, stats::quantile(v, stats::runif(1, 0.5, 0.85)))),
-                      right = "range_end"),
+  range_target = list(
+    put = in_target(function(v, world) pmin(v, stats::quantile(v, stats::runif(1, 0.5, 0.85)))),
+    right = "range_end"),
   range_driver = list(put = visible(in_driver(function(v, world) {
     pmin(v, stats::quantile(v, stats::runif(1, 0.6, 0.8)))
   })),
@@ -76,9 +80,12 @@ faults <- list(
   step_target = list(put = in_target(function(v, world) {
     v + ifelse(seq_along(v) >= at_step(v), stats::runif(1, 4, 10) * world$noise, 0)
   }), right = "step_change"),
-  clock_target = list(put = visible(in_target(function(v, world) late(v, world, clock_hours(world)))), right = "clock"),
+  clock_target = list(
+    put = visible(in_target(function(v, world) late(v, world, clock_hours(world)))),
+    right = "clock"),
   clock_driver = list(put = visible(function(world) {
-    in_driver(function(v, world) late(v, world, clock_hours(world)), sample(c("Te", "Gv"), 1))(world)
+    in_driver(function(v, world) late(v, world, clock_hours(world)),
+              sample(c("Te", "Gv"), 1))(world)
   }), right = "clock"),
   daylight = list(put = visible(function(world) {
     change <- function(v, world) late(v, world, sample(c(-1, 1), 1), at_step(v))
@@ -87,7 +94,8 @@ faults <- list(
   start = list(put = function(world) {
     since <- world$data$hour - world$warmup
     away <- sample(c(-1, 1), 1) * stats::runif(1, 8, 20) * world$noise
-    world$data$Ti <- world$data$Ti + ifelse(since > 0, away * exp(-since / stats::runif(1, 4, 15)), 0)
+    world$data$Ti <- world$data$Ti +
+      ifelse(since > 0, away * exp(-since / stats::runif(1, 4, 15)), 0)
     world
   }, right = "start"),
   direction = list(put = function(world) {

@@ -1,6 +1,7 @@
 # What the records of other sciences share.
 
-autoregressive <- function(n, memory, sd) as.numeric(stats::arima.sim(list(ar = memory), n, sd = sd))
+autoregressive <- function(n, memory, sd)
+  as.numeric(stats::arima.sim(list(ar = memory), n, sd = sd))
 
 # Autoregressive, of the standard deviation stated.
 stationary <- function(n, memory, sd) autoregressive(n, memory, sd * sqrt(1 - memory^2))
@@ -21,7 +22,8 @@ scaled <- function(info, term, x) {
   info
 }
 
-term <- function(info, name, absent, n) rep_len(if (is.null(info[[name]])) absent else info[[name]], n)
+term <- function(info, name, absent, n)
+  rep_len(if (is.null(info[[name]])) absent else info[[name]], n)
 
 # The first value measured while the model warms up, where one is held.
 start_of <- function(info, absent) if (is.na(info$hold[1])) absent else info$hold[1]
@@ -37,7 +39,8 @@ new_mechanism <- function(name, boundary, sentence, parameter, f) {
 
 # The drift's unit counts in so many hours.
 drifting_sensor <- function(sd, unit, hours = 24) {
-  new_mechanism("sensor drift", character(), "The sensor drifts.", free("drift", normal(0, sd), unit),
+  new_mechanism("sensor drift", character(), "The sensor drifts.",
+                free("drift", normal(0, sd), unit),
                 function(values, drivers, info, base) {
     base(values, drivers, info) + values[["drift"]] * info$step_h * seq_len(nrow(drivers)) / hours
   })

@@ -1,6 +1,7 @@
-# The concentration of a drug under doses and infusion, by the half hour. Hidden: tissue that takes up the drug and
-# gives it back, a mechanism of two parameters and no boundary condition; the model lacks besides a short transit before
-# absorption and a bit of bile that returns. The truth takes steps of a minute, the model of ten.
+# The concentration of a drug under doses and infusion, by the half hour. Hidden: tissue that takes
+# up the drug and gives it back, a mechanism of two parameters and no boundary condition; the model
+# lacks besides a short transit before absorption and a bit of bile that returns. The truth takes
+# steps of a minute, the model of ten.
 draw_drug <- function(seed) {
   set.seed(seed)
   step <- 0.5
@@ -31,15 +32,16 @@ draw_drug <- function(seed) {
       transit <- transit + dose[i] / parts - dt * transit / 0.05
       gut <- gut + dt * (transit / 0.05 + 0.03 * bile - true[["ka"]] * gut)
       bile <- bile + dt * (0.005 * blood - 0.03 * bile)
-      change <- true[["share"]] * true[["ka"]] * gut + infusion[i] - true[["cl"]] / true[["volume"]] * blood -
-        true[["k12"]] * blood + true[["k21"]] * tissue - 0.005 * blood
+      change <- true[["share"]] * true[["ka"]] * gut + infusion[i] -
+        true[["cl"]] / true[["volume"]] * blood - true[["k12"]] * blood + true[["k21"]] * tissue -
+        0.005 * blood
       blood <- blood + dt * change
       tissue <- tissue + dt * (true[["k12"]] * blood - true[["k21"]] * tissue)
       inside[j, i] <- blood / true[["volume"]]
     }
   }
-  table <- data.frame(hour = time, concentration = colMeans(inside) + noise_of(n, 0.06, 0.6), dose, infusion, renal,
-                      helper)
+  table <- data.frame(hour = time, concentration = colMeans(inside) + noise_of(n, 0.06, 0.6), dose,
+                      infusion, renal, helper)
   compartment <- function(values, drivers, info) {
     n <- nrow(drivers)
     parts <- 3
@@ -68,19 +70,21 @@ draw_drug <- function(seed) {
     mean
   }
   base <- function_simulator(compartment, free("cl", uniform(1, 15), "L/h"),
-                             free("volume", lognormal(log(30), 0.5), "L"), free("ka", uniform(0.2, 2), "1/h"),
-                             free("share", beta_prior(4, 2)), boundary = c("dose", "infusion"),
-                             name = "one compartment")
+                             free("volume", lognormal(log(30), 0.5), "L"),
+                             free("ka", uniform(0.2, 2), "1/h"), free("share", beta_prior(4, 2)),
+                             boundary = c("dose", "infusion"), name = "one compartment")
   mechanisms <- catalogue(
-    mechanism("tissue", boundary = character(), sentence = "Tissue takes up the drug and gives it back.",
-              edit = function(model) {
-      with_parameters(model, free("k12", uniform(0, 0.6), "1/h"), free("k21", uniform(0.02, 0.5), "1/h"),
+    mechanism("tissue", boundary = character(),
+              sentence = "Tissue takes up the drug and gives it back.", edit = function(model) {
+      with_parameters(model, free("k12", uniform(0, 0.6), "1/h"),
+                      free("k21", uniform(0.02, 0.5), "1/h"),
                       f = function(values, drivers, info, base) {
         base(values, drivers, added(added(info, "k12", values[["k12"]]), "k21", values[["k21"]]))
       })
     }),
     new_mechanism("saturable clearance", character(), "The liver's capacity is limited.",
-                  free("inverse_half", uniform(0.001, 1), "L/mg"), function(values, drivers, info, base) {
+                  free("inverse_half", uniform(0.001, 1), "L/mg"),
+                  function(values, drivers, info, base) {
       info$half <- 1 / values[["inverse_half"]]
       base(values, drivers, info)
     }),
@@ -89,9 +93,10 @@ draw_drug <- function(seed) {
       state <- 1 + values[["renal_part"]] * (drivers[, "renal"] - 90) / 90
       base(values, drivers, scaled(info, "clearance", pmax(0.05, state)))
     }),
-    new_mechanism("inhibitor", "helper", "A second drug slows the clearance.", free("inhibited", uniform(0, 0.8)),
-                  function(values, drivers, info, base) {
-      base(values, drivers, scaled(info, "clearance", 1 - values[["inhibited"]] * drivers[, "helper"]))
+    new_mechanism("inhibitor", "helper", "A second drug slows the clearance.",
+                  free("inhibited", uniform(0, 0.8)), function(values, drivers, info, base) {
+      base(values, drivers,
+           scaled(info, "clearance", 1 - values[["inhibited"]] * drivers[, "helper"]))
     }),
     new_mechanism("induction", character(), "The liver learns to clear the drug faster.",
                   free("induced", uniform(0, 1)), function(values, drivers, info, base) {
@@ -99,8 +104,9 @@ draw_drug <- function(seed) {
       base(values, drivers, scaled(info, "clearance", 1 + values[["induced"]] * learnt))
     }),
     drifting_sensor(0.05, "mg/L/d"))
-  measured <- measurements(table, time = "hour", target = "concentration",
-                           boundary = ~ dose + infusion + renal + helper, noise_sd = 0.06, unit = "mg/L",
-                           name = "drug", warmup = 0, calibrate = time <= 130, validate = time > 130)
+  measured <- measurements(
+    table, time = "hour", target = "concentration", boundary = ~ dose + infusion + renal + helper,
+    noise_sd = 0.06, unit = "mg/L",
+    name = "drug", warmup = 0, calibrate = time <= 130, validate = time > 130)
   list(base = base, measurements = measured, catalogue = mechanisms, hidden = "tissue", true = true)
 }

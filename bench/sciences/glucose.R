@@ -1,6 +1,6 @@
-# Glucose in the blood under meals, insulin and sport, by the quarter of an hour. Hidden: the uptake by sport, and the
-# release at dawn; the model lacks besides a third small compartment of the gut and the lag of the uptake by sport. The
-# truth takes steps of a minute, the model of five.
+# Glucose in the blood under meals, insulin and sport, by the quarter of an hour. Hidden: the uptake
+# by sport, and the release at dawn; the model lacks besides a third small compartment of the gut
+# and the lag of the uptake by sport. The truth takes steps of a minute, the model of five.
 draw_glucose <- function(seed) {
   set.seed(seed)
   step <- 0.25
@@ -28,7 +28,8 @@ draw_glucose <- function(seed) {
   }
   asleep <- as.numeric(hour >= 23 | hour < 6.75)
   activity <- activity + ifelse(asleep > 0, 0, pmax(0, 0.5 + stationary(n, 0.7, 0.3)))
-  true <- c(p1 = 0.45, basal = 7.2, gain = 0.22, tau_gut = 0.6, si = 1.15, sport = 0.055, dawn = 1.3)
+  true <- c(p1 = 0.45, basal = 7.2, gain = 0.22, tau_gut = 0.6, si = 1.15, sport = 0.055,
+            dawn = 1.3)
   glucose <- 7.2
   stomach <- gut <- last <- depot <- plasma <- muscle <- 0
   dt <- step / parts
@@ -42,15 +43,15 @@ draw_glucose <- function(seed) {
       plasma <- plasma + dt * (depot - plasma) / 0.9
       muscle <- muscle + dt * (activity[i] - muscle) / 0.08
       clock <- (time[i] - step + j * dt) %% 24
-      change <- true[["gain"]] * last / true[["tau_gut"]] - true[["p1"]] * (glucose - true[["basal"]]) -
-        true[["si"]] * plasma / 0.9 * glucose / 8 - true[["sport"]] * muscle * glucose +
-        true[["dawn"]] * exp(-((clock - 6) / 2)^2)
+      change <- true[["gain"]] * last / true[["tau_gut"]] -
+        true[["p1"]] * (glucose - true[["basal"]]) - true[["si"]] * plasma / 0.9 * glucose / 8 -
+        true[["sport"]] * muscle * glucose + true[["dawn"]] * exp(-((clock - 6) / 2)^2)
       glucose <- max(2, glucose + dt * change)
       inside[j, i] <- glucose
     }
   }
-  table <- data.frame(hour = time, glucose = colMeans(inside) + noise_of(n, 0.28, 0.7), carbs, insulin, activity,
-                      asleep)
+  table <- data.frame(hour = time, glucose = colMeans(inside) + noise_of(n, 0.28, 0.7), carbs,
+                      insulin, activity, asleep)
   minimal <- function(values, drivers, info) {
     n <- nrow(drivers)
     parts <- 3
@@ -69,7 +70,8 @@ draw_glucose <- function(seed) {
         gut <- gut + dt * (stomach - gut) / values[["tau_gut"]]
         depot <- depot + insulin[i] - dt * depot / 0.9
         plasma <- plasma + dt * (depot - plasma) / 0.9
-        change <- values[["gain"]] * gut / values[["tau_gut"]] - values[["p1"]] * (glucose - values[["basal"]]) -
+        change <- values[["gain"]] * gut / values[["tau_gut"]] -
+          values[["p1"]] * (glucose - values[["basal"]]) -
           values[["si"]] * plasma / 0.9 * glucose / 8 - uptake[i] * glucose + release[i]
         glucose <- max(1, glucose + dt * change)
         sum <- sum + glucose
@@ -78,10 +80,10 @@ draw_glucose <- function(seed) {
     }
     mean
   }
-  base <- function_simulator(minimal, free("p1", uniform(0.1, 1.5), "1/h"), free("basal", uniform(3, 12), "mmol/L"),
-                             free("gain", uniform(0.05, 0.5), "mmol/L/g"), free("tau_gut", uniform(0.2, 1.5), "h"),
-                             free("si", uniform(0, 3), "mmol/L/U"), boundary = c("carbs", "insulin"),
-                             name = "minimal model")
+  base <- function_simulator(
+    minimal, free("p1", uniform(0.1, 1.5), "1/h"), free("basal", uniform(3, 12), "mmol/L"),
+    free("gain", uniform(0.05, 0.5), "mmol/L/g"), free("tau_gut", uniform(0.2, 1.5), "h"),
+    free("si", uniform(0, 3), "mmol/L/U"), boundary = c("carbs", "insulin"), name = "minimal model")
   mechanisms <- catalogue(
     new_mechanism("sport", "activity", "Muscles take up glucose during sport.",
                   free("sport", uniform(0, 0.3), "1/h/MET"), function(values, drivers, info, base) {
@@ -93,7 +95,8 @@ draw_glucose <- function(seed) {
       base(values, drivers, added(info, "release", values[["dawn"]] * early))
     }),
     new_mechanism("sleep", "asleep", "Less glucose is released in sleep.",
-                  free("sleep", uniform(-1.5, 1.5), "mmol/L/h"), function(values, drivers, info, base) {
+                  free("sleep", uniform(-1.5, 1.5), "mmol/L/h"),
+                  function(values, drivers, info, base) {
       base(values, drivers, added(info, "release", -values[["sleep"]] * drivers[, "asleep"]))
     }),
     new_mechanism("sensor lag", character(), "The sensor under the skin lags behind the blood.",
@@ -102,16 +105,18 @@ draw_glucose <- function(seed) {
       keep <- exp(-info$step_h / values[["lag"]])
       as.numeric(stats::filter((1 - keep) * blood, keep, method = "recursive", init = blood[1]))
     }),
-    new_mechanism("slow fat", "carbs", "A part of the meals is absorbed slowly.", free("fat", uniform(0, 0.6)),
-                  function(values, drivers, info, base) {
+    new_mechanism("slow fat", "carbs", "A part of the meals is absorbed slowly.",
+                  free("fat", uniform(0, 0.6)), function(values, drivers, info, base) {
       keep <- exp(-info$step_h / 3)
       late <- as.numeric(stats::filter((1 - keep) * drivers[, "carbs"], keep, method = "recursive"))
       drivers[, "carbs"] <- (1 - values[["fat"]]) * drivers[, "carbs"] + values[["fat"]] * late
       base(values, drivers, info)
     }),
     drifting_sensor(0.2, "mmol/L/d"))
-  measured <- measurements(table, time = "hour", target = "glucose", boundary = ~ carbs + insulin + activity + asleep,
-                           noise_sd = 0.28, unit = "mmol/L", name = "glucose", warmup = 4, calibrate = time <= 96,
+  measured <- measurements(table, time = "hour", target = "glucose",
+                           boundary = ~ carbs + insulin + activity + asleep, noise_sd = 0.28,
+                           unit = "mmol/L", name = "glucose", warmup = 4, calibrate = time <= 96,
                            validate = time > 96)
-  list(base = base, measurements = measured, catalogue = mechanisms, hidden = c("sport", "dawn effect"), true = true)
+  list(base = base, measurements = measured, catalogue = mechanisms,
+       hidden = c("sport", "dawn effect"), true = true)
 }

@@ -1,6 +1,7 @@
-# The temperature of a stirred reactor with a feed and a cooled jacket, every three minutes. Hidden: the jacket fouls;
-# the model lacks besides a corner that mixes badly, a jacket that lags and a coolant that warms a little. The truth
-# takes steps of six seconds, the model of a minute, and the thermometer rounds to a hundredth.
+# The temperature of a stirred reactor with a feed and a cooled jacket, every three minutes. Hidden:
+# the jacket fouls; the model lacks besides a corner that mixes badly, a jacket that lags and a
+# coolant that warms a little. The truth takes steps of six seconds, the model of a minute, and the
+# thermometer rounds to a hundredth.
 draw_reactor <- function(seed) {
   set.seed(seed)
   step <- 0.05
@@ -25,8 +26,8 @@ draw_reactor <- function(seed) {
     for (j in seq_len(parts)) {
       rate <- true[["k"]] * exp(true[["energy"]] * (1 / 323.15 - 1 / (reactor + 273.15)))
       cooling <- true[["ua"]] * exp(-true[["foul"]] * (i - 1 + j / parts) * step)
-      warming <- flow[i] * (feed[i] - reactor) + true[["rise"]] * rate * content + cooling * (jacket - reactor) +
-        1.5 * 0.05 * (corner - reactor)
+      warming <- flow[i] * (feed[i] - reactor) + true[["rise"]] * rate * content +
+        cooling * (jacket - reactor) + 1.5 * 0.05 * (corner - reactor)
       corner <- corner + dt * 1.5 * (reactor - corner)
       jacket <- jacket + dt * 60 * (coolant[i] + 0.01 * (reactor - coolant[i]) - jacket)
       content <- content + dt * (flow[i] * (1 - content) - rate * content)
@@ -34,8 +35,8 @@ draw_reactor <- function(seed) {
       inside[j, i] <- reactor
     }
   }
-  table <- data.frame(hour = time, temperature = round(colMeans(inside) + noise_of(n, 0.2, 0.5), 2), flow, feed,
-                      coolant, ambient)
+  table <- data.frame(hour = time, temperature = round(colMeans(inside) + noise_of(n, 0.2, 0.5), 2),
+                      flow, feed, coolant, ambient)
   stirred <- function(values, drivers, info) {
     n <- nrow(drivers)
     parts <- 3
@@ -65,22 +66,27 @@ draw_reactor <- function(seed) {
     mean
   }
   base <- function_simulator(stirred, free("k", uniform(0.3, 3), "1/h"),
-                             free("energy", normal(6500, 1500, 2000, 11000), "K"), free("rise", uniform(40, 180), "K"),
-                             free("ua", uniform(0.5, 5), "1/h"), boundary = c("flow", "feed", "coolant"),
-                             name = "stirred reactor")
+                             free("energy", normal(6500, 1500, 2000, 11000), "K"),
+                             free("rise", uniform(40, 180), "K"),
+                             free("ua", uniform(0.5, 5), "1/h"),
+                             boundary = c("flow", "feed", "coolant"), name = "stirred reactor")
   elapsed <- function(drivers, info) info$step_h * seq_len(nrow(drivers))
   mechanisms <- catalogue(
     new_mechanism("fouling", "coolant", "The cooling jacket fouls and takes less heat away.",
                   free("foul", uniform(0, 0.08), "1/h"), function(values, drivers, info, base) {
-      base(values, drivers, scaled(info, "cooling", exp(-values[["foul"]] * elapsed(drivers, info))))
+      base(values, drivers,
+           scaled(info, "cooling", exp(-values[["foul"]] * elapsed(drivers, info))))
     }),
     new_mechanism("catalyst decay", character(), "The catalyst loses activity.",
-                  free("decay", uniform(-0.05, 0.05), "1/h"), function(values, drivers, info, base) {
-      base(values, drivers, scaled(info, "activity", exp(-values[["decay"]] * elapsed(drivers, info))))
+                  free("decay", uniform(-0.05, 0.05), "1/h"),
+                  function(values, drivers, info, base) {
+      base(values, drivers,
+           scaled(info, "activity", exp(-values[["decay"]] * elapsed(drivers, info))))
     }),
     new_mechanism("loss to the hall", "ambient", "The vessel loses heat to the hall.",
                   free("hall", uniform(0, 1), "1/h"), function(values, drivers, info, base) {
-      base(values, drivers, added(added(info, "loss", values[["hall"]]), "outside", drivers[, "ambient"]))
+      base(values, drivers,
+           added(added(info, "loss", values[["hall"]]), "outside", drivers[, "ambient"]))
     }),
     new_mechanism("feed thermometer", "feed", "The feed's thermometer has an offset.",
                   free("feed_offset", normal(0, 3), "K"), function(values, drivers, info, base) {
@@ -93,8 +99,10 @@ draw_reactor <- function(seed) {
       base(values, drivers, info)
     }),
     drifting_sensor(1, "K/10 h", 10))
-  measured <- measurements(table, time = "hour", target = "temperature", boundary = ~ flow + feed + coolant + ambient,
-                           noise_sd = 0.2, unit = "K", name = "reactor", warmup = 1.5, calibrate = time <= 14.5,
+  measured <- measurements(table, time = "hour", target = "temperature",
+                           boundary = ~ flow + feed + coolant + ambient, noise_sd = 0.2, unit = "K",
+                           name = "reactor", warmup = 1.5, calibrate = time <= 14.5,
                            validate = time > 14.5)
-  list(base = base, measurements = measured, catalogue = mechanisms, hidden = "fouling", true = true)
+  list(base = base, measurements = measured, catalogue = mechanisms, hidden = "fouling",
+       true = true)
 }

@@ -1,5 +1,6 @@
-# Calibrations of one record by other packages and by ours (bench/peers/calibrations.R): effective draws per CPU second
-# of one core, over the whole of each call. SEPIA is in no package registry (its method: bench/peers/ball_drop.R).
+# Calibrations of one record by other packages and by ours (bench/peers/calibrations.R): effective
+# draws per CPU second of one core, over the whole of each call. SEPIA is in no package registry
+# (its method: bench/peers/ball_drop.R).
 
 source(file.path(root, "bench", "peers", "install.R"), local = TRUE)
 calibrations <- run_with_peers(root, "calibrations.R", "RobustCalibration")

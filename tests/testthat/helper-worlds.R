@@ -8,7 +8,8 @@ world_seed <- function(default) {
 linear_simulator <- function() {
   function_simulator(function(values, drivers) {
     values[["offset"]] + values[["gain"]] * drivers[, "Te"]
-  }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te", name = "linear")
+  }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te",
+     name = "linear")
 }
 
 linear_data <- function(n = 240, noise = 0.1, seed = 11) {
@@ -22,12 +23,13 @@ linear_data <- function(n = 240, noise = 0.1, seed = 11) {
 }
 
 linear_measurements <- function(data = linear_data(), ...) {
-  defaults <- list(data = data, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1, unit = "K")
+  defaults <- list(data = data, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
+                   unit = "K")
   do.call("measurements", utils::modifyList(defaults, list(...)))
 }
 
-# `make`, whose results are kept: the same arguments are worked on once. What is to be made twice, to see whether it
-# comes out the same, calls `make` itself.
+# `make`, whose results are kept: the same arguments are worked on once. What is to be made twice,
+# to see whether it comes out the same, calls `make` itself.
 made_once <- function(make) {
   made <- new.env()
   function(...) {
@@ -39,7 +41,8 @@ made_once <- function(make) {
 
 # Functions that stand in for the package's own of the same names until a test ends.
 stand_in <- function(..., frame = parent.frame()) {
-  set <- function(functions) for (name in names(functions)) utils::assignInNamespace(name, functions[[name]], "amiss")
+  set <- function(functions)
+    for (name in names(functions)) utils::assignInNamespace(name, functions[[name]], "amiss")
   given <- list(...)
   own <- mget(names(given), asNamespace("amiss"))
   withr::defer(set(own), envir = frame)
@@ -49,7 +52,8 @@ stand_in <- function(..., frame = parent.frame()) {
 quick_ais <- list(ais = list(pilot_chains = 48, groups = 4, chains = 24, sweeps = 3))
 
 linear_fit <- function(measurements = linear_measurements(), seed = 3, threads = 1, runs = 30) {
-  emulator <- train_emulator(simulate_design(linear_simulator(), measurements, runs = runs, seed = seed), measurements)
+  emulator <- train_emulator(
+    simulate_design(linear_simulator(), measurements, runs = runs, seed = seed), measurements)
   calibrate(emulator, measurements, quick_ais, seed = seed, threads = threads)
 }
 
@@ -63,15 +67,17 @@ rescaled <- function(emulator, factor) {
   emulator
 }
 
-twinhouse_study <- function(house) system.file("studies", sprintf("twinhouse_%s.yml", house), package = "amiss")
+twinhouse_study <- function(house)
+  system.file("studies", sprintf("twinhouse_%s.yml", house), package = "amiss")
 
 # What print() says, in one line.
 printed <- function(x) gsub("\\s+", " ", paste(utils::capture.output(print(x)), collapse = " "))
 
-# A world that bends: lag and strength hang on one parameter, the sun on another. Three vectors leave out a sixth
-# of the noise.
+# A world that bends: lag and strength hang on one parameter, the sun on another. Three vectors
+# leave out a sixth of the noise.
 bent_simulator <- function(f = bent_run) {
-  function_simulator(f, free("a", uniform(0, 1)), free("b", uniform(0, 2)), boundary = c("Te", "Gv"), name = "bent")
+  function_simulator(f, free("a", uniform(0, 1)), free("b", uniform(0, 2)),
+                     boundary = c("Te", "Gv"), name = "bent")
 }
 
 bent_run <- function(values, drivers) {

@@ -16,7 +16,8 @@ test_that("one call does what the stages do", {
 })
 
 test_that("without the noise it is taken from second differences", {
-  expect_message(m <- record_measurements(record, NULL), "noise of \"Ti\"", class = "amiss_message_noise")
+  expect_message(m <- record_measurements(record, NULL), "noise of \"Ti\"",
+                 class = "amiss_message_noise")
   expect_equal(m$conditions, c("Te", "Gv"))
   expect_equal(m$noise_sd, difference_sd(record$hour, record$Ti))
   # Of 4000 values it is known to 2 %; the course adds (0.01)^2 / 6 to a square of 0.01.

@@ -1,4 +1,5 @@
-# A record that answers to `driver`, among fifteen conditions of which all but Te and Gv are named X.
+# A record that answers to `driver`, among fifteen conditions of which all but Te and Gv are named
+# X.
 fifteen <- function(strength) withr::with_seed(4, {
   data <- linear_data()
   hour <- data$hour
@@ -25,7 +26,8 @@ test_that("a planted effect is found in the right condition, and none where ther
   data <- linear_data()
   lagged <- as.numeric(stats::filter(data$Gv / 300, 0.8, "recursive")) * 0.2
   data$Ti <- data$Ti + lagged
-  found <- attribute_discrepancy(linear_fit(linear_measurements(data)), list(surrogates = 99), seed = 1)
+  found <- attribute_discrepancy(linear_fit(linear_measurements(data)), list(surrogates = 99),
+                                 seed = 1)
   expect_equal(found$table$boundary[1], "Gv")
   expect_true(found$table$significant[1])
   expect_gt(found$table$log10_bf_dropped[1], 2)
@@ -38,7 +40,8 @@ test_that("a planted effect is found in the right condition, and none where ther
 
 test_that("one true condition among fifteen is found, and it alone", {
   found <- attribute_discrepancy(linear_fit(fifteen(0.1)), list(surrogates = 39), seed = 1)
-  # The step-down method's least p-value does not grow with the number of conditions: Holm's would be 15 / 40.
+  # The step-down method's least p-value does not grow with the number of conditions: Holm's would
+  # be 15 / 40.
   expect_identical(significant_conditions(found$table), "X05")
   expect_equal(found$table$p_value[1], 1 / 40)
   expect_setequal(found$table$boundary, fifteen(0.1)$conditions)
@@ -51,7 +54,8 @@ test_that("among fifteen conditions none answers where nothing is hidden", {
 
 test_that("a copy of the true driver does not hide it: both are named as one", {
   for (seed in 1:2) {
-    found <- attribute_discrepancy(linear_fit(twins(1, 0.05), seed = seed), list(surrogates = 99), seed = 1)
+    found <- attribute_discrepancy(linear_fit(twins(1, 0.05), seed = seed), list(surrogates = 99),
+                                   seed = 1)
     expect_identical(significant_conditions(found$table), "Tn or Tc")
   }
   expect_length(found$groups, 1)
@@ -65,16 +69,19 @@ test_that("a copy of the true driver does not hide it: both are named as one", {
   expect_equal(found$table$log10_bf_dropped[members], rep(group$log10_bf_dropped, 2))
   expect_match(printed(found), "driven by Tn or Tc")
   expect_match(printed(found),
-               "Tn and Tc cannot be told apart in this record .correlation 1.000.: measure while the two differ")
+               paste("Tn and Tc cannot be told apart in this record .correlation 1.000.: measure",
+                     "while the two differ"))
 })
 
 test_that("nearly a copy is named with the driver, and what differs enough is told apart", {
   near <- attribute_discrepancy(linear_fit(twins(0.999, 0.1)), list(surrogates = 99), seed = 1)
   expect_identical(significant_conditions(near$table), "Tn or Tc")
   expect_match(amiss:::group_words(near), "correlation 0.999", fixed = TRUE)
-  # At 0.95 the record may tell them apart; if it does, the true one is named. "Nothing" is wrong in either case.
+  # At 0.95 the record may tell them apart; if it does, the true one is named. "Nothing" is wrong in
+  # either case.
   for (strength in c(0.02, 0.1)) {
-    apart <- attribute_discrepancy(linear_fit(twins(0.95, strength)), list(surrogates = 99), seed = 1)
+    apart <- attribute_discrepancy(linear_fit(twins(0.95, strength)), list(surrogates = 99),
+                                   seed = 1)
     expect_true(significant_conditions(apart$table) %in% c("Tn", "Tn or Tc"))
   }
   expect_length(amiss:::group_words(apart), sum(!is.na(apart$table$group)) / 2)
@@ -85,8 +92,8 @@ test_that("shares are plain shares of the variance where conditions do not overl
   data$Ti <- data$Ti + 0.004 * data$Gv
   fit <- linear_fit(linear_measurements(data))
   table <- attribute_discrepancy(fit, list(surrogates = 19), seed = 1)$table
-  # The simulator's own directions are nearly free beside a noise of 0.1: all but the noise, over what is measured
-  # outside them.
+  # The simulator's own directions are nearly free beside a noise of 0.1: all but the noise, over
+  # what is measured outside them.
   outside <- function(v) stats::lm.fit(fit$emulator$basis$vectors, v)$residuals
   noise <- data$Ti - 20 - 0.4 * data$Te - 0.004 * data$Gv
   explained <- 1 - sum(outside(noise)^2) / sum(outside(data$Ti)^2)
@@ -109,15 +116,17 @@ test_that("one boundary condition is enough", {
 
 test_that("evidence lost is the posterior over the prior odds of a condition that does not act", {
   data <- linear_data()
-  data$Ti <- data$Ti + 0.00031 * data$Gv  # too weak to be certain: a part of the draws leaves it out
+  # too weak to be certain: a part of the draws leaves it out
+  data$Ti <- data$Ti + 0.00031 * data$Gv
   fit <- linear_fit(linear_measurements(data))
   table <- attribute_discrepancy(fit, list(surrogates = 19), seed = 1)$table
   off <- colSums(fit$weights * (fit$posterior$t == 0))
   expect_true(all(off > 0.02 & off < 0.99))
-  expect_equal(table$log10_bf_dropped[match(c("Te", "Gv"), table$boundary)], log10(1 - 0.2) - log10(off),
-               tolerance = 1e-8)
+  expect_equal(table$log10_bf_dropped[match(c("Te", "Gv"), table$boundary)],
+               log10(1 - 0.2) - log10(off), tolerance = 1e-8)
   # Sampled again without the condition: the same within four standard errors of both.
-  again <- attribute_discrepancy(fit, list(surrogates = 19, ais = list(precision = 0.01, max_groups = 4)),
+  again <- attribute_discrepancy(fit, list(surrogates = 19,
+                                           ais = list(precision = 0.01, max_groups = 4)),
                                  seed = 1)$table
   again <- again[match(table$boundary, again$boundary), ]
   expect_true(all(again$log10_bf_dropped != table$log10_bf_dropped))

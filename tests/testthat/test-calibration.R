@@ -22,11 +22,12 @@ test_that("the evidence does not hang on the number of basis vectors", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, runs = 40, seed = 2)
   fits <- lapply(c(3, 4, 6, 8), function(q) {
-    calibrate(train_emulator(runs, m, list(max_vectors = q, explained = 1, noise_fraction = 1e-6)), m, quick_ais,
-              seed = 1)
+    calibrate(train_emulator(runs, m, list(max_vectors = q, explained = 1, noise_fraction = 1e-6)),
+              m, quick_ais, seed = 1)
   })
-  # Three vectors leave out a sixth of the noise, four next to nothing. What is left is the sampler's error,
-  # 0.02 decades; 0.3 is a third of what changes a word. A split of the record at these vectors moved it by decades.
+  # Three vectors leave out a sixth of the noise, four next to nothing. What is left is the
+  # sampler's error, 0.02 decades; 0.3 is a third of what changes a word. A split of the record at
+  # these vectors moved it by decades.
   expect_lt(diff(range(decades(fits, function(f) f$log_evidence))), 0.3)
   expect_lt(diff(range(decades(fits, function(f) f$posterior$log_evidence))), 0.3)
   expect_lt(max(decades(fits, function(f) f$standard_error)), 0.05)
@@ -54,12 +55,14 @@ test_that("the reach is a distribution over the numbers given", {
 
 test_that("a single reach is taken and said", {
   at_reach <- function(reach) {
-    calibrate(plain_fit()$emulator, plain_fit()$measurements, c(quick_ais, list(reach = reach)), seed = 3)
+    calibrate(plain_fit()$emulator, plain_fit()$measurements, c(quick_ais, list(reach = reach)),
+              seed = 3)
   }
   free <- at_reach(Inf)
   expect_equal(free$reach, c("Inf" = 1))
   expect_match(printed(free), "the discrepancy is free")
-  expect_match(printed(at_reach(13)), "keeps out of what the parameters do (reach 13)", fixed = TRUE)
+  expect_match(printed(at_reach(13)), "keeps out of what the parameters do (reach 13)",
+               fixed = TRUE)
 })
 
 test_that("a model that is wrong where its parameters could hide it has a free discrepancy", {
@@ -67,7 +70,8 @@ test_that("a model that is wrong where its parameters could hide it has a free d
   data$Ti <- data$Ti + 1.6 * data$Te  # the gain is 2, beyond its prior of 0 to 1
   fit <- linear_fit(linear_measurements(data))
   expect_gt(fit$reach[["Inf"]], 0.95)
-  expect_match(printed(fit), "reaches into what the parameters can do .probability (0.9[5-9]|1.00).")
+  expect_match(printed(fit),
+               "reaches into what the parameters can do .probability (0.9[5-9]|1.00).")
 })
 
 test_that("the reach has the probabilities that separate calibrations give it", {
@@ -77,12 +81,14 @@ test_that("the reach has the probabilities that separate calibrations give it", 
   m <- linear_measurements(data, boundary = c("Te", "Gv", "Tn"))
   fit <- linear_fit(m)
   alone <- lapply(fit$control$reach,
-                  function(reach) calibrate(fit$emulator, m, c(quick_ais, list(reach = reach)), seed = 3))
+                  function(reach)
+                    calibrate(fit$emulator, m, c(quick_ais, list(reach = reach)), seed = 3))
   of_each <- vapply(alone, `[[`, 0, "log_evidence")
   se <- vapply(alone, `[[`, 0, "standard_error")
   expected <- exp(of_each - max(of_each)) / sum(exp(of_each - max(of_each)))
   # Four standard errors of the evidences, and of shares of the effective draws.
-  error <- sqrt(expected * (1 - expected) / fit$posterior$ess + (2 * expected * (1 - expected) * max(se))^2)
+  error <- sqrt(expected * (1 - expected) / fit$posterior$ess +
+                (2 * expected * (1 - expected) * max(se))^2)
   expect_length(expected, 3)
   expect_true(all(abs(fit$reach - expected) < 4 * error + 1e-3))
 })
@@ -116,64 +122,77 @@ test_that("validation rows are never touched by calibration", {
 test_that("the evidence does not depend on the unit of a boundary condition", {
   data <- linear_data()
   data$Gv <- data$Gv / 1000
-  expect_equal(linear_fit(linear_measurements(data))$log_evidence, plain_fit()$log_evidence, tolerance = 1e-6)
+  expect_equal(linear_fit(linear_measurements(data))$log_evidence, plain_fit()$log_evidence,
+               tolerance = 1e-6)
 })
 
 test_that("the unit of the basis does not matter", {
   fit <- plain_fit()
-  # Powers of two round nothing. Other factors change the last digit, by which a chain may take another way: what is
-  # found then differs as between two seeds, whose standard deviation is 0.07 (seeds 3 to 9), and the reach's 0.04.
+  # Powers of two round nothing. Other factors change the last digit, by which a chain may take
+  # another way: what is found then differs as between two seeds, whose standard deviation is 0.07
+  # (seeds 3 to 9), and the reach's 0.04.
   for (factor in c(2^10, 2^-10, 1000)) {
     other <- calibrate(rescaled(fit$emulator, factor), fit$measurements, quick_ais, seed = 3)
     exact <- factor != 1000
     expect_lt(abs(other$log_evidence - fit$log_evidence), if (exact) 1e-8 else 0.21)
-    expect_lt(abs(other$posterior$log_evidence - fit$posterior$log_evidence), if (exact) 1e-8 else 0.21)
+    expect_lt(abs(other$posterior$log_evidence - fit$posterior$log_evidence),
+              if (exact) 1e-8 else 0.21)
     expect_lt(max(abs(other$reach - fit$reach)), if (exact) 1e-8 else 0.12)
     expect_equal(coef(other), coef(fit), tolerance = if (exact) 1e-8 else 1e-3)
   }
 })
 
-# Another order gives each condition other random numbers: the likelihood is the same (tests/cpp), the evidence within
-# its error.
+# Another order gives each condition other random numbers: the likelihood is the same (tests/cpp),
+# the evidence within its error.
 test_that("the order of the conditions does not matter", {
   fit <- plain_fit()
   turned <- calibrate(fit$emulator, linear_measurements(boundary = ~ Gv + Te), quick_ais, seed = 3)
-  expect_lt(abs(turned$log_evidence - fit$log_evidence), 4 * sqrt(turned$standard_error^2 + fit$standard_error^2))
+  expect_lt(abs(turned$log_evidence - fit$log_evidence),
+            4 * sqrt(turned$standard_error^2 + fit$standard_error^2))
 })
 
 test_that("options are checked", {
   m <- plain_fit()$measurements
   emulator <- plain_fit()$emulator
-  expect_error(calibrate(emulator, m, list(chains = 3)), "unknown option", class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1), "control\\$ais\\$chains` = 1 cannot",
+  expect_error(calibrate(emulator, m, list(chains = 3)), "unknown option",
                class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(confidence = 3)), "confidence", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1),
+               "control\\$ais\\$chains` = 1 cannot", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(confidence = 3)), "confidence",
+               class = "amiss_error_input")
   expect_error(calibrate(emulator, m, threads = 0), "threads", class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(reach = c(0, Inf))), "reach", class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(reach = c(13, 13))), "reach", class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(check = -1)), "control\\$check", class = "amiss_error_input")
-  expect_error(calibrate(emulator, m, list(exact = 0.5)), "control\\$exact", class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(reach = c(0, Inf))), "reach",
+               class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(reach = c(13, 13))), "reach",
+               class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(check = -1)), "control\\$check",
+               class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, list(exact = 0.5)), "control\\$exact",
+               class = "amiss_error_input")
 })
 
 test_that("an emulator of another record is refused", {
   shorter <- linear_measurements(linear_data()[1:100, ])
-  expect_error(calibrate(plain_fit()$emulator, shorter), "240 steps.*100", class = "amiss_error_input")
+  expect_error(calibrate(plain_fit()$emulator, shorter), "240 steps.*100",
+               class = "amiss_error_input")
 })
 
 test_that("a record with no more rows than the basis has vectors is refused", {
   data <- linear_data(20)
   m <- linear_measurements(data)
   runs <- simulate_design(linear_simulator(), m, runs = 40, seed = 3)
-  noisy <- ensemble(runs$values, runs$outputs + withr::with_seed(1, matrix(rnorm(800), 20)), runs$parameters)
+  noisy <- ensemble(runs$values, runs$outputs + withr::with_seed(1, matrix(rnorm(800), 20)),
+                    runs$parameters)
   emulator <- suppressWarnings(train_emulator(noisy, m, list(explained = 1, noise_fraction = 1e-9)))
   expect_identical(ncol(emulator$basis$vectors), 19L)  # never as many as rows
   emulator$basis$vectors <- cbind(emulator$basis$vectors, cos(1:20), sin(1:20))
   emulator$spread <- rbind(emulator$spread, 0, 0)
   emulator$processes$coefficients <- cbind(emulator$processes$coefficients, 0, 0)
-  emulator$processes$hyperparameters <- emulator$processes$hyperparameters[c(1:19, 19, 19), , drop = FALSE]
+  emulator$processes$hyperparameters <-
+    emulator$processes$hyperparameters[c(1:19, 19, 19), , drop = FALSE]
   emulator$basis$discarded_sd[] <- 0
-  expect_error(calibrate(emulator, m, quick_ais, seed = 1), "20 rows, no more than the 21 basis vectors",
-               class = "amiss_error_input")
+  expect_error(calibrate(emulator, m, quick_ais, seed = 1),
+               "20 rows, no more than the 21 basis vectors", class = "amiss_error_input")
 })
 
 test_that("a Bayes factor needs one record", {

@@ -1,4 +1,5 @@
-# A program of another science with a measured record: a rainfall-runoff model in awk, and a mountain river.
+# A program of another science with a measured record: a rainfall-runoff model in awk, and a
+# mountain river.
 skip_if_not_installed("airGR")
 skip_if(Sys.which("awk") == "", "awk is not installed")
 
@@ -12,11 +13,13 @@ river_example <- function(cache = withr::local_tempdir(.local_envir = parent.fra
 # Four years of the record: one to warm up, two to calibrate, one held out.
 short_river <- function(example) {
   daily <- example$daily[example$daily$day < "2004-01-01", ]
-  measurements(daily, time = "day", target = "flow", boundary = ~ rain + temperature + evaporation, noise_sd = 0.1,
-               warmup = 24 * 366, calibrate = daily$day < "2003-01-01", validate = daily$day >= "2003-01-01")
+  measurements(daily, time = "day", target = "flow", boundary = ~ rain + temperature + evaporation,
+               noise_sd = 0.1, warmup = 24 * 366, calibrate = daily$day < "2003-01-01",
+               validate = daily$day >= "2003-01-01")
 }
 
-# The logarithm of the flow that airGR simulates for one row of values, with CemaNeige's snow where they have some.
+# The logarithm of the flow that airGR simulates for one row of values, with CemaNeige's snow where
+# they have some.
 airgr_flow <- function(x, daily, least) {
   snow <- "melt" %in% names(x)
   model <- if (snow) airGR::RunModel_CemaNeigeGR4J else airGR::RunModel_GR4J
@@ -24,26 +27,31 @@ airgr_flow <- function(x, daily, least) {
                  PotEvap = daily$evaporation, verbose = FALSE)
   if (snow) inputs <- c(inputs, list(TempMean = daily$temperature, NLayers = 1))
   inputs <- do.call(airGR::CreateInputsModel, inputs)
-  options <- list(FUN_MOD = model, InputsModel = inputs, IndPeriod_WarmUp = 0L, IndPeriod_Run = seq_len(nrow(daily)),
-                  verbose = FALSE, warnings = FALSE)
-  # It takes the snow that leaves no ground bare as 0.9 of the snow of a year, and 0.25 is the memory in snow.awk.
+  options <- list(FUN_MOD = model, InputsModel = inputs, IndPeriod_WarmUp = 0L,
+                  IndPeriod_Run = seq_len(nrow(daily)), verbose = FALSE, warnings = FALSE)
+  # It takes the snow that leaves no ground bare as 0.9 of the snow of a year, and 0.25 is the
+  # memory in snow.awk.
   if (snow) options$MeanAnSolidPrecip <- x[["covered"]] / 0.9
   parameters <- c(x[c("production", "exchange", "routing", "lag")], if (snow) c(0.25, x[["melt"]]))
-  log(pmax(model(inputs, do.call(airGR::CreateRunOptions, options), unname(parameters))$Qsim, least))
+  log(pmax(model(inputs, do.call(airGR::CreateRunOptions, options), unname(parameters))$Qsim,
+           least))
 }
 
 test_that("the model in awk is GR4J, and with its snow CemaNeige, as airGR has them", {
   example <- river_example()
   daily <- example$daily[1:900, ]
   drivers <- as.matrix(daily[c("rain", "evaporation", "temperature")])
-  values <- cbind(production = c(350, 100, 1200, 60), exchange = c(-0.5, 1, -3, 0), routing = c(90, 30, 200, 20),
-                  lag = c(1.7, 0.6, 4.3, 2), melt = c(3, 5, 1, 8), covered = c(100, 300, 30, 200))
+  values <- cbind(production = c(350, 100, 1200, 60), exchange = c(-0.5, 1, -3, 0),
+                  routing = c(90, 30, 200, 20), lag = c(1.7, 0.6, 4.3, 2), melt = c(3, 5, 1, 8),
+                  covered = c(100, 300, 30, 200))
   agrees <- function(model) {
     x <- values[, names(free_parameters(model))]
-    runs <- simulate_runs(model, x, drivers[, driver_names(model)], step_h = 24, time = as.POSIXct(daily$day))
+    runs <- simulate_runs(model, x, drivers[, driver_names(model)], step_h = 24,
+                          time = as.POSIXct(daily$day))
     expected <- apply(x, 1, airgr_flow, daily, example$least)
     expect_gt(min(expected), log(example$least))
-    expect_lt(max(abs(runs - expected)), 1e-5)  # of a logarithm; airGR's constant 0.9 has single precision
+    # of a logarithm; airGR's constant 0.9 has single precision
+    expect_lt(max(abs(runs - expected)), 1e-5)
     runs
   }
   dry <- agrees(example$runoff)
@@ -57,8 +65,8 @@ test_that("mechanisms of a river stack in any order", {
   drivers <- as.matrix(example$daily[1:400, c("rain", "evaporation", "temperature")])
   run <- function(order) {
     model <- Reduce(function(model, edit) edit(model), edits[order], example$runoff)
-    values <- cbind(production = 350, exchange = -0.5, routing = 90, lag = 1.7, melt = 3, covered = 100, catch = 1.2,
-                    demand = 0.8)
+    values <- cbind(production = 350, exchange = -0.5, routing = 90, lag = 1.7, melt = 3,
+                    covered = 100, catch = 1.2, demand = 0.8)
     simulate_runs(model, values, drivers[, driver_names(model)], step_h = 24)
   }
   stacked <- run(c("snow", "undercatch", "demand"))
@@ -66,13 +74,16 @@ test_that("mechanisms of a river stack in any order", {
   scaled <- drivers %*% diag(c(1.2, 0.8, 1))
   colnames(scaled) <- colnames(drivers)
   snowy <- edits$snow(example$runoff)
-  values <- cbind(production = 350, exchange = -0.5, routing = 90, lag = 1.7, melt = 3, covered = 100)
+  values <- cbind(production = 350, exchange = -0.5, routing = 90, lag = 1.7, melt = 3,
+                  covered = 100)
   expect_equal(simulate_runs(snowy, values, scaled[, driver_names(snowy)], step_h = 24), stacked)
 })
 
 # The model with a file that gains a line at each run.
 counted_runs <- function(model, log) {
-  with_template(model, list(gr4j.awk = function(lines) c(lines, sprintf("END { print \"ran\" >> \"%s\" }", log))))
+  with_template(
+    model,
+    list(gr4j.awk = function(lines) c(lines, sprintf("END { print \"ran\" >> \"%s\" }", log))))
 }
 
 test_that("failed runs of a river are told and tried again, the others are kept", {
@@ -80,10 +91,12 @@ test_that("failed runs of a river are told and tried again, the others are kept"
   example <- river_example()
   log <- withr::local_tempfile()
   stuck <- "NR == 400 && lag > 4.5 { print \"the gate is stuck\" > \"/dev/stderr\"; exit 3 }"
-  model <- with_template(counted_runs(example$runoff, log), list(gr4j.awk = function(lines) c(lines, stuck)))
+  model <- with_template(counted_runs(example$runoff, log),
+                         list(gr4j.awk = function(lines) c(lines, stuck)))
   river <- short_river(example)
   design <- function() simulate_design(model, river, runs = 30, seed = 1)
-  expect_warning(expect_warning(made <- design(), "of \"GR4J by awk\" failed.*exit status 3.*the gate is stuck"),
+  expect_warning(expect_warning(made <- design(),
+                                "of \"GR4J by awk\" failed.*exit status 3.*the gate is stuck"),
                  "left out")
   expect_gt(made$failed, 1)
   expect_lte(max(made$values[, "lag"]), 4.5)
@@ -98,15 +111,17 @@ test_that("snow is decisive on the mountain, and data held out gain by it", {
   river <- short_river(example)
   log <- withr::local_tempfile()
   # Two parameters are held and the others lie near, so that few runs suffice.
-  held <- function(lines) sub("{{exchange}}", "-0.5", sub("{{lag}}", "1.5", lines, fixed = TRUE), fixed = TRUE)
+  held <- function(lines)
+    sub("{{exchange}}", "-0.5", sub("{{lag}}", "1.5", lines, fixed = TRUE), fixed = TRUE)
   templates <- example$runoff$templates
   templates$gr4j.awk <- held(templates$gr4j.awk)
   dry <- program_simulator(example$runoff$command, free("production", lognormal(7.5, 0.3), "mm"),
-                           free("routing", lognormal(5.2, 0.15), "mm"), templates = lapply(templates, I),
-                           output = example$runoff$output, boundary = example$runoff$boundary,
-                           cache = example$runoff$cache)
+                           free("routing", lognormal(5.2, 0.15), "mm"),
+                           templates = lapply(templates, I), output = example$runoff$output,
+                           boundary = example$runoff$boundary, cache = example$runoff$cache)
   dry <- counted_runs(dry, log)
-  snowy <- with_template(dry, c(ground.awk = example$script("snow.awk")), free("melt", uniform(3, 7), "mm/(K d)"),
+  snowy <- with_template(dry, c(ground.awk = example$script("snow.awk")),
+                         free("melt", uniform(3, 7), "mm/(K d)"),
                          free("covered", lognormal(6.3, 0.2), "mm"), boundary = "temperature")
   quick <- list(calibration = list(check = 8, ais = list(pilot_chains = 48, groups = 4)))
   calibrated <- function(model) {
@@ -131,7 +146,8 @@ test_that("snow is decisive on the mountain, and data held out gain by it", {
 })
 
 test_that("the loop names the snow of a mountain, and measures the gain", {
-  skip_if_not(identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true"), "the long forms (AMISS_EXTENDED_TESTS)")
+  skip_if_not(identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true"),
+              "the long forms (AMISS_EXTENDED_TESTS)")
   if (.Platform$OS.type == "unix") {
     future::plan("multicore", workers = 2)
     withr::defer(future::plan("sequential"))

@@ -1,11 +1,13 @@
-# A simulator that counts its runs and does as `misbehave(count, series)` says from the run `after` on.
+# A simulator that counts its runs and does as `misbehave(count, series)` says from the run `after`
+# on.
 counting <- function(misbehave, after) {
   count <- 0
   function_simulator(function(values, drivers) {
     count <<- count + 1
     series <- values[["offset"]] + values[["gain"]] * drivers[, "Te"]
     if (count > after) misbehave(count - after, series) else series
-  }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te", name = "counting")
+  }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te",
+     name = "counting")
 }
 
 # Runs misbehave at posterior draws alone: the design has 30.
@@ -20,7 +22,8 @@ test_that("a good emulator passes the check by runs", {
   expect_true(fit$check$passed)
   expect_lt(fit$check$ratio, 0.01)  # two vectors hold a linear simulator exactly
   expect_true(fit$trust$trusted)
-  expect_match(fit$check$verdict, sprintf("by %d runs of the simulator at posterior draws", fit$check$runs),
+  expect_match(fit$check$verdict,
+               sprintf("by %d runs of the simulator at posterior draws", fit$check$runs),
                fixed = TRUE)
   expect_identical(glance(fit)$emulator_error, fit$check$ratio)
   expect_equal(fitted(fit), fit$check$mean)
@@ -30,14 +33,18 @@ test_that("the error of the check is that of runs at the record's rows", {
   fit <- linear_fit()
   made <- amiss:::posterior_runs(fit, amiss:::even_draws(fit, 40), 1)
   own <- function(i) {
-    run <- fit$values[made$draws[i], "offset"] + fit$values[made$draws[i], "gain"] * linear_data()$Te
+    run <- fit$values[made$draws[i], "offset"] +
+      fit$values[made$draws[i], "gain"] * linear_data()$Te
     run - stats::predict(fit$emulator, fit$values[made$draws[i], , drop = FALSE])$mean[, 1]
   }
   # Both are differences of numbers near 25: rounding, of 1e-4.
-  expect_equal(fit$check$error, sqrt(mean(vapply(seq_along(made$draws), own, numeric(240))^2)), tolerance = 1e-6)
+  expect_equal(fit$check$error, sqrt(mean(vapply(seq_along(made$draws), own, numeric(240))^2)),
+               tolerance = 1e-6)
   expect_equal(fit$check$ratio, fit$check$error / fit$check$noise)
-  # White error of 0.1, as stated: the noise that it is measured by lies within what 240 values tell of it.
-  white <- calibrate(fit$emulator, fit$measurements, c(quick_ais, list(error_times = numeric())), seed = 3)
+  # White error of 0.1, as stated: the noise that it is measured by lies within what 240 values tell
+  # of it.
+  white <- calibrate(fit$emulator, fit$measurements, c(quick_ais, list(error_times = numeric())),
+                     seed = 3)
   expect_lt(abs(white$check$noise - 0.1), 0.1 * 4 / sqrt(2 * 240))
 })
 
@@ -53,8 +60,9 @@ test_that("a smooth error counts less where the measurement error is smooth", {
   white <- ratio(0L, smooth)
   expect_equal(white, sqrt(mean(smooth^2)) / 0.1, tolerance = 1e-8)
   expect_equal(ratio(0L, rough), sqrt(mean(rough^2)) / 0.1, tolerance = 1e-8)
-  # Setting 5: an Ornstein-Uhlenbeck part of 30 times the white variance over two steps. Its spectrum over its variance
-  # is 4.1 for slow errors and 0.25 for those that alternate; both count over the larger noise seen, by the root of 31.
+  # Setting 5: an Ornstein-Uhlenbeck part of 30 times the white variance over two steps. Its
+  # spectrum over its variance is 4.1 for slow errors and 0.25 for those that alternate; both count
+  # over the larger noise seen, by the root of 31.
   expect_equal(ratio(5L, smooth) / white, sqrt(31 / (1 + 30 * 4.1)), tolerance = 0.1)
   expect_equal(ratio(5L, rough) / white, sqrt(31 / (1 + 30 * 0.25)), tolerance = 0.1)
 })
@@ -62,19 +70,22 @@ test_that("a smooth error counts less where the measurement error is smooth", {
 test_that("spoiled coefficients fail the check, and the calibration says why it is not trusted", {
   m <- linear_measurements()
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m)
-  emulator$processes$coefficients <- 1.02 * emulator$processes$coefficients  # 2 % of 24 K beside a noise of 0.1 K
+  # 2 % of 24 K beside a noise of 0.1 K
+  emulator$processes$coefficients <- 1.02 * emulator$processes$coefficients
   fit <- calibrate(emulator, m, quick_ais, seed = 3)
   expect_false(fit$check$passed)
   expect_gt(fit$check$ratio, 1)
   expect_false(fit$trust$trusted)
-  expect_match(fit$trust$verdict, "not trusted: by .* runs .* of the noise, more than a third: it is not good enough")
+  expect_match(fit$trust$verdict,
+               "not trusted: by .* runs .* of the noise, more than a third: it is not good enough")
   expect_false(glance(fit)$trusted)
   expect_match(printed(fit), "not good enough")
 })
 
 test_that("too few runs fail the check", {
   m <- bent_measurements()
-  fit <- calibrate(train_emulator(simulate_design(bent_simulator(), m, runs = 6, seed = 1), m), m, quick_ais, seed = 1)
+  fit <- calibrate(train_emulator(simulate_design(bent_simulator(), m, runs = 6, seed = 1), m), m,
+                   quick_ais, seed = 1)
   expect_gt(fit$check$ratio, 1)
   expect_false(fit$trust$trusted)
 })
@@ -104,22 +115,25 @@ test_that("runs that fail at posterior draws are left out and told", {
 
 test_that("where more than a fifth of the runs at posterior draws fail, one of them is named", {
   expect_error(checked(function(k, y) if (k %% 3 == 0) NaN * y else y),
-               "failed at 1[23] of [34][0-9] draws.*more than 20 %.*first is run 3 at offset = [0-9.]+, gain = [0-9.]+",
-               class = "amiss_error_numerical")
+               paste("failed at 1[23] of [34][0-9] draws.*more than 20 %.*first is run 3 at",
+                     "offset = [0-9.]+, gain = [0-9.]+"), class = "amiss_error_numerical")
   expect_error(checked(function(k, y) stop("no steady state")), "failed at ([34][0-9]) of \\1",
                class = "amiss_error_numerical")
 })
 
 test_that("a simulator that returns another number of values at posterior draws is refused", {
-  expect_error(checked(function(k, y) y[-1]), "returned 239 value.*240 numbers", class = "amiss_error_input")
-  expect_error(checked(function(k, y) as.character(y)), "class <character>", class = "amiss_error_input")
+  expect_error(checked(function(k, y) y[-1]), "returned 239 value.*240 numbers",
+               class = "amiss_error_input")
+  expect_error(checked(function(k, y) as.character(y)), "class <character>",
+               class = "amiss_error_input")
 })
 
 test_that("runs made elsewhere are checked by those left out", {
   m <- bent_measurements()
   elsewhere <- function(runs) {
     made <- simulate_design(bent_simulator(), m, runs, seed = 1)
-    calibrate(train_emulator(ensemble(made$values, made$outputs, made$parameters), m), m, quick_ais, seed = 1)
+    calibrate(train_emulator(ensemble(made$values, made$outputs, made$parameters), m), m, quick_ais,
+              seed = 1)
   }
   good <- elsewhere(60)
   expect_true(good$check$passed)
@@ -135,7 +149,8 @@ test_that("runs made elsewhere are checked by those left out", {
 
 test_that("of a linear simulator the exact evidence is the emulated one", {
   fit <- linear_fit()
-  # The emulator's error is below 1e-3 of the noise, at 240 rows: less than 0.05 nats of a likelihood.
+  # The emulator's error is below 1e-3 of the noise, at 240 rows: less than 0.05 nats of a
+  # likelihood.
   expect_lt(abs(fit$check$correction), 0.05)
   expect_equal(fit$log_evidence, fit$posterior$log_evidence + fit$check$correction)
   expect_gt(fit$check$effective, 0.99)
@@ -144,7 +159,8 @@ test_that("of a linear simulator the exact evidence is the emulated one", {
 test_that("with a coarse basis the exact evidence comes closer to that of a fine one", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, runs = 40, seed = 2)
-  calibrated <- function(control) suppressWarnings(calibrate(train_emulator(runs, m, control), m, quick_ais, seed = 1))
+  calibrated <- function(control)
+    suppressWarnings(calibrate(train_emulator(runs, m, control), m, quick_ais, seed = 1))
   fine <- calibrated(list(explained = 1, noise_fraction = 1e-6))
   for (noise_fraction in c(1, 10)) {
     coarse <- calibrated(list(explained = 0.5, noise_fraction = noise_fraction))

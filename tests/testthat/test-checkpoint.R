@@ -31,12 +31,14 @@ test_that("a damaged or foreign file counts as absent and is told", {
   whole <- readBin(file, "raw", file.size(file))
   flipped <- readRDS(file)
   flipped$bytes[500] <- xor(flipped$bytes[500], as.raw(1))
-  damages <- list(function() writeBin(whole[seq_len(length(whole) / 2)], file), function() writeBin(raw(), file),
-                  function() writeLines("mine", file), function() saveRDS(3, file), function() saveRDS(flipped, file),
+  damages <- list(function() writeBin(whole[seq_len(length(whole) / 2)], file),
+                  function() writeBin(raw(), file), function() writeLines("mine", file),
+                  function() saveRDS(3, file), function() saveRDS(flipped, file),
                   function() saveRDS(pack(4, "another"), file))
   for (damage in damages) {
     damage()
-    expect_message(expect_identical(keep("a", 7), 7), "damaged or not from this package", class = "amiss_message_kept")
+    expect_message(expect_identical(keep("a", 7), 7), "damaged or not from this package",
+                   class = "amiss_message_kept")
     expect_silent(expect_identical(keep("a", 8), 7))
   }
 })
@@ -47,7 +49,8 @@ test_that("what cannot be written is told and does not stop the run", {
   short <- function(object, file) writeBin(as.raw(1:9), file)
   full <- function(object, file) stop("no space left")
   for (write in list(short, full)) {
-    expect_message(keep_value(1, file, "x", write), "could not be kept", class = "amiss_message_kept")
+    expect_message(keep_value(1, file, "x", write), "could not be kept",
+                   class = "amiss_message_kept")
     expect_length(dir(folder), 0)
   }
   blocked <- file.path(folder, "afile")
@@ -65,11 +68,12 @@ test_that("a process killed while it writes leaves nothing that is taken for who
   skip_on_cran()  # second tier: tools/test --quick
   skip_on_os("windows")
   folder <- withr::local_tempdir()
-  kill <- "function(object, file) { writeBin(as.raw(1:99), file); tools::pskill(Sys.getpid(), 9); Sys.sleep(9) }"
+  kill <- paste("function(object, file) { writeBin(as.raw(1:99), file);",
+                "tools::pskill(Sys.getpid(), 9); Sys.sleep(9) }")
   code <- sprintf("amiss:::keep_value(1, '%s', 'x', %s)", file.path(folder, "amiss-x.rds"), kill)
   withr::with_envvar(c(R_LIBS = paste(.libPaths(), collapse = ":")), {
-    suppressWarnings(system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)), stdout = FALSE,
-                             stderr = FALSE))
+    suppressWarnings(system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)),
+                             stdout = FALSE, stderr = FALSE))
   })
   expect_match(dir(folder), "^amiss-part-")
   expect_null(read_kept(file.path(folder, "amiss-x.rds"), "x"))
@@ -98,9 +102,12 @@ test_that("the key knows what a function captures, and nothing of how it was mad
   for (i in 1:3) fast(1)
   expect_equal(key(compiler::cmpfun(fast)), key(scaled(2)))
   expect_equal(key(unserialize(serialize(fast, NULL))), key(fast))
-  sourced <- function(text, keep) eval(parse(text = text, keep.source = keep), new.env(parent = asNamespace("amiss")))
-  expect_equal(key(sourced("a <- 1; function(x) a", TRUE)), key(sourced("a <- 1; function(x)   a # note", FALSE)))
-  expect_false(key(sourced("a <- 1; function(x) a", TRUE)) == key(sourced("a <- 1 + 1e-15; function(x) a", TRUE)))
+  sourced <- function(text, keep)
+    eval(parse(text = text, keep.source = keep), new.env(parent = asNamespace("amiss")))
+  expect_equal(key(sourced("a <- 1; function(x) a", TRUE)),
+               key(sourced("a <- 1; function(x)   a # note", FALSE)))
+  expect_false(key(sourced("a <- 1; function(x) a", TRUE)) ==
+               key(sourced("a <- 1 + 1e-15; function(x) a", TRUE)))
   expect_equal(key(1:10), key(c(1L, 2L, 3L, 4L, 5L, 6L, 7L, 8L, 9L, 10L)))
   formula <- function(a) y ~ a
   expect_false(key(formula(1)) == key(formula(2)))
@@ -110,7 +117,8 @@ test_that("the key knows the globals that a function names", {
   withr::defer(rm(list = c("amiss_test_f", "amiss_test_g"), envir = globalenv()))
   made <- function(by) {
     assign("amiss_test_g", by, globalenv())
-    assign("amiss_test_f", eval(quote(function(x) if (x > 9) amiss_test_f(x - 1) else amiss_test_g), globalenv()),
+    assign("amiss_test_f",
+           eval(quote(function(x) if (x > 9) amiss_test_f(x - 1) else amiss_test_g), globalenv()),
            globalenv())
     content_hash(plain(list(eval(quote(function(x) amiss_test_f(x)), globalenv()))))
   }
@@ -131,16 +139,17 @@ test_that("a seed that was drawn is kept with the work, one that was given is no
   expect_false(kept_seed(NULL, NULL) == drawn)
   remove_kept(folder)
   expect_false(dir.exists(folder))
-  expect_error(kept_seed(NULL, file.path(system.file("DESCRIPTION", package = "amiss"), "in")), "checkpoint",
-               class = "amiss_error_input")
+  expect_error(kept_seed(NULL, file.path(system.file("DESCRIPTION", package = "amiss"), "in")),
+               "checkpoint", class = "amiss_error_input")
 })
 
 test_that("an edited model does not go on with the old one's work", {
   folder <- withr::local_tempdir()
   m <- linear_measurements(linear_data(60))
   kept <- function(slope) {
-    model <- function_simulator(function(values, drivers) values[["offset"]] + slope * drivers[, "Te"],
-                                free("offset", uniform(10, 30)), boundary = "Te")
+    model <- function_simulator(
+      function(values, drivers) values[["offset"]] + slope * drivers[, "Te"],
+      free("offset", uniform(10, 30)), boundary = "Te")
     checkpoint_keeper(folder, list(m))(list("fit", "base", plain(model)), slope)
   }
   expect_equal(kept(0.4), 0.4)

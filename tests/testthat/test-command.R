@@ -2,16 +2,16 @@
 exit_code <- function(...) {
   command <- system.file("exec", "amiss", package = "amiss")
   skip_if(command == "", "the command is not installed")
-  suppressWarnings(system2(file.path(R.home("bin"), "Rscript"), c(shQuote(command), ...), stdout = FALSE,
-                           stderr = FALSE,
+  suppressWarnings(system2(file.path(R.home("bin"), "Rscript"), c(shQuote(command), ...),
+                           stdout = FALSE, stderr = FALSE,
                            env = paste0("R_LIBS=", paste(.libPaths(), collapse = ":"))))
 }
 
 test_that("the command ends with 0 when the study ran, with the seed that it was given", {
   skip_on_cran()
   folder <- withr::local_tempdir()
-  expect_equal(exit_code("run", shQuote(write_study_file(folder)), "--out", shQuote(file.path(folder, "out")),
-                         "--quiet", "--trust", "--seed", "9"), 0)
+  expect_equal(exit_code("run", shQuote(write_study_file(folder)), "--out",
+                         shQuote(file.path(folder, "out")), "--quiet", "--trust", "--seed", "9"), 0)
   expect_equal(jsonlite::read_json(file.path(folder, "out", "result.json"))$seed, 9)
 })
 
@@ -28,7 +28,8 @@ test_that("the command ends with 0 when it was asked for help", {
 test_that("the command ends with 1 when the study is refused, and leaves nothing", {
   folder <- withr::local_tempdir()
   bad <- write_study_file(folder, target = "nothing")
-  expect_equal(exit_code("run", shQuote(bad), "--out", shQuote(file.path(folder, "bad")), "--trust"), 1)
+  expect_equal(
+    exit_code("run", shQuote(bad), "--out", shQuote(file.path(folder, "bad")), "--trust"), 1)
   expect_false(file.exists(file.path(folder, "bad")))
 })
 
@@ -36,7 +37,8 @@ test_that("the command ends with 1 when the study is refused, and leaves nothing
 said <- function(...) {
   told <- NULL
   study <- write_study_file(withr::local_tempdir())
-  status <- withCallingHandlers(run_command(c("run", study, "--out", "x", ...)), message = function(m) {
+  status <- withCallingHandlers(run_command(c("run", study, "--out", "x", ...)),
+                                message = function(m) {
     told <<- conditionMessage(m)
     invokeRestart("muffleMessage")
   })
@@ -60,5 +62,6 @@ test_that("the command refuses words that it does not know", {
 
 test_that("the command says its options and its version", {
   expect_output(expect_equal(run_command(c("run", "--help")), 0), "--trust")
-  expect_output(expect_equal(run_command("--version"), 0), as.character(utils::packageVersion("amiss")))
+  expect_output(expect_equal(run_command("--version"), 0),
+                as.character(utils::packageVersion("amiss")))
 })

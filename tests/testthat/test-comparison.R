@@ -2,12 +2,15 @@
 line <- function(..., f, boundary = c("Te", "Gv")) function_simulator(f, ..., boundary = boundary)
 offset <- free("offset", uniform(10, 30), "K")
 gain <- free("gain", uniform(0, 1))
-blind <- line(offset, gain, f = function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"])
+blind <- line(offset, gain,
+              f = function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"])
 sunny <- line(offset, gain, free("sun", uniform(0, 0.01), "K/(W/m2)"),
-              f = function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"] +
+              f = function(values, drivers)
+                values[["offset"]] + values[["gain"]] * drivers[, "Te"] +
                 values[["sun"]] * drivers[, "Gv"])
 other <- line(offset, free("slope", uniform(-1, 1)),
-              f = function(values, drivers) values[["offset"]] + values[["slope"]] * drivers[, "Gv"] / 100)
+              f = function(values, drivers)
+                values[["offset"]] + values[["slope"]] * drivers[, "Gv"] / 100)
 
 sunny_data <- function(n = 90) {
   data <- linear_data(n)
@@ -17,12 +20,13 @@ sunny_data <- function(n = 90) {
 
 rough_ais <- list(ais = list(pilot_chains = 24, groups = 4, chains = 12, importance_draws = 200))
 
-compare_linear <- function(models = list(blind = blind, sunny = sunny, other = other), method = "paper", m = NULL,
+compare_linear <- function(models = list(blind = blind, sunny = sunny, other = other),
+                           method = "paper", m = NULL,
                            ...) {
   data <- sunny_data()
   m <- m %||% linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60)
-  compare_models(models, m, method, runs = 12, control = list(calibration = rough_ais, ...), seed = 3, threads = 2,
-                 quiet = TRUE)
+  compare_models(models, m, method, runs = 12, control = list(calibration = rough_ais, ...),
+                 seed = 3, threads = 2, quiet = TRUE)
 }
 
 compared <- compare_linear()
@@ -35,18 +39,21 @@ test_that("likelihood, AIC, BIC and the likelihood ratio are those of lm()", {
   fits <- list(stats::lm(Ti ~ Te, data), stats::lm(Ti ~ Te + Gv, data), stats::lm(Ti ~ Gv, data))
   table <- tidy(compared, "criteria")
   # nlminb stops where the sum of squares no longer changes by 1e-10 of itself.
-  expect_equal(table$log_likelihood, vapply(fits, function(f) as.numeric(stats::logLik(f)), 0), tolerance = 1e-7)
+  expect_equal(table$log_likelihood, vapply(fits, function(f) as.numeric(stats::logLik(f)), 0),
+               tolerance = 1e-7)
   expect_equal(table$aic, vapply(fits, stats::AIC, 0), tolerance = 1e-7)
   expect_equal(table$bic, vapply(fits, stats::BIC, 0), tolerance = 1e-7)
   expect_equal(table$k, c(3, 4, 3))
-  expect_equal(table$lr[2], 2 * as.numeric(stats::logLik(fits[[2]]) - stats::logLik(fits[[1]])), tolerance = 1e-6)
+  expect_equal(table$lr[2], 2 * as.numeric(stats::logLik(fits[[2]]) - stats::logLik(fits[[1]])),
+               tolerance = 1e-6)
   expect_equal(table$lr_p_value[2], stats::pchisq(table$lr[2], 1, lower.tail = FALSE))
   expect_identical(table$nested, c(NA, "blind", NA))
-  expect_equal(table$autocorrelation[1], stats::cor(residuals(fits[[1]])[-1], residuals(fits[[1]])[-60]),
-               tolerance = 1e-5)
+  expect_equal(table$autocorrelation[1],
+               stats::cor(residuals(fits[[1]])[-1], residuals(fits[[1]])[-60]), tolerance = 1e-5)
   expect_true(all(table$converged))
   best <- compared$models$sunny$best$values
-  expect_equal(unname(best[c("offset", "gain", "sun")]), unname(stats::coef(fits[[2]])), tolerance = 1e-5)
+  expect_equal(unname(best[c("offset", "gain", "sun")]), unname(stats::coef(fits[[2]])),
+               tolerance = 1e-5)
 })
 
 test_that("evidence, Bayes factors and probabilities are those of the calibrations", {
@@ -57,7 +64,8 @@ test_that("evidence, Bayes factors and probabilities are those of the calibratio
   expect_identical(compared$models$sunny$fit$log_evidence, alone$log_evidence)
   expect_equal(table$log10_evidence[2], alone$log_evidence / log(10))
   expect_equal(sum(table$probability), 1)
-  expect_equal(log10(table$probability[1] / table$probability[2]), table$log10_evidence[1] - table$log10_evidence[2])
+  expect_equal(log10(table$probability[1] / table$probability[2]),
+               table$log10_evidence[1] - table$log10_evidence[2])
   factor <- bayes_factor(compared$models$sunny$fit, compared$models$blind$fit)
   expect_identical(table$model[which.min(table$rank)], "sunny")
   expect_equal(unlist(table[2, c("log10_bf", "bf_lower95", "bf_upper95")], use.names = FALSE),
@@ -69,14 +77,16 @@ test_that("evidence, Bayes factors and probabilities are those of the calibratio
   expect_identical(table$against[table$rank == 3], table$model[table$rank == 2])
   expect_equal(table$log10_bf_first[1], 0)
   expect_equal(glance(compared)$model, "sunny")
-  expect_identical(subset(tidy(compared, "attribution"), model == "sunny", -model)$boundary, alone$index$boundary)
+  expect_identical(subset(tidy(compared, "attribution"), model == "sunny", -model)$boundary,
+                   alone$index$boundary)
 })
 
 test_that("scores are those of predictions, at calibration and held-out rows", {
   model <- compared$models$sunny
   p <- predict(model$fit, use = "validate")
   expect_equal(unname(model$scores$validate[["rmse"]]), sqrt(mean((p$observed - p$mean)^2)))
-  expect_equal(tidy(compared, "criteria")$rmse_validation[2], unname(model$scores$validate[["rmse"]]))
+  expect_equal(tidy(compared, "criteria")$rmse_validation[2],
+               unname(model$scores$validate[["rmse"]]))
   expect_lt(tidy(compared, "criteria")$rmse_validation[2], 0.15)  # noise of 0.1
   data <- sunny_data()
   alone <- compare_linear(list(blind = blind), m = linear_measurements(data))
@@ -94,7 +104,8 @@ test_that("a disagreement between criteria and evidence is told", {
   expect_identical(disagreements(x), c(aic = "blind"))
   x$tables$ranking$bic <- c(3, 1, 2)
   expect_match(disagreement_sentences(x)[1], "AIC would choose blind; the evidence chooses sunny")
-  expect_match(disagreement_sentences(x)[2], "Of 3 pairs of models, AIC puts 1 and BIC puts 1 in another order")
+  expect_match(disagreement_sentences(x)[2],
+               "Of 3 pairs of models, AIC puts 1 and BIC puts 1 in another order")
   x$tables$criteria$lr_p_value[2] <- 0.3
   expect_match(disagreement_sentences(x)[3], "does not prefer sunny to blind")
 })
@@ -109,7 +120,8 @@ test_that("what cannot be trusted is told", {
   expect_match(told, "sunny: the basis is coarse", all = FALSE)
   narrow <- line(free("offset", uniform(20.5, 30)), gain, f = blind$f)
   narrow <- compare_linear(list(narrow = narrow, wide = sunny))
-  expect_match(doubt_sentences(narrow), "edge of what was thought possible: narrow: offset", all = FALSE)
+  expect_match(doubt_sentences(narrow), "edge of what was thought possible: narrow: offset",
+               all = FALSE)
   expect_true(is.na(tidy(narrow, "criteria")$nested[2]))  # another prior: not nested
 })
 
@@ -121,7 +133,8 @@ test_that("the chi-square test is called invalid at the edge of a range", {
 
 test_that("the history method carries its own attribution", {
   x <- compare_linear(list(blind = blind, sunny = sunny), "history",
-                      attribution = list(surrogates = 19, ais = list(pilot_chains = 24, groups = 4)))
+                      attribution = list(surrogates = 19,
+                                         ais = list(pilot_chains = 24, groups = 4)))
   expect_s3_class(x$models$blind$fit, "amiss_calibration")
   expect_true(all(c("log10_bf_dropped", "p_value") %in% names(tidy(x, "attribution"))))
   expect_identical(glance(x)$model, "sunny")
@@ -130,24 +143,30 @@ test_that("the history method carries its own attribution", {
   expect_true(ggplot2::is.ggplot(ggplot2::autoplot(x, "attribution")))
 })
 
-test_that("a comparison prints within fifteen lines, draws all figures and says what is wrong with its arguments", {
+test_that(paste("a comparison prints within fifteen lines, draws all figures and says what is",
+                "wrong with its arguments"), {
   expect_lte(length(capture.output(print(compared))), 15)
   grDevices::pdf(NULL)
   withr::defer(grDevices::dev.off())
-  for (which in figures_of(compared)) expect_error(ggplot2::ggplot_build(ggplot2::autoplot(compared, which)), NA)
+  for (which in figures_of(compared))
+    expect_error(ggplot2::ggplot_build(ggplot2::autoplot(compared, which)), NA)
   expect_error(plot(compared, "heat_loss"), class = "amiss_error_input")
   expect_error(tidy(compared, "nonsense"), class = "amiss_error_input")
   m <- compared$measurements
   expect_error(compare_models(list(blind, sunny), m), "named list", class = "amiss_error_input")
-  expect_error(compare_models(list(a = blind, b = 3), m), "Model \"b\" is no simulator", class = "amiss_error_input")
-  expect_error(compare_models(list(a = blind), m, "guess"), "method", class = "amiss_error_input")
-  expect_error(compare_models(list(a = blind), m, control = list(attribution = list(surrogates = 9))), "belongs to",
+  expect_error(compare_models(list(a = blind, b = 3), m), "Model \"b\" is no simulator",
                class = "amiss_error_input")
+  expect_error(compare_models(list(a = blind), m, "guess"), "method", class = "amiss_error_input")
+  expect_error(compare_models(list(a = blind), m,
+                              control = list(attribution = list(surrogates = 9))),
+               "belongs to", class = "amiss_error_input")
   expect_error(compare_models(list(a = blind), m, control = list(steps = 1)), "unknown option",
                class = "amiss_error_input")
-  expect_error(compare_models(list(a = blind), m, truth = list(values = 1)), "truth", class = "amiss_error_input")
+  expect_error(compare_models(list(a = blind), m, truth = list(values = 1)), "truth",
+               class = "amiss_error_input")
   nameless <- line(offset, f = blind$f, boundary = "Gh")
-  expect_error(compare_models(list(lacking = nameless), m, quiet = TRUE), "lacking", class = "amiss_error_input")
+  expect_error(compare_models(list(lacking = nameless), m, quiet = TRUE), "lacking",
+               class = "amiss_error_input")
 })
 
 test_that("an interrupted comparison goes on where it stopped, with the same bits on one thread", {
@@ -164,7 +183,8 @@ test_that("an interrupted comparison goes on where it stopped, with the same bit
   expect_identical(tidy(both, "criteria"), tidy(compared, "criteria"))
 })
 
-test_that("the paper's discrepancy over time lies outside the simulation space, with the variance of the formula", {
+test_that(paste("the paper's discrepancy over time lies outside the simulation space, with the",
+                "variance of the formula"), {
   fit <- compared$models$blind$fit
   d <- discrepancy(fit)
   expect_s3_class(d, "amiss_discrepancy")
@@ -184,8 +204,9 @@ test_that("the paper's discrepancy over time lies outside the simulation space, 
   inside <- t(h) %*% z %*% h
   covariance <- inside - inside %*% solve(inside + diag(0.1, nrow(inside)), inside)
   # The fictitious condition, the last, is constant.
-  own <- paper_discrepancy_(paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
-                            list(alpha = rbind(alpha), t2 = 0.2, lambda = 10), engine_context(1, 1))
+  own <- paper_discrepancy_(paper_data(fit$emulator, fit$measurements, fit$rows, fit$control),
+                            fit$priors, list(alpha = rbind(alpha), t2 = 0.2, lambda = 10),
+                            engine_context(1, 1))
   expect_equal(own$variance[, 1], diag(h %*% covariance %*% t(h)), tolerance = 1e-8)
 })
 

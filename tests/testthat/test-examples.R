@@ -1,7 +1,8 @@
 # Sessions of their own, as users have them; they find the package where this one does.
 run_example <- function(file, arguments = character(), folder = withr::local_tempdir()) {
   withr::local_envvar(R_LIBS = paste(.libPaths(), collapse = .Platform$path.sep))
-  processx::run(file.path(R.home("bin"), "Rscript"), c(file, arguments), wd = folder, error_on_status = FALSE)
+  processx::run(file.path(R.home("bin"), "Rscript"), c(file, arguments), wd = folder,
+                error_on_status = FALSE)
 }
 
 example_file <- function(...) system.file("examples", ..., package = "amiss", mustWork = TRUE)
@@ -9,9 +10,11 @@ example_file <- function(...) system.file("examples", ..., package = "amiss", mu
 test_that("every exported function has a help page with an example", {
   pages <- tools::Rd_db("amiss")
   tags <- function(page) vapply(page, attr, "", "Rd_tag")
-  aliases <- function(page) vapply(page[tags(page) == "\\alias"], function(x) as.character(x[[1]]), "")
+  aliases <- function(page)
+    vapply(page[tags(page) == "\\alias"], function(x) as.character(x[[1]]), "")
   shown <- unlist(lapply(pages, function(page) if ("\\examples" %in% tags(page)) aliases(page)))
-  others <- c("tidy", "glance", "augment", "autoplot")  # of generics and ggplot2; their methods are among the pages
+  # of generics and ggplot2; their methods are among the pages
+  others <- c("tidy", "glance", "augment", "autoplot")
   expect_setequal(setdiff(getNamespaceExports("amiss"), c(shown, others)), character())
 })
 
@@ -48,7 +51,8 @@ test_that("the targets pipeline runs", {
 test_that("the batch job runs both houses and refuses to guess where to write", {
   skip_on_cran()  # second tier: tools/test --quick
   expect_match(run_example(example_file("batch.R"))$stderr, "usage: Rscript batch.R OUT")
-  skip_if_not(identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true"), "the long forms (AMISS_EXTENDED_TESTS)")
+  skip_if_not(identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true"),
+              "the long forms (AMISS_EXTENDED_TESTS)")
   skip_if_not_installed("future")
   folder <- withr::local_tempdir()
   result <- run_example(example_file("batch.R"), c("out", "--quick"), folder)

@@ -1,9 +1,12 @@
-# What a mechanism explains by itself: its Bayes factor with no unknown response to its conditions in either model.
+# What a mechanism explains by itself: its Bayes factor with no unknown response to its conditions
+# in either model.
 
-test_that("it is the factor, and what the present model loses without the response more than the extension", {
+test_that(paste("it is the factor, and what the present model loses without the response more than",
+                "the extension"), {
   upgrade <- small_upgrade()
   expect_gt(length(upgrade$models), 1)
-  row <- upgrade$candidates[upgrade$candidates$from == "base" & upgrade$candidates$mechanism == "sun", ]
+  row <-
+    upgrade$candidates[upgrade$candidates$from == "base" & upgrade$candidates$mechanism == "sun", ]
   lost <- function(model) {
     table <- model$attribution$table
     table$log10_bf_dropped[table$boundary == "Gv"]

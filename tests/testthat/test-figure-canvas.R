@@ -10,8 +10,8 @@ skip_without_devices <- function() {
 
 # TRUE where nothing is drawn along the edges of the canvas: text that runs out of it crosses them.
 edges_blank <- function(figure, width, res = 120) {
-  captured <- ragg::agg_capture(width = width, height = figure_height(figure, width / res) * res, units = "px",
-                                res = res, background = "white")
+  captured <- ragg::agg_capture(width = width, height = figure_height(figure, width / res) * res,
+                                units = "px", res = res, background = "white")
   withr::defer(grDevices::dev.off())
   print(figure)
   pixels <- captured(native = FALSE)
@@ -37,7 +37,8 @@ test_that("no text leaves the canvas, whatever its width and font", {
 
 test_that("titles of a fixed number of letters leave it", {
   skip_without_devices()
-  figure <- withr::with_options(list(amiss.font = fonts[1]), ggplot2::autoplot(small_upgrade(), "attribution"))
+  figure <- withr::with_options(list(amiss.font = fonts[1]),
+                                ggplot2::autoplot(small_upgrade(), "attribution"))
   figure$labels$subtitle <- paste(strwrap(figure$labels$subtitle, 92), collapse = "\n")
   class(figure) <- setdiff(class(figure), "amiss_figure")
   expect_false(edges_blank(figure, 800))
@@ -61,7 +62,8 @@ test_that("lines are as long as the width allows, in the font at hand", {
     lines <- strsplit(wrap_measured(with_unit, width, 12), "\n")[[1]]
     expect_match(lines[length(lines)], "/ K$")
   }
-  expect_identical(wrap_measured("neighbouring K", text_inches("neighbouring", 12) * 1.02, 12), "neighbouring\nK")
+  expect_identical(wrap_measured("neighbouring K", text_inches("neighbouring", 12) * 1.02, 12),
+                   "neighbouring\nK")
 })
 
 test_that("a figure keeps its whole title, and builds without a device", {
@@ -73,14 +75,15 @@ test_that("a figure keeps its whole title, and builds without a device", {
 })
 
 test_that("figures look as they did", {
-  for (file in c("measurements.svg", "sampler.svg")) announce_snapshot_file(name = file)  # kept where this is skipped
+  # kept where this is skipped
+  for (file in c("measurements.svg", "sampler.svg")) announce_snapshot_file(name = file)
   skip_on_cran()
   skip_if_not_installed("vdiffr")
   version <- utils::packageVersion("ggplot2")
   skip_if_not(version >= "3.4.1" && version < "3.5", "drawn with ggplot2 3.4")
-  m <- measurements(data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4)), time = "hour",
-                    target = "Ti",
-                    boundary = ~Te, noise_sd = 0.1, warmup = 6, unit = "K", name = "a room")
+  m <- measurements(data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4)),
+                    time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6,
+                    unit = "K", name = "a room")
   vdiffr::expect_doppelganger("measurements", ggplot2::autoplot(m))
   ladder <- data.frame(beta = c(0.1, 0.4, 1), step = 1, sweeps = 3, acceptance = c(0.4, 0.3, 0.25),
                        ess = c(0.7, 0.6, 0.65))
@@ -91,9 +94,10 @@ test_that("figures look as they did", {
 
 test_that("Sobol indices stay on the canvas", {
   skip_without_devices()
-  table <- data.frame(parameter = c("a", "b", "c"), first = c(0.6, 0.2, 0), first_sampling = 0.02, first_emulator = 0.1,
-                      total = c(0.7, 0.3, 0.02), total_sampling = 0.01, total_emulator = 0.05,
-                      label = c("conductivity of the insulation of all outer walls", "g", "air changes per hour"))
+  table <- data.frame(
+    parameter = c("a", "b", "c"), first = c(0.6, 0.2, 0), first_sampling = 0.02,
+    first_emulator = 0.1, total = c(0.7, 0.3, 0.02), total_sampling = 0.01, total_emulator = 0.05,
+    label = c("conductivity of the insulation of all outer walls", "g", "air changes per hour"))
   indices <- structure(list(format_version = format_version, table = table), class = "amiss_sobol")
   for (width in widths) expect_true(edges_blank(ggplot2::autoplot(indices), width), info = width)
 })

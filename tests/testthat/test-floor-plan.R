@@ -6,25 +6,31 @@ skip_without_sources <- function() {
 }
 
 rooms_of <- function(files) {
-  lines <- grep("^\\| [a-z]+ \\| `", readLines(file.path(root, "ARCHITECTURE.md"), encoding = "UTF-8"), value = TRUE)
-  patterns <- lapply(regmatches(lines, gregexpr("`[^`]+`", lines)), function(x) utils::glob2rx(gsub("`", "", x)))
+  lines <- grep("^\\| [a-z]+ \\| `",
+                readLines(file.path(root, "ARCHITECTURE.md"), encoding = "UTF-8"), value = TRUE)
+  patterns <- lapply(regmatches(lines, gregexpr("`[^`]+`", lines)),
+                     function(x) utils::glob2rx(gsub("`", "", x)))
   lapply(files, function(f) which(vapply(patterns, function(p) any(vapply(p, grepl, NA, f)), NA)))
 }
 
-# Which file calls which: list(from, to, what), from the names that the functions of each file ask for.
+# Which file calls which: list(from, to, what), from the names that the functions of each file ask
+# for.
 calls_between <- function(files) {
   parsed <- lapply(file.path(root, "R", paste0(files, ".R")), parse, keep.source = FALSE)
-  defined <- lapply(parsed, function(file) Filter(function(e) rlang::is_call(e, "<-") && !is.call(e[[2]]), file))
+  defined <- lapply(
+    parsed, function(file) Filter(function(e) rlang::is_call(e, "<-") && !is.call(e[[2]]), file))
   home <- stats::setNames(rep(files, lengths(defined)),
                           unlist(lapply(defined, vapply, function(e) as.character(e[[2]])[1], "")))
   asked <- function(e) {
     value <- e[[3]]
-    f <- if (rlang::is_call(value, "function")) eval(value, globalenv()) else rlang::new_function(NULL, value)
+    f <- if (rlang::is_call(value, "function")) eval(value, globalenv())
+         else rlang::new_function(NULL, value)
     intersect(codetools::findGlobals(f), names(home))
   }
   do.call(rbind, Map(function(from, definitions) {
     what <- unique(unlist(lapply(definitions, asked)))
-    calls <- data.frame(from = rep(from, length(what)), to = unname(home[what]), what = as.character(what))
+    calls <- data.frame(from = rep(from, length(what)), to = unname(home[what]),
+                        what = as.character(what))
     calls[calls$from != calls$to, ]
   }, files, defined))
 }
@@ -43,7 +49,8 @@ test_that("no file calls into a room below its own, and none in a circle", {
   expect_gt(nrow(calls), 300)
   rooms <- stats::setNames(vapply(rooms_of(files), `[`, 0L, 1), files)
   back <- calls[rooms[calls$from] < rooms[calls$to], ]
-  expect_identical(paste(back$from, "calls", back$what, "of", back$to, recycle0 = TRUE), character())
+  expect_identical(paste(back$from, "calls", back$what, "of", back$to, recycle0 = TRUE),
+                   character())
   left <- unique(calls[c("from", "to")])
   while (any(last <- !left$to %in% left$from)) left <- left[!last, ]
   expect_identical(nrow(left), 0L)

@@ -7,15 +7,18 @@ archive <- function(entries, ..., frame = parent.frame()) {
 
 description <- function(...) as_bytes(c(...))
 
-house_xml <- function(version = 2) readLines(file.path(fmu_sources, paste0("house", version, ".xml")))
+house_xml <- function(version = 2)
+  readLines(file.path(fmu_sources, paste0("house", version, ".xml")))
 
-refused <- function(file, pattern) expect_error(fmu_variables(file), pattern, class = "amiss_error_fmu")
+refused <- function(file, pattern)
+  expect_error(fmu_variables(file), pattern, class = "amiss_error_fmu")
 
 test_that("a file that is no archive, is cut off or holds no description is refused", {
   file <- withr::local_tempfile()
   refused(file, "no such file")
   refused(tempdir(), "no such file")
-  for (bytes in list(raw(), charToRaw("no archive"), charToRaw("PK\005\006"), as.raw(sample(0:255, 5000, TRUE)))) {
+  for (bytes in list(raw(), charToRaw("no archive"), charToRaw("PK\005\006"),
+                     as.raw(sample(0:255, 5000, TRUE)))) {
     writeBin(bytes, file)
     refused(file, "no zip archive")
   }
@@ -33,10 +36,13 @@ test_that("names that leave the folder, links, twins and what is encrypted are r
     entries[[name]] <- charToRaw("/etc/passwd")
     archive(entries, ..., frame = frame)
   }
-  for (name in c("../x", "resources/../../x", "/tmp/x", "C:/x", "..\\x", "resources/a\nb", "~/x", "{stop()}/../x")) {
+  for (name in c("../x", "resources/../../x", "/tmp/x", "C:/x", "..\\x", "resources/a\nb", "~/x",
+                 "{stop()}/../x")) {
     refused(with(name), "outside of its folder")
   }
-  refused(with("resources/link", modes = list("resources/link" = 41471)), "symbolic link.*resources/link")  # 0120777
+  # 0120777
+  refused(with("resources/link", modes = list("resources/link" = 41471)),
+          "symbolic link.*resources/link")
   refused(with("MODELDESCRIPTION.xml"), "twice")
   secret <- with("resources/a")
   bytes <- readBin(secret, "raw", 1e6)
@@ -63,7 +69,8 @@ test_that("a bomb is refused, and one that lies about its size is cut off", {
 })
 
 test_that("only the platform's library and the resources are unpacked", {
-  entries <- list(modelDescription.xml = description(house_xml()), "binaries/linux64/house.so" = charToRaw("a"),
+  entries <- list(modelDescription.xml = description(house_xml()),
+                  "binaries/linux64/house.so" = charToRaw("a"),
                   "binaries/win64/house.dll" = charToRaw("b"), "sources/house.c" = charToRaw("c"),
                   "resources/deep/start.txt" = charToRaw("d"))
   folder <- amiss:::unpack_fmu(archive(entries), "linux64")
@@ -72,21 +79,26 @@ test_that("only the platform's library and the resources are unpacked", {
 })
 
 test_that("entities, other encodings and what is no description are refused", {
-  of <- function(..., frame = parent.frame()) archive(list(modelDescription.xml = description(...)), frame = frame)
-  laughs <- c("<?xml version=\"1.0\"?>", "<!DOCTYPE x [<!ENTITY a \"ha\"> <!ENTITY b \"&a;&a;&a;\">]>",
+  of <- function(..., frame = parent.frame())
+    archive(list(modelDescription.xml = description(...)), frame = frame)
+  laughs <- c("<?xml version=\"1.0\"?>",
+              "<!DOCTYPE x [<!ENTITY a \"ha\"> <!ENTITY b \"&a;&a;&a;\">]>",
               "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"&b;\"/>")
   refused(of(laughs), "document type")
   refused(of("<!doctype x SYSTEM 'file:///etc/passwd'>"), "document type")
-  refused(archive(list(modelDescription.xml = iconv(paste(laughs, collapse = ""), to = "UTF-16LE", toRaw = TRUE)[[1]])),
-          "not UTF-8")
+  refused(archive(list(modelDescription.xml = iconv(paste(laughs, collapse = ""), to = "UTF-16LE",
+                                                    toRaw = TRUE)[[1]])), "not UTF-8")
   refused(of("<?xml version=\"1.0\" encoding=\"UTF-7\"?>", "<a/>"), "not UTF-8")
   refused(of("<html/>"), "no description of a model")
   refused(of("<fmiModelDescription"), "no XML")
   refused(of("{stop('run')}"), "no XML")
   refused(of("<fmiModelDescription fmiVersion=\"1.0\"/>"), "FMI \"1.0\".*Export it again")
-  refused(of(sub("modelIdentifier=\"house\"", "modelIdentifier=\"../house\"", house_xml())), "no identifier")
-  refused(of(sub("valueReference=\"3\"", "valueReference=\"x\"", house_xml())), "without a name, reference or type")
-  refused(of(sub("valueReference=\"3\"", "valueReference=\"-1\"", house_xml(3))), "without a name, reference or type")
+  refused(of(sub("modelIdentifier=\"house\"", "modelIdentifier=\"../house\"", house_xml())),
+          "no identifier")
+  refused(of(sub("valueReference=\"3\"", "valueReference=\"x\"", house_xml())),
+          "without a name, reference or type")
+  refused(of(sub("valueReference=\"3\"", "valueReference=\"-1\"", house_xml(3))),
+          "without a name, reference or type")
   only <- sub("<CoSimulation[^>]*>", "<ModelExchange modelIdentifier=\"house\"/>", house_xml())
   refused(of(only), "model exchange only.*Export it for co-simulation")
   refused(of(house_xml()[-3]), "no co-simulation")
@@ -117,11 +129,14 @@ test_that("a study runs an FMU only if it is trusted", {
   expect_true(file.exists(types_mark()))
 })
 
-test_that("an FMU for another platform is refused with the platforms that it has, and without any with that", {
-  other <- list(modelDescription.xml = description(house_xml()), "binaries/vax/house.so" = charToRaw("a"),
-                "binaries/c64/house.so" = charToRaw("a"), "binaries/linux64/readme.so" = charToRaw("a"))
+test_that(paste("an FMU for another platform is refused with the platforms that it has, and",
+                "without any with that"), {
+  other <- list(modelDescription.xml = description(house_xml()),
+                "binaries/vax/house.so" = charToRaw("a"), "binaries/c64/house.so" = charToRaw("a"),
+                "binaries/linux64/readme.so" = charToRaw("a"))
   run <- function(file) simulate_runs(house_fmu(file), cbind(R_out = 0.01), house_drivers(3), 1)
-  expect_error(run(archive(other)), "no library for this platform.*\"vax\" and \"c64\"", class = "amiss_error_fmu")
+  expect_error(run(archive(other)), "no library for this platform.*\"vax\" and \"c64\"",
+               class = "amiss_error_fmu")
   expect_error(run(archive(other[1])), "none for any", class = "amiss_error_fmu")
 })
 
@@ -129,7 +144,8 @@ test_that("an FMU that changed since it was declared is refused", {
   file <- house_file()
   house <- house_fmu(file)
   build_house(file, resources = list(start.txt = "21"), sources = fmu_sources)
-  expect_error(simulate_runs(house, cbind(R_out = 0.01), house_drivers(3), 1), "has changed", class = "amiss_error_fmu")
+  expect_error(simulate_runs(house, cbind(R_out = 0.01), house_drivers(3), 1), "has changed",
+               class = "amiss_error_fmu")
   unlink(file)
   expect_error(simulate_runs(house, cbind(R_out = 0.01), house_drivers(3), 1), "no such file",
                class = "amiss_error_fmu")
@@ -141,10 +157,11 @@ test_that("aliases, arrays and defaults of a description are read", {
   xml <- sub("(.*name=\"fault\".*)/>", "\\1><Dimension start=\"3\"/></Float64>", xml)
   file <- archive(list(modelDescription.xml = description(xml)))
   v <- fmu_variables(file)
-  expect_identical(v$use[match(c("leak", "draught", "fault"), v$name)], c("parameter", "parameter", ""))
+  expect_identical(v$use[match(c("leak", "draught", "fault"), v$name)],
+                   c("parameter", "parameter", ""))
   with <- function(...) fmu_simulator(file, ..., output = "T_air")
-  expect_error(with(free("leak", uniform(0, 1)), fixed = list(draught = 1)), "one variable under the names",
-               class = "amiss_error_input")
+  expect_error(with(free("leak", uniform(0, 1)), fixed = list(draught = 1)),
+               "one variable under the names", class = "amiss_error_input")
   expect_error(with(free("fault", uniform(0, 1))), "is an array", class = "amiss_error_input")
   expect_identical(v$unit[v$name == "T_wall"], "degC")
   expect_identical(v$variability[v$name == "T_air"], "continuous")

@@ -4,7 +4,8 @@ skip_on_os("windows")
 
 faulty <- function(file, ...) house_fmu(file, free("fault", uniform(0, 10)), ...)
 
-with_fault <- function(fault) cbind(R_out = seq(0.008, 0.012, length.out = length(fault)), fault = fault)
+with_fault <- function(fault)
+  cbind(R_out = seq(0.008, 0.012, length.out = length(fault)), fault = fault)
 
 # The warnings of a call. It stands by itself: expect_match() evaluates its argument twice.
 told_of <- function(code) {
@@ -22,8 +23,8 @@ test_that("each way to fail is told, and the session and the next runs go on", {
   skip_on_cran()  # second tier: tools/test --quick
   file <- house_file()
   house <- faulty(file, time_limit = 5)
-  why <- c("signal 6", "did not end within 1 s", "exit status 3", "signal 11", "not finite in row 1",
-           "discarded the step at 0", "fatal error for the step")
+  why <- c("signal 6", "did not end within 1 s", "exit status 3", "signal 11",
+           "not finite in row 1", "discarded the step at 0", "fatal error for the step")
   for (fault in seq_along(why)) {
     quick <- if (fault == 2) faulty(file, time_limit = 1) else house
     told <- told_of(runs <- simulate_runs(quick, with_fault(fault), house_drivers(3), 1))
@@ -47,10 +48,12 @@ test_that("no run is lost that succeeds, and those that fail cost no process tha
   expect_identical(which(is.nan(runs[1, ])), which(fault != 0))
   good <- house_fmu(house$file)
   expect_identical(runs[, fault == 0],
-                   simulate_runs(good, with_fault(fault)[fault == 0, "R_out", drop = FALSE], house_drivers(12), 1))
+                   simulate_runs(good, with_fault(fault)[fault == 0, "R_out", drop = FALSE],
+                                 house_drivers(12), 1))
   # The last process lives since run 18; those without a number did not end it.
   expect_identical(worker_of(house)$runs, 13 + sum(fault == 0))
-  expect_setequal(fmu_processes(), vapply(as.list(amiss:::fmu_workers), function(one) one$process$get_pid(), 0L))
+  expect_setequal(fmu_processes(),
+                  vapply(as.list(amiss:::fmu_workers), function(one) one$process$get_pid(), 0L))
 })
 
 test_that("a failed run is tried again in a new process, and a finished one is kept", {
@@ -66,9 +69,11 @@ test_that("a failed run is tried again in a new process, and a finished one is k
 })
 
 test_that("an FMU that is not to be instantiated twice has a process for each run", {
-  once <- function(lines) sub("<CoSimulation", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\"", lines)
+  once <- function(lines)
+    sub("<CoSimulation", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\"", lines)
   house <- house_fmu(house_file(2, once))
-  expect_true(all(is.finite(simulate_runs(house, cbind(R_out = c(0.01, 0.011)), house_drivers(3), 1))))
+  expect_true(
+    all(is.finite(simulate_runs(house, cbind(R_out = c(0.01, 0.011)), house_drivers(3), 1))))
   expect_null(worker_of(house))
 })
 
@@ -99,8 +104,9 @@ hanging_session <- function(file, frame = parent.frame()) {
   code <- sprintf("library(amiss)
     house <- fmu_simulator('%s', free('fault', uniform(0, 10)), output = 'T_air', time_limit = 500)
     simulate_runs(house, cbind(fault = 8), matrix(0, 3, 0), 1)", file)
-  session <- processx::process$new(file.path(R.home("bin"), "Rscript"), c("-e", code), stdout = "|", stderr = "2>&1",
-                                   env = c("current", R_LIBS = paste(.libPaths(), collapse = ":"), TMPDIR = folder))
+  session <- processx::process$new(
+    file.path(R.home("bin"), "Rscript"), c("-e", code), stdout = "|", stderr = "2>&1",
+    env = c("current", R_LIBS = paste(.libPaths(), collapse = ":"), TMPDIR = folder))
   withr::defer(session$kill_tree(), envir = frame)
   wait_until(function() length(dir(folder, "^filled[.]txt$", recursive = TRUE)) > 0)
   session

@@ -11,7 +11,8 @@ test_that("a lost row costs one row, and no warm-up", {
                  "1 lost row in 1 gap is bridged, the first after row 99",
                  class = "amiss_message_gap")
   whole <- linear_measurements(data, warmup = 10)
-  expect_identical(m[c("hours", "segment", "use", "step_h")], whole[c("hours", "segment", "use", "step_h")])
+  expect_identical(m[c("hours", "segment", "use", "step_h")],
+                   whole[c("hours", "segment", "use", "step_h")])
   expect_identical(m$y, replace(whole$y, 100, NA))
   expect_equal(m$raw$drivers[100, "Te"], mean(data$Te[c(99, 101)]), ignore_attr = TRUE)
   expect_identical(m$raw$drivers[-100, ], whole$raw$drivers[-100, ])
@@ -22,7 +23,8 @@ test_that("a lost row is as a row whose target is missing", {
   data$Te[100] <- mean(data$Te[c(99, 101)])
   data$Gv[100] <- mean(data$Gv[c(99, 101)])
   lost <- quietly(data[-100, ], average = 2)
-  expect_equal(lost, linear_measurements(replace(data, "Ti", replace(data$Ti, 100, NA)), average = 2))
+  expect_equal(lost,
+               linear_measurements(replace(data, "Ti", replace(data$Ti, 100, NA)), average = 2))
   values <- rbind(c(gain = 0.4), c(gain = 0.7))
   runs <- function(m) amiss:::simulate_measured(lag_simulator(), values, m, "calibrate", 1L)
   expect_equal(runs(quietly(data[-100, ])), runs(linear_measurements(data))[-100, ])
@@ -44,10 +46,12 @@ test_that("longer gaps are bridged as far as is asked, and cut the record beyond
 test_that("what a driver lacks is filled as far as is asked, and told", {
   data <- linear_data()
   lacking <- replace(data, "Te", replace(data$Te, c(30:32, 70), NA))
-  expect_error(linear_measurements(lacking), "Te.*4 missing.*row 30.*fill_gaps", class = "amiss_error_input")
-  expect_error(quietly(lacking, fill_gaps = 2), "Te.*3 missing.*row 30", class = "amiss_error_input")
-  expect_message(m <- linear_measurements(lacking, fill_gaps = 3), "4 values of .*Te.* in 2 gaps of at most 3 h",
-                 class = "amiss_message_gap")
+  expect_error(linear_measurements(lacking), "Te.*4 missing.*row 30.*fill_gaps",
+               class = "amiss_error_input")
+  expect_error(quietly(lacking, fill_gaps = 2), "Te.*3 missing.*row 30",
+               class = "amiss_error_input")
+  expect_message(m <- linear_measurements(lacking, fill_gaps = 3),
+                 "4 values of .*Te.* in 2 gaps of at most 3 h", class = "amiss_message_gap")
   expect_equal(m$boundary[30:32, 1], stats::approx(c(29, 33), data$Te[c(29, 33)], 30:32)$y)
   expect_equal(m$y, data$Ti)
   # Beside a lost row the gap is as long as both.
@@ -57,7 +61,8 @@ test_that("what a driver lacks is filled as far as is asked, and told", {
   expect_error(quietly(replace(data, "Te", replace(data$Te, 240, NA)), fill_gaps = 3), "row 240",
                class = "amiss_error_input")
   beside <- replace(data, "Te", replace(data$Te, 99, NA))[-(100:130), ]
-  expect_error(suppressWarnings(quietly(beside, fill_gaps = 3)), "row 99", class = "amiss_error_input")
+  expect_error(suppressWarnings(quietly(beside, fill_gaps = 3)), "row 99",
+               class = "amiss_error_input")
 })
 
 test_that("directions are filled the short way round", {
@@ -118,7 +123,8 @@ test_that("uses and expressions stay with their rows", {
 })
 
 test_that("a missing target leaves a calibration as it is without that row", {
-  # The likelihood of n rows without one of them is that of the other n - 1: the error's filter steps over it.
+  # The likelihood of n rows without one of them is that of the other n - 1: the error's filter
+  # steps over it.
   data <- linear_data(60)
   m <- linear_measurements(replace(data, "Ti", replace(data$Ti, 30, NA)))
   lost <- quietly(data[-30, ])

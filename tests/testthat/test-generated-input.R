@@ -1,5 +1,5 @@
-# Whatever is given to an exported function is refused by a condition of the package, or gives a right result: see
-# helper-generated-input.R. AMISS_EXTENDED_TESTS=true tries all of it.
+# Whatever is given to an exported function is refused by a condition of the package, or gives a
+# right result: see helper-generated-input.R. AMISS_EXTENDED_TESTS=true tries all of it.
 skip_on_cran()  # second tier: tools/test --quick
 
 wrong_outcomes <- function(rows, calls) {
@@ -33,15 +33,17 @@ test_that("hostile values are refused by a condition of the package, or change n
 # What YAML can write of the hostile values, and some that only it has.
 hostile_fields <- function() {
   writable <- function(x) {
-    plain <- is.null(x) || (is.numeric(x) || is.logical(x) || is.character(x)) && !is.object(x) && is.null(dim(x))
+    plain <- is.null(x) ||
+      (is.numeric(x) || is.logical(x) || is.character(x)) && !is.object(x) && is.null(dim(x))
     plain && (!is.character(x) || all(validEnc(x) & Encoding(x) != "bytes"))
   }
   c(Filter(writable, hostile_values),
-    list(mapping = list(a = 1, b = "x"), nested = list(list(list(1))), empty = list(), date = "2024-02-30",
-         octal = "017"))
+    list(mapping = list(a = 1, b = "x"), nested = list(list(list(1))), empty = list(),
+         date = "2024-02-30", octal = "017"))
 }
 
-test_that("a study file with any field replaced is refused by a condition of the package, or done", {
+test_that(
+  "a study file with any field replaced is refused by a condition of the package, or done", {
   stand_in(upgrade_model = function(...) structure(list(models = list()), class = "no_upgrade"))
   fields <- setdiff(unlist(study_fields, use.names = FALSE), c("models", "method", "truth"))
   rows <- expand.grid(field = fields, value = seq_along(hostile_fields()), stringsAsFactors = FALSE)
@@ -58,10 +60,10 @@ test_that("a study file with any field replaced is refused by a condition of the
 })
 
 test_that("the command ends any words with a status, and says why", {
-  words <- c("", " ", "run", "walk", "-", "--", "--out", "--out=", "--seed", "--seed=x", "--seed=1e99", "--threads=-1",
-             "--help=1", "-h", "--version", "{x}", "a\nb", "\u00e9", strrep("a", 1e4), "--trust", "--nonsense",
-             "/dev/null",
-             tempdir(), "--out=/dev/null/x", bad_study(list(runs = -1)))
+  words <- c("", " ", "run", "walk", "-", "--", "--out", "--out=", "--seed", "--seed=x",
+             "--seed=1e99", "--threads=-1", "--help=1", "-h", "--version", "{x}", "a\nb", "\u00e9",
+             strrep("a", 1e4), "--trust", "--nonsense", "/dev/null", tempdir(), "--out=/dev/null/x",
+             bad_study(list(runs = -1)))
   withr::local_dir(withr::local_tempdir())
   statuses <- withr::with_seed(1, vapply(1:80, function(i) {
     given <- c(if (i %% 2) "run", sample(words, sample(0:4, 1), replace = TRUE))
@@ -71,7 +73,8 @@ test_that("the command ends any words with a status, and says why", {
   expect_true(all(statuses %in% 0:2) && all(c(0, 2) %in% statuses))
 })
 
-test_that("a table whose bytes or lines are changed is read, or refused by a condition of the package", {
+test_that(
+  "a table whose bytes or lines are changed is read, or refused by a condition of the package", {
   changes <- testthat::test_path("..", "..", "bench", "fuzz_files", "changes.R")
   skip_if_not(file.exists(changes), "the package's sources")
   changed <- new.env()
@@ -82,7 +85,8 @@ test_that("a table whose bytes or lines are changed is read, or refused by a con
   wrong <- withr::with_seed(1, vapply(1:80, function(i) {
     writeBin(changed$changed_bytes(good, list(good)), path)
     tryCatch({
-      suppressWarnings(suppressMessages(linear_measurements(read_table_file(path, c("hour", "Ti", "Te", "Gv")))))
+      suppressWarnings(
+        suppressMessages(linear_measurements(read_table_file(path, c("hour", "Ti", "Te", "Gv")))))
       ""
     }, amiss_error = function(e) "", error = function(e) paste(i, class(e)[1], conditionMessage(e)))
   }, ""))
@@ -95,23 +99,28 @@ read_objects <- function() {
   o <- bad_input_objects()
   quietly <- function(x) suppressWarnings(suppressMessages(x))
   calls <- generated_calls()
-  result <- function(f, ...) quietly(do.call(exported_function(f), utils::modifyList(calls[[f]], list(...))))
-  c(o[c("measurements", "ensemble", "emulator", "fit", "paper", "upgrade", "function_simulator", "program")],
+  result <- function(f, ...)
+    quietly(do.call(exported_function(f), utils::modifyList(calls[[f]], list(...))))
+  c(o[c("measurements", "ensemble", "emulator", "fit", "paper", "upgrade", "function_simulator",
+        "program")],
     list(joint = result("calibrate_jointly", control = list(calibration = o$calibration)),
-         comparison = result("compare_models"), sampled = result("ais"), indices = result("sobol_indices"),
+         comparison = result("compare_models"), sampled = result("ais"),
+         indices = result("sobol_indices"),
          attribution = result("attribute_discrepancy", control = list(surrogates = 19)),
          discrepancy = discrepancy(o$fit)))
 }
 
 # Generics for the package's own use, whose callers have looked already.
-inner_generics <- c("calibrated_record", "calibrator", "condition_table", "default_control", "figures_of",
-                    "free_parameters", "driver_names", "simulate_runs", "result_list", "report_content")
+inner_generics <- c("calibrated_record", "calibrator", "condition_table", "default_control",
+                    "figures_of", "free_parameters", "driver_names", "simulate_runs", "result_list",
+                    "report_content")
 
 # The methods that read an object of these classes, by name.
 readers_of <- function(classes) {
   methods <- getNamespaceInfo("amiss", "S3methods")
   methods <- methods[methods[, 2] %in% classes & !methods[, 1] %in% inner_generics, , drop = FALSE]
-  methods <- methods[vapply(methods[, 3], is.character, NA), , drop = FALSE]  # others were registered by tests
+  # others were registered by tests
+  methods <- methods[vapply(methods[, 3], is.character, NA), , drop = FALSE]
   mget(as.character(methods[, 3]), asNamespace("amiss"))
 }
 
@@ -119,7 +128,8 @@ reader_outcome <- function(reader, object, class) {
   told <- tryCatch({
     utils::capture.output(reader(object))
     "accepted"
-  }, error = function(e) if (inherits(e, class)) "" else paste0("<", class(e)[1], "> ", conditionMessage(e)))
+  }, error = function(e)
+    if (inherits(e, class)) "" else paste0("<", class(e)[1], "> ", conditionMessage(e)))
   told
 }
 
@@ -130,7 +140,8 @@ test_that("every reader of an object says that it was made by another version, a
   for (name in names(objects)) for (reader in names(readers[[name]])) {
     old <- objects[[name]]
     old$format_version <- 2L
-    expect_identical(reader_outcome(readers[[name]][[reader]], old, "amiss_error_version"), "", label = reader)
+    expect_identical(reader_outcome(readers[[name]][[reader]], old, "amiss_error_version"), "",
+                     label = reader)
   }
   old <- objects$upgrade
   for (version in list(4, "3", list(), NA)) {
@@ -138,7 +149,8 @@ test_that("every reader of an object says that it was made by another version, a
     expect_identical(reader_outcome(print, old, "amiss_error_version"), "")
   }
   old$format_version <- 2L
-  expect_error(print(old), "made by another version.*Its format is 2; this version reads 3.*Make it again",
+  expect_error(print(old),
+               "made by another version.*Its format is 2; this version reads 3.*Make it again",
                class = "amiss_error_input")
 })
 
@@ -149,8 +161,8 @@ test_that("every reader refuses what is damaged, and no reader stops raw", {
   rows <- unlist(lapply(names(objects), function(name) {
     damaged <- near_lists(objects[[name]])
     unlist(lapply(names(readers_of(class(objects[[name]]))), function(reader) {
-      Map(function(value, what) list(object = name, reader = reader, value = value, what = what), damaged,
-          names(damaged))
+      Map(function(value, what) list(object = name, reader = reader, value = value, what = what),
+          damaged, names(damaged))
     }), recursive = FALSE)
   }), recursive = FALSE)
   if (!nzchar(Sys.getenv("AMISS_EXTENDED_TESTS"))) rows <- spread_rows(rows, 150)

@@ -1,13 +1,14 @@
-# A fixed subset of the worlds of bench/hidden_effects: every kind of effect, and none, hidden in five to seven days of
-# data. Of 24 worlds at least 22 must come out right: the effect's mechanism named (either of two), nothing where there
-# is nothing, and what the catalogue does not hold not blamed on it with confidence. AMISS_WORLD_SEED moves all seeds.
+# A fixed subset of the worlds of bench/hidden_effects: every kind of effect, and none, hidden in
+# five to seven days of data. Of 24 worlds at least 22 must come out right: the effect's mechanism
+# named (either of two), nothing where there is nothing, and what the catalogue does not hold not
+# blamed on it with confidence. AMISS_WORLD_SEED moves all seeds.
 skip_on_cran()  # second tier: tools/test --quick
 bench <- test_path("..", "..", "bench", "hidden_effects")
 
 hidden_worlds <- function(scope) {
   kinds <- c(scope$world_kinds, scope$catalogue_kinds, rep("none", 3))
-  data.frame(seed = world_seed(500) + seq_along(kinds), kind = kinds, strength = rep_len(c(2, 4, 1, 8), length(kinds)),
-             days = rep_len(5:7, length(kinds)))
+  data.frame(seed = world_seed(500) + seq_along(kinds), kind = kinds,
+             strength = rep_len(c(2, 4, 1, 8), length(kinds)), days = rep_len(5:7, length(kinds)))
 }
 
 came_out_right <- function(row) {
@@ -16,8 +17,9 @@ came_out_right <- function(row) {
   isTRUE(row$mechanism %in% row$true_mechanism) && isTRUE(row$condition %in% row$true_boundary)
 }
 
-# The design promises so many runs of the simulator in the median over worlds. A single world may take
-# more: one that ends unexplained is searched again from all priors. No more than three times as many.
+# The design promises so many runs of the simulator in the median over worlds. A single world may
+# take more: one that ends unexplained is searched again from all priors. No more than three times
+# as many.
 expect_runs <- function(rows, promised) {
   runs <- vapply(rows, function(r) as.numeric(r$runs_total), 0)
   worst <- rows[[which.max(runs)]]
@@ -29,19 +31,25 @@ expect_runs <- function(rows, promised) {
 test_that("what is hidden in 24 worlds is found", {
   if (!dir.exists(bench)) skip("bench/ is not part of the installed package")
   scope <- new.env()
-  for (part in c("worlds.R", "least_squares.R", "score.R")) sys.source(file.path(bench, part), scope)
+  for (part in c("worlds.R", "least_squares.R", "score.R"))
+    sys.source(file.path(bench, part), scope)
   worlds <- hidden_worlds(scope)
   expect_gte(nrow(worlds), 24)
   rows <- parallel::mclapply(seq_len(nrow(worlds)), function(i) {
-    scope$score_world(scope$draw_world(worlds$seed[i], worlds$kind[i], worlds$strength[i], worlds$days[i]),
-                      control = list(max_steps = 1, calibration = list(ais = list(precision = 0.3))), rivals = FALSE)
+    scope$score_world(
+      scope$draw_world(worlds$seed[i], worlds$kind[i], worlds$strength[i], worlds$days[i]),
+      control = list(max_steps = 1, calibration = list(ais = list(precision = 0.3))),
+      rivals = FALSE)
   }, mc.cores = 2, mc.preschedule = FALSE)
   failed <- vapply(rows, inherits, NA, "try-error")
   expect_false(any(failed), info = paste(unlist(rows[failed]), collapse = "; "))
   right <- vapply(rows[!failed], came_out_right, NA)
-  wrong <- vapply(rows[!failed][!right], function(r) sprintf("%s (seed %d, ratio %.1f): %s, %s", r$kind, r$seed,
-                                                             r$achieved, r$mechanism, r$verdict), "")
-  expect_gte(sum(right), 22, label = paste0("number right (wrong: ", paste(wrong, collapse = "; "), ")"))
+  wrong <- vapply(
+    rows[!failed][!right],
+    function(r) sprintf("%s (seed %d, ratio %.1f): %s, %s", r$kind, r$seed, r$achieved, r$mechanism,
+                        r$verdict), "")
+  expect_gte(sum(right), 22,
+             label = paste0("number right (wrong: ", paste(wrong, collapse = "; "), ")"))
   expect_runs(rows[!failed], 400)
   rates <- scope$score_rates(rows[!failed])
   expect_equal(rates$false_mechanism$n, 4)
@@ -49,8 +57,8 @@ test_that("what is hidden in 24 worlds is found", {
 
 test_that("house O5: the open south blinds are found in real data", {
   study <- read_study(twinhouse_study("O5"))
-  upgrade <- upgrade_model(study$model, study$measurements, study$catalogue, seed = 7, threads = 2, quiet = TRUE,
-                           control = list(max_steps = 1))
+  upgrade <- upgrade_model(study$model, study$measurements, study$catalogue, seed = 7, threads = 2,
+                           quiet = TRUE, control = list(max_steps = 1))
   expect_equal(upgrade$models[[1]]$attribution$table$boundary[1], "Gv_S")
   expect_equal(upgrade$named_cause$mechanism, "south solar aperture")
   expect_gt(upgrade$named_cause$log10_bf, 40)

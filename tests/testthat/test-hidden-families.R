@@ -1,6 +1,7 @@
-# The families of worlds beside the box of test-hidden-effects.R: thermal networks, a catchment with thresholds, and
-# base models that are wrong in structure. First the generators, held against least squares on the simulators
-# themselves; then eight worlds of each family, scored. AMISS_WORLD_SEED moves the seeds of the latter.
+# The families of worlds beside the box of test-hidden-effects.R: thermal networks, a catchment with
+# thresholds, and base models that are wrong in structure. First the generators, held against least
+# squares on the simulators themselves; then eight worlds of each family, scored. AMISS_WORLD_SEED
+# moves the seeds of the latter.
 bench <- test_path("..", "..", "bench", "hidden_effects")
 
 families_scope <- function() {
@@ -14,14 +15,16 @@ families_scope <- function() {
 new_families <- c("network", "runoff", "wrong")
 short <- c(network = 5, runoff = 30, wrong = 5)  # days
 
-true_model <- function(world) Reduce(function(model, kind) world$catalogue[[kind]]$edit(model), world$kinds, world$base)
+true_model <- function(world)
+  Reduce(function(model, kind) world$catalogue[[kind]]$edit(model), world$kinds, world$base)
 
 true_values <- function(world) {
   c(world$values, unlist(lapply(unname(world$effects), function(e) e[names(e) != "size"])))
 }
 
 output_at <- function(simulator, values, drivers) {
-  simulate_runs(simulator, rbind(values[names(free_parameters(simulator))]), drivers, simulator$step)[, 1]
+  simulate_runs(simulator, rbind(values[names(free_parameters(simulator))]), drivers,
+                simulator$step)[, 1]
 }
 
 rms <- function(x) sqrt(mean(x^2))
@@ -38,8 +41,8 @@ test_that("worlds of the box are what they were", {
   skip_on_cran()
   scope <- families_scope()
   kinds <- vapply(c(1:3, 20001, 20002), function(seed) scope$draw_world(seed)$kind, "")
-  expect_equal(kinds, c("unmetered load", "two effects", "wind-driven infiltration", "missing thermal mass",
-                        "wind-driven infiltration"))
+  expect_equal(kinds, c("unmetered load", "two effects", "wind-driven infiltration",
+                        "missing thermal mass", "wind-driven infiltration"))
   world <- scope$draw_world(20001)
   expect_equal(world$family, "box")
   expect_equal(world$true_boundary, c("RHP", "Te", "Gv"))
@@ -66,7 +69,8 @@ test_that("a world follows from its seed, with all that scoring needs", {
   }
 })
 
-test_that("mechanisms stack: parameters are never lost, and where each is at zero the base model is left", {
+test_that(
+  "mechanisms stack: parameters are never lost, and where each is at zero the base model is left", {
   skip_on_cran()
   scope <- families_scope()
   for (family in c("network", "runoff")) {
@@ -85,11 +89,12 @@ test_that("mechanisms stack: parameters are never lost, and where each is at zer
         }
         parameters <- free_parameters(model)
         middle <- amiss:::unit_to_values(matrix(0.5, 1, length(parameters)), parameters)[1, ]
-        added <- function(entry) setdiff(names(free_parameters(entry$edit(world$base))), names(world$values))
+        added <- function(entry)
+          setdiff(names(free_parameters(entry$edit(world$base))), names(world$values))
         extents <- vapply(world$catalogue, function(entry) added(entry)[1], "")
         with_base <- replace(middle, names(world$values), world$values)
-        expect_equal(output_at(model, replace(with_base, extents, 0), drivers), plain, tolerance = 1e-4,
-                     info = paste(family, seed))
+        expect_equal(output_at(model, replace(with_base, extents, 0), drivers), plain,
+                     tolerance = 1e-4, info = paste(family, seed))
         expect_gt(rms(output_at(model, with_base, drivers) - plain), 1e-3)
       }
     }
@@ -104,15 +109,18 @@ test_that("a prior that was changed survives a mechanism", {
   expect_identical(free_parameters(world$catalogue[["heater state"]]$edit(narrowed))$C_air, narrow)
 })
 
-test_that("the models' coarser steps stay below the noise: a simulator with the true values gives the truth", {
+test_that(paste("the models' coarser steps stay below the noise: a simulator with the true values",
+                "gives the truth"), {
   skip_on_cran()
   scope <- families_scope()
   for (family in c("network", "runoff")) {
     kinds <- scope$families[[family]]$kinds
     for (i in seq_along(kinds)) {
-      world <- scope$family_world(family, 10 + i, kind = kinds[i], strength = 1, days = short[[family]])
+      world <- scope$family_world(family, 10 + i, kind = kinds[i], strength = 1,
+                                  days = short[[family]])
       own <- world$measurements$raw$use != "warmup"
-      error <- (output_at(true_model(world), true_values(world), world$measurements$raw$drivers) - world$clean)[own]
+      error <- (output_at(true_model(world), true_values(world), world$measurements$raw$drivers) -
+                world$clean)[own]
       expect_lt(rms(error), 0.3 * world$noise, label = paste(family, kinds[i]))
     }
   }
@@ -126,11 +134,13 @@ test_that("least squares with what is really there reaches the noise, and withou
   for (family in names(some)) {
     kinds <- some[[family]]
     for (i in seq_along(kinds)) {
-      world <- scope$family_world(family, 20 + i, kind = kinds[i], strength = 4, days = short[[family]])
+      world <- scope$family_world(family, 20 + i, kind = kinds[i], strength = 4,
+                                  days = short[[family]])
       told <- paste(family, kinds[i])
       noise <- drawn_noise(world)
       ratio <- scope$best_rmse(world) / noise
-      # Parameters take up a part of the noise (all the more if it is autocorrelated), coarser steps add a little.
+      # Parameters take up a part of the noise (all the more if it is autocorrelated), coarser steps
+      # add a little.
       expect_gt(ratio, 0.7, label = told)
       expect_lt(ratio, 1.1, label = told)
       if (kinds[i] == "none") {
@@ -145,7 +155,8 @@ test_that("least squares with what is really there reaches the noise, and withou
   }
 })
 
-test_that("a wrong base leaves what its parameters cannot follow, whether an effect is hidden or not", {
+test_that(
+  "a wrong base leaves what its parameters cannot follow, whether an effect is hidden or not", {
   skip_on_cran()
   scope <- families_scope()
   worlds <- lapply(1:12, function(seed) scope$family_world("wrong", seed, days = 5))
@@ -162,18 +173,20 @@ test_that("a wrong base leaves what its parameters cannot follow, whether an eff
   expect_gt(min(ratio), 1.5)
 })
 
-test_that("rates tell families, verdicts and checks apart, and do without what the package does not say", {
+test_that(
+  "rates tell families, verdicts and checks apart, and do without what the package does not say", {
   scope <- families_scope()
   row <- function(...) {
-    usual <- list(family = "network", kind = "heater state", hidden = TRUE, true_mechanism = "heater state",
-                  true_boundary = "P", achieved = 4, condition = "P", attributed_condition = "P",
-                  mechanism = "heater state", adopted = c("heater state", "envelope leak"),
-                  verdicts = c("named", "likely"), verdict = "named", unexplained = FALSE, covered = TRUE,
-                  check_passed = TRUE, rmse_ratio = 1.1, gain_share = 1, wall_s = 1)
+    usual <- list(family = "network", kind = "heater state", hidden = TRUE,
+                  true_mechanism = "heater state", true_boundary = "P", achieved = 4,
+                  condition = "P", attributed_condition = "P", mechanism = "heater state",
+                  adopted = c("heater state", "envelope leak"), verdicts = c("named", "likely"),
+                  verdict = "named", unexplained = FALSE, covered = TRUE, check_passed = TRUE,
+                  rmse_ratio = 1.1, gain_share = 1, wall_s = 1)
     utils::modifyList(usual, list(...))
   }
-  rows <- list(row(), row(verdicts = c("named", "named"), rmse_ratio = 1.5), row(check_passed = FALSE),
-               row(check_passed = NA),
+  rows <- list(row(), row(verdicts = c("named", "named"), rmse_ratio = 1.5),
+               row(check_passed = FALSE), row(check_passed = NA),
                row(kind = "none", hidden = FALSE, true_mechanism = character(), achieved = 0,
                    verdicts = c("stand-in", "likely")),
                row(family = "runoff"))
@@ -188,10 +201,12 @@ test_that("rates tell families, verdicts and checks apart, and do without what t
   expect_equal(network$named_unchecked, 1)
   expect_equal(network$false_mechanism, 1)
   expect_equal(rates$network$right_paper_condition$n, 0)
-  told <- scope$attributed_kinds(c(rows, list(row(attributed_condition = "Te"), row(attributed_condition = NA))))
+  told <- scope$attributed_kinds(
+    c(rows, list(row(attributed_condition = "Te"), row(attributed_condition = NA))))
   expect_equal(told, data.frame(kind = "heater state", right = 5L, wrong = 1L, none = 1L))
   model <- function(...) list(...)
-  upgrade <- list(models = list(model(), model(verdict = "stand-in", fit = list(check = list(passed = FALSE)))))
+  upgrade <- list(
+    models = list(model(), model(verdict = "stand-in", fit = list(check = list(passed = FALSE)))))
   expect_equal(scope$mechanism_verdicts(upgrade, "named"), "stand-in")
   expect_false(scope$check_passed(upgrade))
   older <- list(models = list(model(), model(fit = list())))
@@ -199,17 +214,19 @@ test_that("rates tell families, verdicts and checks apart, and do without what t
   expect_true(is.na(scope$check_passed(older)))
 })
 
-# Bounds on eight worlds a family. Networks and catchments: of the worlds whose effect the base model cannot imitate
-# to a fifth of the noise all but one have it among what is adopted, and at most one of the worlds has a mechanism named
-# that is not there. Wrong bases: what is not there is named in at most one of eight. Nowhere is anything named on an
-# emulator that the simulator does not confirm.
+# Bounds on eight worlds a family. Networks and catchments: of the worlds whose effect the base
+# model cannot imitate to a fifth of the noise all but one have it among what is adopted, and at
+# most one of the worlds has a mechanism named that is not there. Wrong bases: what is not there is
+# named in at most one of eight. Nowhere is anything named on an emulator that the simulator does
+# not confirm.
 family_worlds <- function(scope) {
   effects <- function(family) scope$families[[family]]$mechanisms
   network <- c(effects("network"), "solar gain on the air", "none", "none")
   runoff <- c(effects("runoff"), "overflow threshold", "none", "none")
   layers <- c("none", "window transmission", "none", "neighbour coupling")
   zones <- c("none", "solar gain on the air", "none", "envelope leak")
-  worlds <- data.frame(family = rep(new_families, each = 8), kind = c(network, runoff, layers, zones),
+  worlds <- data.frame(family = rep(new_families, each = 8),
+                       kind = c(network, runoff, layers, zones),
                        strength = rep_len(c(4, 2, 8, 4), 24),
                        structure = rep(c(NA, scope$wrong_structures), c(16, 4, 4)))
   worlds$seed <- world_seed(900) + seq_len(24)
@@ -217,9 +234,9 @@ family_worlds <- function(scope) {
   worlds
 }
 
-# The design promises so many runs of the simulator in the median over the worlds of a family. A single
-# world may take more: one that ends unexplained is searched again from all priors, a base on a curved ridge
-# asks for several rounds. No more than three times as many.
+# The design promises so many runs of the simulator in the median over the worlds of a family. A
+# single world may take more: one that ends unexplained is searched again from all priors, a base on
+# a curved ridge asks for several rounds. No more than three times as many.
 promised_runs <- c(network = 600, runoff = 500, wrong = 600)
 
 expect_runs <- function(rows, promised) {
@@ -249,8 +266,10 @@ test_that("what is hidden in worlds of each family is found, and nothing else is
   rows <- rows[!failed]
   falsely <- function(row) any(!scope$named_mechanisms(row) %in% row$true_mechanism)
   told <- function(rows) {
-    paste(vapply(rows, function(r) sprintf("%s %s (seed %d, ratio %.1f): %s", r$family, r$kind, r$seed, r$achieved,
-                                           paste(r$adopted, r$verdicts, collapse = ", ")), ""), collapse = "; ")
+    paste(vapply(rows,
+                 function(r)
+                   sprintf("%s %s (seed %d, ratio %.1f): %s", r$family, r$kind, r$seed, r$achieved,
+                           paste(r$adopted, r$verdicts, collapse = ", ")), ""), collapse = "; ")
   }
   for (family in new_families) {
     own <- Filter(function(r) r$family == family, rows)
@@ -265,6 +284,7 @@ test_that("what is hidden in worlds of each family is found, and nothing else is
     missed <- Filter(function(r) !r$true_mechanism %in% r$adopted, with_effect)
     expect_lte(length(missed), 1, label = paste0("missed (", told(missed), ")"))
   }
-  unchecked <- Filter(function(r) isFALSE(r$check_passed) && length(scope$named_mechanisms(r)), rows)
+  unchecked <- Filter(function(r) isFALSE(r$check_passed) && length(scope$named_mechanisms(r)),
+                      rows)
   expect_length(unchecked, 0)
 })

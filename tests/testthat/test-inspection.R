@@ -1,8 +1,8 @@
 inspected <- function(upgrade) upgrade_inspections(upgrade)
 about <- function(told, what) unname(told[names(told) == what])
 
-# The small upgrade as if nothing hung together with what the sun brought. In its record the gains of
-# the sun and of the air are correlated by -0.38 (least squares) to -0.51; from 0.4 that is told.
+# The small upgrade as if nothing hung together with what the sun brought. In its record the gains
+# of the sun and of the air are correlated by -0.38 (least squares) to -0.51; from 0.4 that is told.
 untied <- function() {
   upgrade <- small_upgrade()
   upgrade$models[[2]]$confounded_with <- character()
@@ -13,7 +13,8 @@ test_that("what to inspect next names the value that the mechanism asks for", {
   told <- inspected(untied())
   sun <- tidy(small_upgrade())
   sun <- sun[sun$term == "sun_gain", ]
-  expect_match(about(told, "site"), sprintf("gain of the sun lies between %s and", short(sun$conf.low, 3)))
+  expect_match(about(told, "site"),
+               sprintf("gain of the sun lies between %s and", short(sun$conf.low, 3)))
   expect_match(about(told, "steps"), "max_steps")
   expect_setequal(names(told), c("site", "steps"))
   expect_identical(summary(untied())$inspect, told)
@@ -27,19 +28,23 @@ test_that("rivals are told apart by what only one of them answers to, or on site
   used <- m$use == "calibrate"
   r <- cor(m$boundary[used, m$condition == 1], m$boundary[used, m$condition == 2])
   told <- about(inspected(upgrade), "rival")
-  expect_match(told, "tell sun from drift, measure while Gv changes while Te does not, or vice versa")
+  expect_match(told,
+               "tell sun from drift, measure while Gv changes while Te does not, or vice versa")
   expect_match(told, sprintf("correlation of Gv and Te is %.2f", r))
   m$boundary[used, m$condition == 2] <- rnorm(sum(used))
   expect_identical(amiss:::correlation_words(m, "Gv", "Te"), "")
   expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- character()
-  expect_match(about(inspected(upgrade), "rival"), "Since sun and drift answer to no condition that was measured")
+  expect_match(about(inspected(upgrade), "rival"),
+               "Since sun and drift answer to no condition that was measured")
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- "Gv"
-  expect_match(about(inspected(upgrade), "rival"), paste("only a look on site tells them apart: the one asks for a",
-                                                         "sun_gain of 0.00"))
+  expect_match(about(inspected(upgrade), "rival"),
+               paste("only a look on site tells them apart: the one asks for a",
+                     "sun_gain of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
-  expect_match(about(inspected(upgrade), "rival"), paste("What sun brings \\(gain of the sun\\) trades off against",
-                                                         "gain: with that measured"), all = FALSE)
+  expect_match(about(inspected(upgrade), "rival"),
+               paste("What sun brings \\(gain of the sun\\) trades off against",
+                     "gain: with that measured"), all = FALSE)
 })
 
 test_that("a stand-in and a drifting sensor have tests of their own", {
@@ -60,7 +65,8 @@ test_that("a time of about a step asks for finer steps of the simulator", {
     about(inspected(upgrade), "step")
   }
   expect_identical(upgrade$candidates$mechanism[1], "sun")
-  expect_match(brought(1.5, "h"), "The time that sun brings \\(lag\\) is about a step of the record")
+  expect_match(brought(1.5, "h"),
+               "The time that sun brings \\(lag\\) is about a step of the record")
   expect_match(brought(80, "min"), "finer ones before you believe in sun")
   expect_length(brought(3, "h"), 0)
   expect_length(brought(1.5, "K"), 0)
@@ -84,23 +90,28 @@ test_that("conditions that go together, answers without a mechanism and absent d
     upgrade$candidates$error_ratio[upgrade$candidates$mechanism == "sun"] <- error_ratio
     about(inspected(upgrade), "answer")
   }
-  expect_match(answers(-1, 0.9), "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted",
+  expect_match(answers(-1, 0.9),
+               "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted",
                all = FALSE)
-  expect_match(answers(-1, 0.7), paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against.",
-                                       "does not tell that from an unknown response to Gv: look for a sun_gain"),
+  expect_match(answers(-1, 0.7),
+               paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against.",
+                     "does not tell that from an unknown response to Gv: look for a sun_gain"),
                all = FALSE)
   expect_match(answers(1, 0.7), "answers to Gv: sun may be why, and is not decided", all = FALSE)
   plain <- upgrade$catalogue
   upgrade$catalogue$sun$boundary <- c("Te", "Gv")
-  expect_match(answers(1, 0.7), "answers to Te and Gv: sun may be why, and is not decided|to Gv and Te: sun may be",
+  expect_match(answers(1, 0.7),
+               "answers to Te and Gv: sun may be why, and is not decided|to Gv and Te: sun may be",
                all = FALSE)
   expect_length(answers(1, 0.7), 1)
   upgrade$catalogue <- plain
   attribution$table$group <- "Te or Gv"
-  attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE, correlation = 0.97))
+  attribution$groups <- list(list(conditions = c("Te", "Gv"), significant = TRUE,
+                                  correlation = 0.97))
   upgrade$models[[1]]$attribution <- attribution
-  expect_match(about(inspected(upgrade), "group"), paste("Te and Gv go together .correlation 0.97.*Te changes while",
-                                                         "Gv stays as it is"))
+  expect_match(about(inspected(upgrade), "group"),
+               paste("Te and Gv go together .correlation 0.97.*Te changes while",
+                     "Gv stays as it is"))
   upgrade$catalogue$sun$boundary <- c("Gv", "wind")
   expect_match(about(inspected(upgrade), "driver"), "analysed: wind, which drives sun")
 })
@@ -109,11 +120,13 @@ test_that("a candidate that is near is named with what would decide it", {
   upgrade <- base_only(small_upgrade())
   upgrade$candidates$log10_bf <- c(1, -1)
   upgrade$candidates$probability <- c(0.8, 0.01)
-  expect_match(about(inspected(upgrade), "nearest"), paste("Not decided is sun \\(odds of 10 to 1 in favour; with it",
-                                                           "the error falls to 8.*Gv changes strongly"))
+  expect_match(about(inspected(upgrade), "nearest"),
+               paste("Not decided is sun \\(odds of 10 to 1 in favour; with it",
+                     "the error falls to 8.*Gv changes strongly"))
   upgrade$catalogue$sun$boundary <- character()
   upgrade$candidates$error_ratio <- 0.9
-  expect_match(about(inspected(upgrade), "nearest"), "10 to 1 in favour\\): a longer record would decide it")
+  expect_match(about(inspected(upgrade), "nearest"),
+               "10 to 1 in favour\\): a longer record would decide it")
   wide <- upgrade
   wide$candidates$lower95 <- -20
   expect_length(about(inspected(wide), "nearest"), 0)
@@ -126,9 +139,11 @@ test_that("a trial is near as well, and one that no runs were left to verify ask
   sun <- upgrade$candidates$mechanism == "sun"
   upgrade$candidates <- upgrade$candidates[sun, ]
   upgrade$candidates[c("judged_by", "log10_bf", "lower95", "upper95")] <- list("trial", 1, 0.4, 1.6)
-  expect_match(about(inspected(upgrade), "nearest"), "Not decided is sun \\(odds of 10 to 1 in favour")
+  expect_match(about(inspected(upgrade), "nearest"),
+               "Not decided is sun \\(odds of 10 to 1 in favour")
   upgrade$candidates[c("log10_bf", "lower95", "upper95")] <- list(3, 2.4, 3.6)
-  expect_match(about(inspected(upgrade), "nearest"), "Not verified is sun \\(odds of 1,000 to 1.*runs_total")
+  expect_match(about(inspected(upgrade), "nearest"),
+               "Not verified is sun \\(odds of 1,000 to 1.*runs_total")
   expect_match(summary(upgrade)$sure, "no runs were left to verify it", all = FALSE)
   expect_match(plot(upgrade, "candidates")$labels$title, "no runs were left to verify the best")
 })
@@ -138,7 +153,8 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
   rough <- which(upgrade$candidates$mechanism == "drift")[1]
   upgrade$candidates[rough, c("log10_bf", "lower95", "upper95")] <- list(-3.5, -5.9, 3)
   upgrade$candidates[rough, c("judged_by", "trusted")] <- list("trial", FALSE)
-  expect_match(about(inspected(upgrade), "undecided"), "Not ruled out is drift.*3,200 to 1 against.*in favour")
+  expect_match(about(inspected(upgrade), "undecided"),
+               "Not ruled out is drift.*3,200 to 1 against.*in favour")
   upgrade$candidates$upper95[rough] <- 54
   expect_match(about(inspected(upgrade), "undecided"), "drift: its numbers are too rough for odds")
   expect_length(about(inspected(upgrade), "nothing"), 0)
@@ -158,7 +174,8 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
   expect_length(about(inspected(adopted), "undecided"), 0)
   adopted$candidates$upper95[rough] <- upper + 1
   expect_length(about(inspected(adopted), "undecided"), 1)
-  # A later trial counts in its place; beside the last model only where something is left to explain.
+  # A later trial counts in its place; beside the last model only where something is left to
+  # explain.
   later <- adopted$candidates[rough, ]
   later$from <- adopted$models[[2]]$name
   adopted$candidates <- rbind(adopted$candidates, later)
@@ -172,12 +189,15 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
 test_that("numbers that are not trusted come first", {
   upgrade <- small_upgrade()
   upgrade$models[[1]]$fit$check[c("passed", "verdict")] <- list(FALSE, "half of the noise")
-  upgrade$models[[2]]$fit$posterior[c("trusted", "verdict")] <- list(FALSE, "not trusted: chains stand still")
+  upgrade$models[[2]]$fit$posterior[c("trusted", "verdict")] <- list(
+    FALSE, "not trusted: chains stand still")
   told <- inspected(upgrade)
   expect_identical(names(told)[1:2], c("emulator", "sampler"))
   runs <- nrow(upgrade$models[[1]]$fit$emulator$processes$inputs)
-  expect_match(told[1], sprintf(paste("emulator of base is not trusted \\(half of the noise\\): make more runs",
-                                      "\\(%d now\\)"), runs))
+  expect_match(
+    told[1],
+    sprintf(paste("emulator of base is not trusted \\(half of the noise\\): make more runs",
+                  "\\(%d now\\)"), runs))
   expect_match(told[2], "\\(chains stand still\\): give it more chains \\(pilot_chains, 24 now\\)")
   upgrade$models[[1]]$fit$emulator["simulator"] <- list(NULL)
   expect_match(inspected(upgrade)[1], "give more runs where the posterior lies")
@@ -188,11 +208,14 @@ test_that("data held out are asked for, and what they hold that calibration did 
   expect_match(about(inspected(upgrade), "held_out"), "No data were held out")
   upgrade <- small_upgrade()
   upgrade$models[[2]]$scores$validate[["rmse"]] <- 5
-  expect_match(about(inspected(upgrade), "held_out"), "error is .* times that in calibration: compare the two periods")
+  expect_match(about(inspected(upgrade), "held_out"),
+               "error is .* times that in calibration: compare the two periods")
   m <- upgrade$measurements
-  m$boundary[m$use == "validate", m$condition == 1] <- m$boundary[m$use == "validate", m$condition == 1] + 100
+  m$boundary[m$use == "validate", m$condition == 1] <-
+    m$boundary[m$use == "validate", m$condition == 1] + 100
   upgrade$measurements <- m
-  expect_match(about(inspected(upgrade), "held_out"), "Te lies in .* of the steps outside of what calibration saw")
+  expect_match(about(inspected(upgrade), "held_out"),
+               "Te lies in .* of the steps outside of what calibration saw")
 })
 
 test_that("edges of the prior are told with the end and its value", {
@@ -200,8 +223,9 @@ test_that("edges of the prior are told with the end and its value", {
   expect_length(edge_inspections(fit), 0)
   fit$values[, "gain"] <- 1.9999
   fit$posterior$unit[, match("gain", colnames(fit$values))] <- 0.99995
-  expect_match(edge_inspections(fit), paste("At the upper end of its prior \\(2.0\\) lies gain: measure it, .* if",
-                                            "more is possible"))
+  expect_match(edge_inspections(fit),
+               paste("At the upper end of its prior \\(2.0\\) lies gain: measure it, .* if",
+                     "more is possible"))
 })
 
 test_that("the size of the error that remains asks for a check of the noise", {
@@ -219,7 +243,8 @@ test_that("a calibration tells what it does not know", {
   told <- calibration_inspections(fit)
   expect_match(about(told, "cause"), "attribute_discrepancy")
   fit$values[, "gain"] <- (fit$values[, "offset"] - 10) / 40
-  expect_match(about(calibration_inspections(fit), "tied"), "offset and gain trade off .*correlation 1.00")
+  expect_match(about(calibration_inspections(fit), "tied"),
+               "offset and gain trade off .*correlation 1.00")
 })
 
 test_that("models that are not told apart are so where their simulations differ most", {
@@ -227,16 +252,19 @@ test_that("models that are not told apart are so where their simulations differ 
   m <- linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60)
   steep <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
                               free("gain", uniform(0, 1)), boundary = "Te")
-  rough <- list(calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 12, importance_draws = 200)))
-  compared <- compare_models(list(a = linear_simulator(), b = steep), m, "paper", runs = 12, control = rough, seed = 3,
-                             quiet = TRUE)
+  rough <- list(calibration = list(ais = list(pilot_chains = 24, groups = 4, chains = 12,
+                                              importance_draws = 200)))
+  compared <- compare_models(list(a = linear_simulator(), b = steep), m, "paper", runs = 12,
+                             control = rough, seed = 3, quiet = TRUE)
   compared$tables$evidence$log10_bf <- c(1, 1)
   compared$models$b$prediction$mean <- compared$models$a$prediction$mean + c(data$Te / 10)
   told <- summary(compared)$inspect
   at <- which.max(data$Te)
-  expect_match(about(told, "separate"), sprintf(paste("differ most \\(by %s K\\) at hour %s, and the more so the",
-                                                      "higher Te is"), short(data$Te[at] / 10), data$hour[at]))
-  text <- knitr::knit(text = c("```{r}", "report_fragment(compared, \"summary\")", "```"), quiet = TRUE,
+  expect_match(about(told, "separate"),
+               sprintf(paste("differ most \\(by %s K\\) at hour %s, and the more so the",
+                             "higher Te is"), short(data$Te[at] / 10), data$hour[at]))
+  text <- knitr::knit(text = c("```{r}", "report_fragment(compared, \"summary\")", "```"),
+                      quiet = TRUE,
                       envir = list2env(list(compared = compared), parent = globalenv()))
   expect_match(text, "differ most")
 })

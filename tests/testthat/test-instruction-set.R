@@ -22,7 +22,8 @@ evidence_with <- function(simd) {
     cat(amiss:::instruction_set(), format(c(box[96, 1], emulated, likelihood, fit$log_evidence, fit$standard_error,
                                             coef(fit)), digits = 15))'
   out <- system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)), stdout = TRUE,
-                 env = c(paste0("AMISS_SIMD=", simd), paste0("R_LIBS=", paste(.libPaths(), collapse = ":"))))
+                 env = c(paste0("AMISS_SIMD=", simd),
+                         paste0("R_LIBS=", paste(.libPaths(), collapse = ":"))))
   parts <- strsplit(trimws(out[length(out)]), " +")[[1]]
   list(set = parts[1], values = as.numeric(parts[-1]))
 }
@@ -36,12 +37,14 @@ test_that("both libraries agree, and the faster one is used where it can run", {
   skip_if(!amiss:::cpu_has_avx2_(), "this processor has no AVX2")
   avx2 <- evidence_with("")
   expect_equal(avx2$set, "AVX2")
-  # Sums in another order: to rounding in the simulator and in the likelihood, to what ends a search in the emulator.
+  # Sums in another order: to rounding in the simulator and in the likelihood, to what ends a search
+  # in the emulator.
   expect_equal(avx2$values[1], baseline$values[1], tolerance = 1e-10)
   expect_equal(avx2$values[2], baseline$values[2], tolerance = 1e-6)
   expect_equal(avx2$values[3], baseline$values[3], tolerance = 1e-9)
-  # A chain that meets another number in the fifth digit may take another turn: the sampled evidence agrees within four
-  # standard errors, the parameter to a small part of its posterior (0.01).
-  expect_lt(abs(avx2$values[4] - baseline$values[4]), 4 * sqrt(avx2$values[5]^2 + baseline$values[5]^2))
+  # A chain that meets another number in the fifth digit may take another turn: the sampled evidence
+  # agrees within four standard errors, the parameter to a small part of its posterior (0.01).
+  expect_lt(abs(avx2$values[4] - baseline$values[4]),
+            4 * sqrt(avx2$values[5]^2 + baseline$values[5]^2))
   expect_equal(avx2$values[6], baseline$values[6], tolerance = 1e-2)
 })

@@ -2,20 +2,22 @@
 
 skip_on_cran()  # second tier: tools/test --quick
 
-quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)), attribution = list(surrogates = 59))
+quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)),
+              attribution = list(surrogates = 59))
 
 two_rooms <- function(sun = c(a = 0, b = 0), seed = 1) {
   hour <- 1:240
   table <- data.frame(hour = hour, Te = 10 + 5 * sin(2 * pi * hour / 24) + cos(hour / 31))
   withr::with_seed(seed, {
-    clouds <- rep(stats::runif(10, 0.1, 1), each = 24)  # days that are alike are no surrogates of one another
+    # days that are alike are no surrogates of one another
+    clouds <- rep(stats::runif(10, 0.1, 1), each = 24)
     table$Gv <- clouds * pmax(0, 300 * sin(2 * pi * (hour - 7) / 24))
     table$a <- 20 + 0.4 * table$Te + sun[["a"]] * table$Gv + stats::rnorm(240, 0, 0.1)
     table$b <- 18 + 0.4 * table$Te + sun[["b"]] * table$Gv + stats::rnorm(240, 0, 0.2)
   })
   room <- function(target, noise_sd) {
-    measurements(table, time = "hour", target = target, boundary = ~ Te + Gv, noise_sd = noise_sd, unit = "K",
-                 validate = table$hour > 168, name = paste("room", target))
+    measurements(table, time = "hour", target = target, boundary = ~ Te + Gv, noise_sd = noise_sd,
+                 unit = "K", validate = table$hour > 168, name = paste("room", target))
   }
   list(a = room("a", 0.1), b = room("b", 0.2))
 }
@@ -28,13 +30,15 @@ room <- function(base) {
 rooms <- list(a = room("base a"), b = room("base b"))
 
 shining <- function(model, gain = "sun") {
-  with_parameters(model, free(gain, uniform(0, 0.05), "K m2/W"), boundary = "Gv", f = function(values, drivers, base) {
+  with_parameters(model, free(gain, uniform(0, 0.05), "K m2/W"), boundary = "Gv",
+                  f = function(values, drivers, base) {
     base(values) + values[[gain]] * drivers[, "Gv"]
   })
 }
 sun <- mechanism("sun", function(model) shining(model), "Gv", "Sun enters both rooms.")
-sun_in_a <- mechanism("sun in a", function(model, record) if (record == "a") shining(model, "sun a") else model, "Gv",
-                      "Sun enters room a.")
+sun_in_a <- mechanism("sun in a",
+                      function(model, record) if (record == "a") shining(model, "sun a") else model,
+                      "Gv", "Sun enters room a.")
 drift <- mechanism("drift", function(model) {
   with_parameters(model, free("drift", uniform(-1, 1), "K"), f = function(values, drivers, base) {
     base(values) + values[["drift"]] * seq_len(nrow(drivers)) / 240
@@ -42,8 +46,8 @@ drift <- mechanism("drift", function(model) {
 }, "Te", "The rooms warm up.")
 
 looped <- function(measured, ..., simulators = rooms, runs = 24, control = list()) {
-  upgrade_model(simulators, measured, catalogue(...), runs = runs, control = utils::modifyList(quick, control),
-                seed = 1, quiet = TRUE)
+  upgrade_model(simulators, measured, catalogue(...), runs = runs,
+                control = utils::modifyList(quick, control), seed = 1, quiet = TRUE)
 }
 
 cache <- new.env()
@@ -62,7 +66,8 @@ test_that("what both records lack is named, with one parameter for both", {
   expect_true(interval[1] < 0.01 && interval[2] > 0.01)
   expect_named(coef(upgrade), c("gain", "base a", "sun", "base b"))
   expect_s3_class(model$fit, "amiss_joint")
-  expect_equal(upgrade$candidates$beside_unknown[1], bayes_factor(model$fit, upgrade$models[[1]]$fit)$log10_bf)
+  expect_equal(upgrade$candidates$beside_unknown[1],
+               bayes_factor(model$fit, upgrade$models[[1]]$fit)$log10_bf)
   expect_identical(upgrade$candidates$judged_by, c("runs", "trial", "trial"))
   expect_gt(upgrade$runs_total, 0)
 })
@@ -86,7 +91,8 @@ test_that("what is hidden in one record is found there, by the mechanism that ac
   upgrade <- looped(measured, sun, sun_in_a)
   expect_identical(upgrade$named_cause$mechanism, "sun in a")
   first <- upgrade$candidates[upgrade$candidates$from == "base", ]
-  expect_gt(first$log10_bf[first$mechanism == "sun in a"], first$log10_bf[first$mechanism == "sun"] + 2)
+  expect_gt(first$log10_bf[first$mechanism == "sun in a"],
+            first$log10_bf[first$mechanism == "sun"] + 2)
   last <- upgrade$models[[length(upgrade$models)]]
   expect_named(last$fit$records$a$emulator$parameters, c("gain", "base a", "sun a"))
   expect_named(last$fit$records$b$emulator$parameters, c("gain", "base b"))
@@ -104,8 +110,8 @@ test_that("a list of one record gives the bits of the record alone", {
   expect_s3_class(listed$models[[1]]$fit, "amiss_calibration")
   expect_identical(listed$candidates, alone$candidates)
   expect_identical(listed$models[[2]]$fit$values, alone$models[[2]]$fit$values)
-  expect_identical(listed[c("gain", "named_cause", "stopped_because")], alone[c("gain", "named_cause",
-                                                                               "stopped_because")])
+  expect_identical(listed[c("gain", "named_cause", "stopped_because")],
+                   alone[c("gain", "named_cause", "stopped_because")])
 })
 
 test_that("an edit of two arguments gets the record's name, also of a single record", {
@@ -127,7 +133,8 @@ test_that("an edit of two arguments gets the record's name, also of a single rec
                class = "amiss_error_input")
 })
 
-test_that("an edit gets the simulator with its own names, and its parameters go by the others again", {
+test_that(
+  "an edit gets the simulator with its own names, and its parameters go by the others again", {
   apart <- rename_parameters(room("base a"), gain = "gain of c")
   extended <- amiss:::extend(apart, sun)
   expect_named(amiss:::free_parameters(extended), c("gain of c", "base a", "sun"))
@@ -154,8 +161,9 @@ test_that("what an upgrade is asked is answered for several records", {
   expect_identical(nrow(glance(upgrade)), 1L)
   expect_identical(tidy(upgrade)$term, names(coef(upgrade)))
   expect_identical(nobs(upgrade), 336L)
-  for (by_record in list(residuals(upgrade), fitted(upgrade), augment(upgrade), predict(upgrade, use = "validate"),
-                         simulate(upgrade, seed = 1))) expect_named(by_record, c("a", "b"))
+  for (by_record in list(residuals(upgrade), fitted(upgrade), augment(upgrade),
+                         predict(upgrade, use = "validate"), simulate(upgrade, seed = 1)))
+    expect_named(by_record, c("a", "b"))
   expect_identical(colnames(as.matrix(upgrade, draws = 8)), names(coef(upgrade)))
   expect_error(logLik(upgrade), class = "amiss_error_input")
   expect_output(print(upgrade$measurements), "2 records")
@@ -177,8 +185,8 @@ test_that("figures are of all records where they can be, and of each one", {
 test_that("a loop over records goes on from what was kept", {
   folder <- withr::local_tempdir()
   again <- function() {
-    upgrade_model(rooms, two_rooms(c(a = 0.01, b = 0.01)), catalogue(sun), runs = 24, control = quick, seed = 1,
-                  quiet = TRUE, checkpoint = folder)
+    upgrade_model(rooms, two_rooms(c(a = 0.01, b = 0.01)), catalogue(sun), runs = 24,
+                  control = quick, seed = 1, quiet = TRUE, checkpoint = folder)
   }
   first <- again()
   files <- dir(folder)
@@ -200,13 +208,14 @@ test_that("what does not fit together is refused before anything runs", {
   refused("named list", simulators = unname(rooms))
   refused("no simulator", simulators = list(a = rooms$a, b = 1))
   refused("amiss_measurements", of = list(a = measured$a, b = 1))
-  other <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"], free("gain", uniform(0, 2)),
-                              boundary = "Te")
+  other <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
+                              free("gain", uniform(0, 2)), boundary = "Te")
   refused("different priors", simulators = list(a = rooms$a, b = other))
   given <- simulate_design(rooms$a, measured$a, runs = 10, seed = 1)
   given["simulator"] <- list(NULL)
   refused("simulators of all records", simulators = list(a = given, b = rooms$b))
-  refused("one set of runs", simulators = rooms, of = measured, mechanism("runs", given, "Gv", "It acts."))
+  refused("one set of runs", simulators = rooms, of = measured,
+          mechanism("runs", given, "Gv", "It acts."))
   refused("runs", runs = 0)
 })
 
@@ -214,15 +223,17 @@ test_that("given runs of several records are looped over too", {
   measured <- two_rooms(c(a = 0.01, b = 0.01))
   made <- function(record, sun = NULL) {
     m <- measured[[record]]
-    priors <- c(list(free("gain", uniform(0, 1)), free(paste("base", record), uniform(15, 25))), sun)
+    priors <- c(list(free("gain", uniform(0, 1)), free(paste("base", record), uniform(15, 25))),
+                sun)
     unit <- withr::with_seed(length(priors), lhs::randomLHS(40, length(priors)))
     values <- amiss:::unit_to_values(unit, amiss:::named_parameters(priors))
     series <- cbind(m$raw$drivers[, "Te"], 1, m$raw$drivers[, "Gv"])[, seq_along(priors)]
     ensemble(values, tcrossprod(series, values), priors, measurements = m)
   }
   given <- list(a = made("a"), b = made("b"))
-  with_sun <- mechanism("sun", function(model, record) made(record, list(free("sun", uniform(0, 0.05)))), "Gv",
-                        "Sun enters.")
+  with_sun <- mechanism("sun",
+                        function(model, record) made(record, list(free("sun", uniform(0, 0.05)))),
+                        "Gv", "Sun enters.")
   upgrade <- looped(measured, with_sun, simulators = given)
   expect_identical(upgrade$models[[2]]$mechanism, "sun")
   expect_identical(upgrade$runs_total, 0)
@@ -245,14 +256,15 @@ write_rooms_study <- function(folder, records = NULL, drop = character(), ...) {
   writeLines('function(measurements) function_simulator(
     function(values, drivers) values[["own"]] + values[["gain"]] * drivers[, "Te"],
     free("gain", uniform(0, 1)), free("own", uniform(15, 25)), boundary = "Te", name = measurements$name)',
-    file.path(folder, "own.R"))
+             file.path(folder, "own.R"))
   writeLines('catalogue(mechanism("sun", function(model, record) {
     with_parameters(model, free("sun", uniform(0, 0.05), "K m2/W"), boundary = "Gv",
                     f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
   }, "Gv", "Sun enters both rooms."))', file.path(folder, "catalogue.R"))
-  fields <- list(study = "two rooms", time = "hour", target = "warmth", boundary = list("Te", "Gv"), unit = "K",
-                 calibrate = "hour <= 168", validate = "hour > 168", model = "models.R", catalogue = "catalogue.R",
-                 runs = 24, seed = 1, control = c(quick, list(max_steps = 1)),
+  fields <- list(study = "two rooms", time = "hour", target = "warmth", boundary = list("Te", "Gv"),
+                 unit = "K", calibrate = "hour <= 168", validate = "hour > 168", model = "models.R",
+                 catalogue = "catalogue.R", runs = 24, seed = 1,
+                 control = c(quick, list(max_steps = 1)),
                  records = records %||% list(a = list(data = "a.csv", noise_sd = 0.1),
                                              b = list(data = "b.csv", noise_sd = 0.2)), ...)
   path <- file.path(folder, "study.yml")
@@ -267,7 +279,8 @@ test_that("a study of several records is read: fields outside are those of all",
   expect_identical(vapply(study$measurements, `[[`, "", "name"), c(a = "a", b = "b"))
   expect_identical(vapply(study$measurements, `[[`, "", "unit"), c(a = "K", b = "K"))
   expect_named(study$model$b$parameters, c("gain", "base b"))
-  own <- list(a = list(data = "a.csv", noise_sd = 0.1), b = list(data = "b.csv", model = "own.R", noise_sd = 0.2))
+  own <- list(a = list(data = "a.csv", noise_sd = 0.1),
+              b = list(data = "b.csv", model = "own.R", noise_sd = 0.2))
   study <- read_study(write_rooms_study(folder, own), trust = TRUE)
   expect_named(study$model$b$parameters, c("gain", "own"))
   expect_identical(study$model$b$name, "b")
@@ -277,10 +290,12 @@ test_that("a study of several records is read: fields outside are those of all",
 test_that("records of a study that say too little or too much are refused", {
   folder <- withr::local_tempdir()
   refused <- function(what, ...) {
-    expect_error(read_study(write_rooms_study(folder, ...), trust = TRUE), what, class = "amiss_error_input")
+    expect_error(read_study(write_rooms_study(folder, ...), trust = TRUE), what,
+                 class = "amiss_error_input")
   }
   refused("record \"b\", lacks field data", list(a = list(data = "a.csv"), b = list(noise_sd = 1)))
-  refused("record.*\"b\".*unknown field seed", list(a = list(data = "a.csv"), b = list(data = "b.csv", seed = 2)))
+  refused("record.*\"b\".*unknown field seed",
+          list(a = list(data = "a.csv"), b = list(data = "b.csv", seed = 2)))
   refused("no mapping", list("a.csv", "b.csv"))
   refused("no mapping", list(a = "a.csv"))
   refused("no simulator of the record.*c", list(a = list(data = "a.csv", noise_sd = 1),
@@ -299,7 +314,8 @@ test_that("a study of several records runs to its report, whose figures are of e
   result <- run_study(write_rooms_study(folder), out = out, quiet = TRUE, trust = TRUE)
   expect_identical(result$named_cause$mechanism, "sun")
   expect_setequal(list.files(out), c("report.html", "figures", "result.rds", "result.json"))
-  expect_true(all(c("gain.png", "fit_of_a.png", "fit_of_b.png") %in% list.files(file.path(out, "figures"))))
+  expect_true(
+    all(c("gain.png", "fit_of_a.png", "fit_of_b.png") %in% list.files(file.path(out, "figures"))))
   model <- jsonlite::read_json(file.path(out, "result.json"))$models[[2]]
   expect_identical(vapply(model$records, `[[`, "", "name"), c("a", "b"))
   own <- result$models[[2]]$records$b
@@ -307,7 +323,8 @@ test_that("a study of several records runs to its report, whose figures are of e
   expect_equal(model$records[[2]]$held_out_gain, own$held_out_gain[c("mean", "standard_error")])
   expect_equal(model$rmse_calibration, result$models[[2]]$scores$calibrate[["rmse"]])
   page <- paste(readLines(file.path(out, "report.html"), encoding = "UTF-8"), collapse = "\n")
-  for (told in c("fit of a: ", "fit of b: ", "discrepancy of b: ", "times the noise", "Sun enters both rooms")) {
+  for (told in c("fit of a: ", "fit of b: ", "discrepancy of b: ", "times the noise",
+                 "Sun enters both rooms")) {
     expect_match(page, told, fixed = TRUE)
   }
 })

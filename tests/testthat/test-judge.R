@@ -1,10 +1,12 @@
-# Two models by hand, of ten days held out by the hour: the second one's error is `after`, the first one's `before`.
+# Two models by hand, of ten days held out by the hour: the second one's error is `after`, the first
+# one's `before`.
 models_of <- function(before, after, time = NULL) {
   n <- length(before)
   m <- list(use = rep("validate", n), y = rep(0, n), hours = 1e5 + seq_len(n), time = time)
   model <- function(error) {
     list(fit = list(measurements = m),
-         prediction = data.frame(use = "validate", observed = 0, mean = error, time = time %||% m$hours))
+         prediction = data.frame(use = "validate", observed = 0, mean = error,
+                                 time = time %||% m$hours))
   }
   lapply(list(before, after), model)
 }
@@ -71,9 +73,11 @@ test_that("each doubt makes a mechanism likely", {
   })
 })
 
-test_that("a condition that nobody gave a mechanism for, and that the record cannot tell apart, is a doubt", {
+test_that(paste("a condition that nobody gave a mechanism for, and that the record cannot tell",
+                "apart, is a doubt"), {
   twin <- function(u, significant = TRUE) {
-    u$models[[1]]$attribution$groups <- list(list(conditions = c("Gs", "Gv"), significant = significant))
+    u$models[[1]]$attribution$groups <- list(list(conditions = c("Gs", "Gv"),
+                                                  significant = significant))
     u
   }
   expect_doubt("answers to Gs as well, which this record cannot tell from Gv", twin)
@@ -90,10 +94,12 @@ test_that("so it is of a second sensor of the sun, not of one that is coarse", {
   doubts_of <- function(sd) {
     table <- small_record()
     table$Gs <- table$Gv + withr::with_seed(2, rnorm(nrow(table), 0, sd))
-    m <- measurements(table, time = "time", target = "Ti", boundary = ~ Te + Gv + Gs, noise_sd = 0.05,
-                      calibrate = seq_len(240) <= 168, validate = seq_len(240) > 168, warmup = 12)
-    upgrade <- upgrade_model(model_of(small_upgrade()$models[[1]]$fit), m, small_upgrade()$catalogue["sun"], seed = 1,
-                             quiet = TRUE, control = small_upgrade()$control)
+    m <- measurements(table, time = "time", target = "Ti", boundary = ~ Te + Gv + Gs,
+                      noise_sd = 0.05, calibrate = seq_len(240) <= 168,
+                      validate = seq_len(240) > 168, warmup = 12)
+    upgrade <- upgrade_model(model_of(small_upgrade()$models[[1]]$fit), m,
+                             small_upgrade()$catalogue["sun"], seed = 1, quiet = TRUE,
+                             control = small_upgrade()$control)
     upgrade$models[[2]]$doubts
   }
   expect_match(doubts_of(0.5), "answers to Gs as well")
@@ -107,19 +113,23 @@ test_that("what was adopted later is no other cause", {
   later <- upgrade$models[[2]]
   later[c("name", "parent", "mechanism")] <- list("base + sun + drift", "base + sun", "drift")
   upgrade$models[[3]] <- later
-  upgrade$candidates <- rbind(upgrade$candidates, transform(upgrade$candidates, from = "base + sun"))
+  upgrade$candidates <- rbind(upgrade$candidates,
+                              transform(upgrade$candidates, from = "base + sun"))
   upgrade <- rejudged(upgrade)
   expect_no_match(c("", upgrade$models[[2]]$doubts), "other causes")
   expect_false(any(grepl("tell sun from drift", upgrade_inspections(upgrade))))
 })
 
-test_that("where the base model's parameters could have come nearer by themselves, the gain says so", {
+test_that(
+  "where the base model's parameters could have come nearer by themselves, the gain says so", {
   upgrade <- small_upgrade()
   nearest <- amiss:::nearest_run(upgrade$models[[1]]$fit$emulator, upgrade$models[[1]]$fit)
-  runs <- simulate_design(model_of(upgrade$models[[1]]$fit), upgrade$measurements, runs = 20, seed = 1)
+  runs <- simulate_design(model_of(upgrade$models[[1]]$fit), upgrade$measurements, runs = 20,
+                          seed = 1)
   y <- upgrade$measurements$y[used_rows(upgrade$measurements, "calibrate")]
   # The basis leaves out less than a hundredth of the noise.
-  expect_equal(amiss:::nearest_run(train_emulator(runs, upgrade$measurements), upgrade$models[[1]]$fit),
+  expect_equal(amiss:::nearest_run(train_emulator(runs, upgrade$measurements),
+                                   upgrade$models[[1]]$fit),
                sqrt(min(colMeans((runs$outputs - y)^2))), tolerance = 1e-3)
   gain <- function(rmse) {
     upgrade$models[[1]]$scores$calibrate[["rmse"]] <- rmse
@@ -129,7 +139,8 @@ test_that("where the base model's parameters could have come nearer by themselve
   expect_no_match(gain(1.05 * nearest), "by only")
 })
 
-test_that("a parameter of the base model at the edge of its prior is no doubt about the mechanism", {
+test_that(
+  "a parameter of the base model at the edge of its prior is no doubt about the mechanism", {
   expect_identical(judged(function(u) {
     u$models[[2]]$fit$posterior$unit[, 1] <- 0.999
     u
@@ -166,12 +177,14 @@ test_that("the gain on data held out has the standard error of sums over days", 
   expect_equal(gain$mean, mean(fall))
   expect_equal(gain$standard_error, sqrt(10) * sd(days) / 240)
   expect_true(gain$improves)
-  # Its size: of 240 independent differences. A standard deviation of ten values has an error of 24 %.
+  # Its size: of 240 independent differences. A standard deviation of ten values has an error of 24
+  # %.
   expect_equal(gain$standard_error, sd(fall) / sqrt(240), tolerance = 0.75)
   # Of a short record, sums over eighths.
   short <- models_of(e$before[1:80], e$after[1:80])
   eighths <- colSums(matrix(fall[1:80], 10))
-  expect_equal(amiss:::held_out_gain(short[[1]], short[[2]])$standard_error, sqrt(8) * sd(eighths) / 80)
+  expect_equal(amiss:::held_out_gain(short[[1]], short[[2]])$standard_error,
+               sqrt(8) * sd(eighths) / 80)
 })
 
 test_that("days are counted by the hours of the measurements, whatever their time is written in", {
@@ -186,23 +199,26 @@ test_that("days are counted by the hours of the measurements, whatever their tim
   expect_identical(gain(stamp), gain(NULL))
   # A day of 10-minute steps stays one.
   models <- models_of(rep(e$before, 6), rep(e$after, 6))
-  exact <- as.numeric(as.POSIXct("2013-08-30 00:10:00", tz = "UTC") + 600 * (seq_len(1440) - 1)) / 3600
+  exact <-
+    as.numeric(as.POSIXct("2013-08-30 00:10:00", tz = "UTC") + 600 * (seq_len(1440) - 1)) / 3600
   for (k in 1:2) models[[k]]$fit$measurements$hours <- exact
   days <- colSums(matrix(rep(e$before^2 - e$after^2, 6), 144))
-  expect_equal(amiss:::held_out_gain(models[[1]], models[[2]])$standard_error, sqrt(10) * sd(days) / 1440)
+  expect_equal(amiss:::held_out_gain(models[[1]], models[[2]])$standard_error,
+               sqrt(10) * sd(days) / 1440)
 })
 
 test_that("a record with times as text is judged without a warning", {
   data <- small_record()
   data$time <- format(data$time, "%Y-%m-%d %H:%M:%S")
-  m <- measurements(data, time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05, warmup = 12,
-                    calibrate = seq_len(240) <= 168, validate = seq_len(240) > 168)
+  m <- measurements(data, time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05,
+                    warmup = 12, calibrate = seq_len(240) <= 168, validate = seq_len(240) > 168)
   as_text <- function(u) {
     u$models <- lapply(u$models, function(model) {
       model$fit$measurements <- m
       model$prediction$time <- m$time[m$use %in% c("calibrate", "validate")]
       # Large enough to be looked at by the clock.
-      model$prediction$observed <- model$prediction$observed + 2 * (seq_len(nrow(model$prediction)) %% 24 == 9)
+      model$prediction$observed <- model$prediction$observed +
+        2 * (seq_len(nrow(model$prediction)) %% 24 == 9)
       model
     })
     u$measurements <- m
@@ -233,12 +249,13 @@ test_that("parameters that are correlated with those of a mechanism beyond 0.4 a
     new <- runif(400)
     cbind(new, 0.5 * new + 0.5 * runif(400), runif(400), 0.1 * new + 0.9 * runif(400))
   })
-  fit <- list(values = `colnames<-`(unit, c("new", "close", "far", "loose")), weights = rep(1 / 400, 400),
-              posterior = list(unit = unit))
+  fit <- list(values = `colnames<-`(unit, c("new", "close", "far", "loose")),
+              weights = rep(1 / 400, 400), posterior = list(unit = unit))
   expect_identical(amiss:::confounded_parameters(fit, "new"), "close")
   expect_identical(amiss:::confounded_parameters(fit, c("new", "close")), character())
   expect_identical(amiss:::confounded_parameters(fit, character()), character())
-  expect_identical(amiss:::confounded_parameters(fit, c("new", "close", "far", "loose")), character())
+  expect_identical(amiss:::confounded_parameters(fit, c("new", "close", "far", "loose")),
+                   character())
   # Weights count: where the correlated part has none, nothing is left.
   half <- fit
   half$posterior$unit[201:400, 2] <- withr::with_seed(5, runif(200))
@@ -247,37 +264,44 @@ test_that("parameters that are correlated with those of a mechanism beyond 0.4 a
 })
 
 test_that("the edge of a prior is where the interval ends and the median lies", {
-  draws <- cbind(top = 1 - 0.02 * (1:500) / 500, bottom = 0.02 * (1:500) / 500, wide = (1:500) / 500,
-                 inside = 0.4 + 0.2 * (1:500) / 500)
+  draws <- cbind(top = 1 - 0.02 * (1:500) / 500, bottom = 0.02 * (1:500) / 500,
+                 wide = (1:500) / 500, inside = 0.4 + 0.2 * (1:500) / 500)
   fit <- list(values = draws, weights = rep(1 / 500, 500), posterior = list(unit = draws))
-  expect_identical(amiss:::edge_of_prior(fit), c(top = TRUE, bottom = TRUE, wide = FALSE, inside = FALSE))
+  expect_identical(amiss:::edge_of_prior(fit),
+                   c(top = TRUE, bottom = TRUE, wide = FALSE, inside = FALSE))
 })
 
 test_that("a stand-in is no named cause, and what is named goes before what is likely", {
   models <- function(...) {
-    adopted <- Map(function(name, verdict) list(parent = "base", mechanism = name, verdict = verdict),
-                   c("sun", "lag"), c(...))
+    adopted <- Map(
+      function(name, verdict) list(parent = "base", mechanism = name, verdict = verdict),
+      c("sun", "lag"), c(...))
     c(list(list(name = "base")), unname(adopted))
   }
   candidates <- data.frame(from = "base", mechanism = c("sun", "lag"), log10_bf = c(5, 3))
-  entries <- list(sun = list(boundary = "Gv", sentence = "Sun."), lag = list(boundary = "P", sentence = "Lag."))
+  entries <- list(sun = list(boundary = "Gv", sentence = "Sun."),
+                  lag = list(boundary = "P", sentence = "Lag."))
   cause <- function(...) amiss:::named_cause(models(...), candidates, entries)
   expect_null(cause("stand-in", "stand-in"))
-  expect_equal(cause("stand-in", "likely")[c("mechanism", "log10_bf")], list(mechanism = "lag", log10_bf = 3))
+  expect_equal(cause("stand-in", "likely")[c("mechanism", "log10_bf")],
+               list(mechanism = "lag", log10_bf = 3))
   expect_equal(cause("likely", "named")$mechanism, "lag")
   expect_equal(cause("named", "named")$boundary, "Gv")
   expect_null(amiss:::named_cause(list(list(name = "base")), candidates, entries))
 })
 
-test_that("a mechanism with which the simulation's own error rises is not adopted, and why is told", {
+test_that(
+  "a mechanism with which the simulation's own error rises is not adopted, and why is told", {
   upgrade <- base_only(small_upgrade())
   expect_lt(upgrade$candidates$error_ratio[upgrade$candidates$mechanism == "sun"], 0.5)
   upgrade$candidates$error_ratio <- 1.9
   told <- summary(upgrade)
-  expect_match(paste(told$sure, collapse = " "),
-               "not adopted, because with sun the simulation's own error .* does not fall \\(1.9 times")
+  expect_match(
+    paste(told$sure, collapse = " "),
+    "not adopted, because with sun the simulation's own error .* does not fall \\(1.9 times")
   expect_match(told$candidates[["error in calibration"]], "1.9 times", all = FALSE)
-  expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title, "the best does not lower the error")
+  expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title,
+               "the best does not lower the error")
   # One that loses to an unknown response is refused for that.
   upgrade$candidates[c("error_ratio", "beside_unknown")] <- list(0.5, -5)
   expect_match(paste(summary(upgrade)$sure, collapse = " "),
@@ -290,55 +314,69 @@ test_that("a mechanism with which the simulation's own error rises is not adopte
 test_that("why nothing was adopted names the best, also where the error rises with it", {
   present <- list(attribution = small_upgrade()$models[[2]]$attribution)
   context <- amiss:::new_context(1, 1, list(decisive = 2))
-  table <- data.frame(mechanism = c("sun", "lag"), log10_bf = c(1.2, 0.3), lower95 = c(0.1, -1), upper95 = 2,
-                      judged_by = "runs", error_ratio = c(1.4, 0.9), beside_unknown = 1)
+  table <- data.frame(mechanism = c("sun", "lag"), log10_bf = c(1.2, 0.3), lower95 = c(0.1, -1),
+                      upper95 = 2, judged_by = "runs", error_ratio = c(1.4, 0.9),
+                      beside_unknown = 1)
   told <- function(...) amiss:::no_winner(utils::modifyList(table, list(...)), present, context)
   expect_identical(told()$id, "not_decisive")
-  expect_match(told()$words, "no mechanism is decisive \\(best: sun, log10 Bayes factor 1.2; 2 or more")
+  expect_match(told()$words,
+               "no mechanism is decisive \\(best: sun, log10 Bayes factor 1.2; 2 or more")
   risen <- told(log10_bf = c(3, 0.3))
   expect_identical(risen$id, "keeps_error")
-  expect_match(risen$words, "lowers the error decisively \\(sun has a log10 Bayes factor of 3.0, but does not lower it")
+  expect_match(
+    risen$words,
+    "lowers the error decisively \\(sun has a log10 Bayes factor of 3.0, but does not lower it")
   expect_identical(told(log10_bf = c(3, 4), lower95 = c(1, -1))$id, "uncertain")
   expect_match(told(log10_bf = c(3, 4), lower95 = c(1, -1))$words, "too uncertain \\(best: lag")
   imitated <- told(log10_bf = c(1, 4), beside_unknown = c(1, -5))
   expect_identical(imitated$id, "imitated")
-  expect_match(imitated$words, "lag has a log10 Bayes factor of 4.0, but one of -5.0 beside an unknown response")
+  expect_match(imitated$words,
+               "lag has a log10 Bayes factor of 4.0, but one of -5.0 beside an unknown response")
   expect_identical(told(log10_bf = c(NA_real_, NA_real_))$id, "none_computed")
   # Rounded it would look like enough.
   expect_match(told(log10_bf = c(1.96, 0.3))$words, "log10 Bayes factor 1.96;")
 })
 
-test_that("where the base model's emulator is refuted, no mechanism is judged and no odds are given", {
+test_that(
+  "where the base model's emulator is refuted, no mechanism is judged and no odds are given", {
   open <- base_only(small_upgrade())
   expect_match(paste(summary(open)$sure, collapse = " "), "odds of")
   open$models[[1]]$fit$check$passed <- FALSE
-  open$models[[1]]$fit$trust <- list(trusted = FALSE,
-                                     verdict = "not trusted: the emulator's error is 0.64 of the noise")
+  open$models[[1]]$fit$trust <- list(
+    trusted = FALSE, verdict = "not trusted: the emulator's error is 0.64 of the noise")
   told <- summary(open)
   expect_identical(told$verdict, "unexplained")
-  expect_match(told$headline, "answers to Gv. Whether something is missing .* were not found cannot be told")
+  expect_match(told$headline,
+               "answers to Gv. Whether something is missing .* were not found cannot be told")
   expect_match(told$tag, "not good enough")
-  expect_no_match(paste(c(told$sure, told$inspect), collapse = " "), "missing is plain|Not decided is")
+  expect_no_match(paste(c(told$sure, told$inspect), collapse = " "),
+                  "missing is plain|Not decided is")
   stand_in(remaining_error = function(...) list(ratio = 3, large = TRUE, pattern = NULL))
-  expect_match(summary(open)$remains, "noise is too small, or something else is missing, or the parameters were not",
+  expect_match(summary(open)$remains,
+               "noise is too small, or something else is missing, or the parameters were not",
                all = FALSE)
   sure <- paste(told$sure, collapse = " ")
   expect_no_match(sure, "odds of|of the probability")
-  expect_match(sure, "No odds can be given for or against any mechanism: the emulator's error is 0.64 of the noise")
+  expect_match(
+    sure,
+    "No odds can be given for or against any mechanism: the emulator's error is 0.64 of the noise")
 })
 
 test_that("a mechanism that no boundary condition drives is not said to be driven", {
   upgrade <- small_upgrade()
-  expect_match(paste(summary(upgrade)$change, collapse = " "), "sun (named), driven by Gv:", fixed = TRUE)
+  expect_match(paste(summary(upgrade)$change, collapse = " "), "sun (named), driven by Gv:",
+               fixed = TRUE)
   upgrade$catalogue$sun$boundary <- character()
-  expect_match(paste(summary(upgrade)$change, collapse = " "), "sun (named): Sun enters", fixed = TRUE)
+  expect_match(paste(summary(upgrade)$change, collapse = " "), "sun (named): Sun enters",
+               fixed = TRUE)
   expect_no_match(paste(capture.output(print(upgrade)), collapse = " "), "sun ()", fixed = TRUE)
 })
 
 test_that("where the catalogue was empty, no mechanism of it is said to have failed", {
   upgrade <- base_only(small_upgrade())
   upgrade["candidates"] <- list(NULL)
-  expect_match(summary(upgrade)$headline, "Gv is missing from the model, but no mechanism was tried")
+  expect_match(summary(upgrade)$headline,
+               "Gv is missing from the model, but no mechanism was tried")
 })
 
 test_that("what has evidence only beside what it trades off with is likely at most", {
@@ -349,8 +387,9 @@ test_that("what has evidence only beside what it trades off with is likely at mo
   }
   models <- list(model("base", NULL, "C"), model("base + a", "a", c("C", "of_a")),
                  model("base + a + b", "b", c("C", "of_a", "of_b")))
-  candidates <- function(alone) data.frame(from = c("base", "base", "base + a"), mechanism = c("a", "b", "b"),
-                                           log10_bf = c(12, alone, 5))
+  candidates <- function(alone)
+    data.frame(from = c("base", "base", "base + a"), mechanism = c("a", "b", "b"),
+               log10_bf = c(12, alone, 5))
   told <- function(alone = -1, confounded = c("C", "of_a"), steps = 3) {
     amiss:::only_beside(models[seq_len(steps)], confounded, candidates(alone))
   }
@@ -360,7 +399,8 @@ test_that("what has evidence only beside what it trades off with is likely at mo
   expect_null(told(steps = 2))
 })
 
-test_that("where nothing is wrong in calibration and the error on held-out data is larger, the headline says so", {
+test_that(paste("where nothing is wrong in calibration and the error on held-out data is larger,",
+                "the headline says so"), {
   upgrade <- base_only(small_upgrade())
   base <- upgrade$models[[1]]
   base$attribution$table$significant <- FALSE
@@ -375,7 +415,8 @@ test_that("where nothing is wrong in calibration and the error on held-out data 
   }
   expect_identical(told(0.07)$tag, "Nothing decisive")
   expect_identical(told(0.12)$verdict, "nothing")
-  expect_match(told(0.12)$headline, "In calibration no mechanism is called for.* held-out data the error is 2.4 times")
+  expect_match(told(0.12)$headline,
+               "In calibration no mechanism is called for.* held-out data the error is 2.4 times")
 })
 
 test_that("why the one of highest evidence was not adopted is told", {
@@ -384,8 +425,9 @@ test_that("why the one of highest evidence was not adopted is told", {
   upgrade$candidates$log10_bf[other] <- max(upgrade$candidates$log10_bf) + 1
   upgrade$candidates$error_ratio[other] <- 1.2
   told <- paste(summary(upgrade)$sure, collapse = " ")
-  expect_match(told, paste("not adopted first, because with", upgrade$candidates$mechanism[other][1],
-                           "the simulation's own error in calibration does not fall \\(1.2 times as large"))
+  expect_match(
+    told, paste("not adopted first, because with", upgrade$candidates$mechanism[other][1],
+                "the simulation's own error in calibration does not fall \\(1.2 times as large"))
   upgrade$candidates$error_ratio[other] <- 0.9
   expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "not adopted first")
 })

@@ -1,4 +1,5 @@
-# A study that is killed leaves nothing half-written under the names of its results, and goes on to the same ones.
+# A study that is killed leaves nothing half-written under the names of its results, and goes on to
+# the same ones.
 skip_on_cran()  # second tier: tools/test --quick
 skip_on_os("windows")
 
@@ -10,15 +11,17 @@ kill_study <- function(folder) {
   writeLines("function_simulator(function(values, drivers) {
                 Sys.sleep(0.01)
                 values[['offset']] + 0.4 * drivers[, 'Te']
-              }, free('offset', uniform(10, 30), 'K'), boundary = 'Te', name = 'linear')", file.path(folder, "model.R"))
+              }, free('offset', uniform(10, 30), 'K'), boundary = 'Te', name = 'linear')",
+             file.path(folder, "model.R"))
   writeLines("catalogue(mechanism('sun', boundary = 'Gv', sentence = 'The sun shines in.', edit = function(model)
                 with_parameters(model, free('sun', uniform(0, 0.01)), boundary = 'Gv',
                   f = function(values, drivers, base) base(values) + values[['sun']] * drivers[, 'Gv'])))",
              file.path(folder, "catalogue.R"))
   path <- file.path(folder, "study.yml")
-  yaml::write_yaml(list(study = "killed", data = "data.csv", time = "hour", target = "Ti", boundary = list("Te", "Gv"),
-                        noise_sd = 0.1, calibrate = "hour <= 180", validate = "hour > 180", model = "model.R",
-                        catalogue = "catalogue.R", runs = 60, seed = 4,
+  yaml::write_yaml(list(study = "killed", data = "data.csv", time = "hour", target = "Ti",
+                        boundary = list("Te", "Gv"), noise_sd = 0.1, calibrate = "hour <= 180",
+                        validate = "hour > 180", model = "model.R", catalogue = "catalogue.R",
+                        runs = 60, seed = 4,
                         control = list(max_steps = 1, attribution = list(surrogates = 199))),
                    path)
   path
@@ -26,7 +29,8 @@ kill_study <- function(folder) {
 
 # Changes made to the package in another session: a report and figures that take no time, and more.
 quick_parts <- list(
-  report = "function(x, file, ...) writeLines(c(rep('a line of the report', 1e5), '</html>'), file)",
+  report =
+    "function(x, file, ...) writeLines(c(rep('a line of the report', 1e5), '</html>'), file)",
   save_figure = "function(figure, path, ...) writeLines(rep('a figure', 1e4), path)")
 
 # Killed when the first of its results is in place, or the first of earlier ones moved aside.
@@ -40,13 +44,14 @@ r_process <- function(folder, arguments, parts = quick_parts) {
   profile <- tempfile("profile-", folder)
   changes <- sprintf("utils::assignInNamespace('%s', %s, 'amiss')", names(parts), parts)
   writeLines(c("setHook(packageEvent('amiss', 'onLoad'), function(...) {", changes, "})"), profile)
-  processx::process$new(file.path(R.home("bin"), "Rscript"), arguments, stdout = "|", stderr = "2>&1",
-                        env = c("current", R_LIBS = paste(.libPaths(), collapse = ":"), R_PROFILE_USER = profile))
+  processx::process$new(
+    file.path(R.home("bin"), "Rscript"), arguments, stdout = "|", stderr = "2>&1",
+    env = c("current", R_LIBS = paste(.libPaths(), collapse = ":"), R_PROFILE_USER = profile))
 }
 
 run_command_on <- function(study, out, parts = quick_parts) {
-  r_process(dirname(study), c(system.file("exec", "amiss", package = "amiss"), "run", study, "--out", out, "--trust",
-                              "--quiet"), parts)
+  r_process(dirname(study), c(system.file("exec", "amiss", package = "amiss"), "run", study,
+                              "--out", out, "--trust", "--quiet"), parts)
 }
 
 # What a run found, without how long it took.
@@ -62,9 +67,12 @@ result_names <- c("figures", "report.html", "result.json", "result.rds")
 expect_whole <- function(out, reference) {
   there <- intersect(dir(out), result_names)
   if ("result.json" %in% there) expect_identical(found(out), reference)
-  if ("result.rds" %in% there) expect_s3_class(readRDS(file.path(out, "result.rds")), "amiss_upgrade")
-  if ("report.html" %in% there) expect_match(readLines(file.path(out, "report.html")), "</html>", all = FALSE)
-  if ("figures" %in% there) expect_true(all(file.size(dir(file.path(out, "figures"), full.names = TRUE)) > 0))
+  if ("result.rds" %in% there)
+    expect_s3_class(readRDS(file.path(out, "result.rds")), "amiss_upgrade")
+  if ("report.html" %in% there)
+    expect_match(readLines(file.path(out, "report.html")), "</html>", all = FALSE)
+  if ("figures" %in% there)
+    expect_true(all(file.size(dir(file.path(out, "figures"), full.names = TRUE)) > 0))
 }
 
 test_that("a study killed at any moment goes on to the result of one that was left alone", {
@@ -91,10 +99,12 @@ test_that("a study killed at any moment goes on to the result of one that was le
   last$wait()
   expect_identical(last$get_exit_status(), 0L)
   expect_identical(found(out), reference)
-  expect_setequal(grep("^earlier-", dir(out, all.files = TRUE, no.. = TRUE), value = TRUE, invert = TRUE), result_names)
+  expect_setequal(grep("^earlier-", dir(out, all.files = TRUE, no.. = TRUE), value = TRUE,
+                       invert = TRUE), result_names)
 })
 
-# Runs the study again and again until it is not interrupted, and looks each time whether the session is as before.
+# Runs the study again and again until it is not interrupted, and looks each time whether the
+# session is as before.
 interrupted_session <- "
   out <- commandArgs(TRUE)[2]
   state <- function() list(getwd(), options('warn', 'digits', 'OutDec', 'amiss.allow_large'), RNGkind(), sink.number(),
@@ -123,7 +133,8 @@ test_that("a session in which a study was interrupted is as it was, and can go o
   moments <- withr::with_seed(2, stats::runif(3, 0.2, 4))
   said <- character()
   next_line <- function() {
-    while (!length(line <- session$read_output_lines(1)) && session$is_incomplete_output()) session$poll_io(1000)
+    while (!length(line <- session$read_output_lines(1)) && session$is_incomplete_output())
+      session$poll_io(1000)
     said <<- c(said, line)
     line
   }

@@ -3,11 +3,12 @@ skip_on_os("windows")
 
 # A program that echoes what it is given, and notes each run's rows.
 echo <- function(..., frame = parent.frame()) {
-  program_simulator(c("sh", "-c",
-                      "cp drivers.csv $0; awk -F, 'NR == 1 { print \"Ti\" } NR > 1 { print {{a}} * $3 }' $0",
-                      seen_drivers), free("a", uniform(0, 2)), boundary = "Te",
-                    output = c(file = "stdout.txt", column = "Ti"),
-                    cache = withr::local_tempdir(.local_envir = frame), ...)
+  program_simulator(
+    c("sh", "-c",
+      "cp drivers.csv $0; awk -F, 'NR == 1 { print \"Ti\" } NR > 1 { print {{a}} * $3 }' $0",
+      seen_drivers),
+    free("a", uniform(0, 2)), boundary = "Te", output = c(file = "stdout.txt", column = "Ti"),
+    cache = withr::local_tempdir(.local_envir = frame), ...)
 }
 
 seen_drivers <- tempfile("seen")
@@ -16,8 +17,10 @@ withr::defer(unlink(seen_drivers), teardown_env())
 # Two segments of two days by hours, ten hours apart, Te the hour of the record.
 led_record <- function(lost = 0) {
   hour <- c(1:48, 59:106)
-  data <- data.frame(hour = hour, Te = hour, Ti = ifelse(seq_along(hour) <= lost, NA, hour + 0.1 * cos(1.7 * hour)))
-  suppressMessages(suppressWarnings(measurements(data, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)))
+  data <- data.frame(hour = hour, Te = hour,
+                     Ti = ifelse(seq_along(hour) <= lost, NA, hour + 0.1 * cos(1.7 * hour)))
+  suppressMessages(suppressWarnings(measurements(data, time = "hour", target = "Ti", boundary = ~Te,
+                                                 noise_sd = 0.1)))
 }
 
 # What the program was given for its last segment, and the runs.
@@ -60,7 +63,8 @@ test_that("rows without a target ahead of the record count as its lead-in", {
   expect_identical(segment_drivers(linear_simulator(), raw, first, "Te")$lead, 0)
 })
 
-test_that("a message says once that the first day is repeated, and the times are those of the record", {
+test_that(
+  "a message says once that the first day is repeated, and the times are those of the record", {
   data <- small_record(48)
   m <- measurements(data, time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.05)
   out <- suppressMessages(given(m, lead_in = 6))

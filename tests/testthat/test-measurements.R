@@ -17,8 +17,9 @@ test_that("bad tables are refused with what, where, the value and the mend", {
   fails(broken(hour = function(v) replace(v, 9, v[8])), "duplicated.*row 9")
   fails(broken(hour = function(v) replace(v, 9, 2)), "duplicated|goes back")
   fails(broken(hour = function(v) cumsum(rep(c(0.5, 1, 1.5), 80))), "unequal steps")
-  fails(broken(hour = function(v) replace(format(as.POSIXct("2026-01-01", tz = "UTC") + 3600 * v, "%Y-%m-%d %H:%M:%S"),
-                                          3, "noon")), "row 3 holds.*noon")
+  fails(broken(hour = function(v) replace(format(as.POSIXct("2026-01-01", tz = "UTC") + 3600 * v,
+                                                 "%Y-%m-%d %H:%M:%S"), 3, "noon")),
+        "row 3 holds.*noon")
   fails(data, "noise_sd.*positive", noise_sd = -1)
   fails(data, "needed", noise_sd = NULL)
   fails(data, "whole multiple", average = 1.5)
@@ -31,7 +32,8 @@ test_that("bad tables are refused with what, where, the value and the mend", {
 test_that("a constant boundary condition is left out with a warning", {
   data <- linear_data()
   data$Ws <- 3
-  expect_warning(m <- linear_measurements(data, boundary = ~ Te + Ws), "Ws.*not vary", class = "amiss_warning_input")
+  expect_warning(m <- linear_measurements(data, boundary = ~ Te + Ws), "Ws.*not vary",
+                 class = "amiss_warning_input")
   expect_equal(m$conditions, "Te")
   expect_error(linear_measurements(data, boundary = ~Ws), "No boundary condition varies",
                class = "amiss_error_input") |> suppressWarnings()
@@ -39,12 +41,13 @@ test_that("a constant boundary condition is left out with a warning", {
 
 test_that("a gap makes two segments, each with its own warm-up, and is told", {
   data <- linear_data()[-(100:130), ]
-  expect_warning(m <- linear_measurements(data, warmup = 10), "1 gap within.*row 99", class = "amiss_warning_input")
+  expect_warning(m <- linear_measurements(data, warmup = 10), "1 gap within.*row 99",
+                 class = "amiss_warning_input")
   expect_equal(unique(m$segment), c(1, 2))
   expect_equal(sum(m$use == "warmup"), 20)
   expect_equal(which(amiss:::segment_starts(m, amiss:::used_rows(m, "calibrate"))), c(1, 90))
-  expect_message(linear_measurements(data, calibrate = data$hour < 115, validate = data$hour > 115), "1 gap between",
-                 class = "amiss_message_gap")
+  expect_message(linear_measurements(data, calibrate = data$hour < 115, validate = data$hour > 115),
+                 "1 gap between", class = "amiss_message_gap")
 })
 
 test_that("averages are means of whole blocks with their standard errors", {
@@ -112,8 +115,8 @@ test_that("the bootstrapped noise is that of the closed form", {
   m <- linear_measurements(data, average = 6, noise_sd = bootstrap_noise(replicates = 4000))
   windows <- matrix(data$Ti, 6)
   exact <- apply(windows, 2, stats::sd) * sqrt(5 / 6) / sqrt(6)
-  # A standard deviation from B draws has a relative error of about 1 / sqrt(2 B) = 0.011; the largest of 40 is within
-  # 4.
+  # A standard deviation from B draws has a relative error of about 1 / sqrt(2 B) = 0.011; the
+  # largest of 40 is within 4.
   expect_lt(max(abs(m$noise$per_step / exact - 1)), 4 * 0.011)
   expect_equal(m$noise_sd, sqrt(mean(m$noise$per_step^2)))
   expect_equal(m$noise_sd, sqrt(mean(exact^2)), tolerance = 4 * 0.011 / sqrt(40))
@@ -122,13 +125,16 @@ test_that("the bootstrapped noise is that of the closed form", {
                    linear_measurements(data, average = 6, noise_sd = bootstrap_noise()))
 })
 
-test_that("a trend inside the windows is noise to the plain bootstrap, and not to the detrended one", {
+test_that(
+  "a trend inside the windows is noise to the plain bootstrap, and not to the detrended one", {
   set.seed(8)
-  data <- data.frame(hour = 1:1200, Te = sin(1:1200 / 9), Ti = 20 + 0.3 * (1:1200) + stats::rnorm(1200, 0, 0.2),
-                     Gv = stats::runif(1200))
-  noise <- function(...) linear_measurements(data, average = 6,
-                                             noise_sd = bootstrap_noise(replicates = 500, ...))$noise_sd
-  # 200 windows: the variance of detrended windows has 800 degrees of freedom, a relative error of 2.5 % of the sd.
+  data <- data.frame(hour = 1:1200, Te = sin(1:1200 / 9),
+                     Ti = 20 + 0.3 * (1:1200) + stats::rnorm(1200, 0, 0.2), Gv = stats::runif(1200))
+  noise <- function(...)
+    linear_measurements(data, average = 6,
+                        noise_sd = bootstrap_noise(replicates = 500, ...))$noise_sd
+  # 200 windows: the variance of detrended windows has 800 degrees of freedom, a relative error of
+  # 2.5 % of the sd.
   expect_equal(noise(detrend = TRUE), 0.2 / sqrt(6), tolerance = 0.08)
   expect_equal(noise(), sqrt((0.3^2 * (6^2 - 1) / 12 + 0.2^2 * 5 / 6) / 6), tolerance = 0.08)
 })
@@ -137,13 +143,17 @@ test_that("a noise that cannot be bootstrapped is refused", {
   data <- linear_data()
   fails(data, "not averaged", noise_sd = "bootstrap")
   fails(data, "not averaged", noise_sd = "bootstrap", average = 1)
-  fails(data, "an average is of 2 readings only", noise_sd = bootstrap_noise(detrend = TRUE), average = 2)
-  fails(broken(Ti = function(v) rep(20, 240)), "do not scatter", noise_sd = "bootstrap", average = 6)
+  fails(data, "an average is of 2 readings only", noise_sd = bootstrap_noise(detrend = TRUE),
+        average = 2)
+  fails(broken(Ti = function(v) rep(20, 240)), "do not scatter", noise_sd = "bootstrap",
+        average = 6)
   fails(data, "neither a number nor.*guess", noise_sd = "guess", average = 6)
   expect_error(bootstrap_noise(replicates = 3), "too few", class = "amiss_error_input")
   expect_equal(linear_measurements(data)$noise$method, "given")
-  expect_equal(linear_measurements(data, average = 6, noise_sd = NULL)$noise$method, "standard error")
-  missing <- linear_measurements(broken(Ti = function(v) replace(v, 9, NA)), average = 6, noise_sd = "bootstrap")
+  expect_equal(linear_measurements(data, average = 6, noise_sd = NULL)$noise$method,
+               "standard error")
+  missing <- linear_measurements(broken(Ti = function(v) replace(v, 9, NA)), average = 6,
+                                 noise_sd = "bootstrap")
   expect_equal(which(is.na(missing$noise$per_step)), 2)
 })
 
@@ -163,8 +173,8 @@ test_that("a study may ask for the bootstrap", {
 test_that("rows without a measurement are told, and not counted as data", {
   table <- data.frame(hour = 1:100, Ti = 20 + sin(1:100), Te = cos(1:100))
   table$Ti[c(20:24, 90)] <- NaN
-  m <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 10,
-                    validate = table$hour > 80)
+  m <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+                    warmup = 10, validate = table$hour > 80)
   told <- paste(capture.output(print(m)), collapse = " ")
   expect_match(told, "65 calibrate, 19 validate, 10 warm up")
   expect_match(told, "6 without a measurement, left out")
@@ -172,11 +182,13 @@ test_that("rows without a measurement are told, and not counted as data", {
 
 test_that("a formula names columns, and does not compute them", {
   data <- linear_data()
-  expect_error(linear_measurements(data, boundary = ~ log(Te) + Gv), "`log\\(Te\\)` is computed from them",
+  expect_error(linear_measurements(data, boundary = ~ log(Te) + Gv),
+               "`log\\(Te\\)` is computed from them", class = "amiss_error_input")
+  expect_error(linear_measurements(data, boundary = ~ Te * Gv), "`Te:Gv` is computed",
                class = "amiss_error_input")
-  expect_error(linear_measurements(data, boundary = ~ Te * Gv), "`Te:Gv` is computed", class = "amiss_error_input")
   names(data)[2] <- "Te (out)"
-  expect_identical(linear_measurements(data, boundary = ~ `Te (out)` + Gv)$conditions, c("Te (out)", "Gv"))
+  expect_identical(linear_measurements(data, boundary = ~ `Te (out)` + Gv)$conditions,
+                   c("Te (out)", "Gv"))
 })
 
 test_that("a warm-up of less than a step, or of the whole record, is told as such", {

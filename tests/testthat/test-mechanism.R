@@ -7,7 +7,8 @@ test_that("mechanisms and catalogues are checked", {
   expect_error(amiss:::extend(linear_simulator(), broken), "cannot be applied.*no such wall",
                class = "amiss_error_input")
   other <- mechanism("c", function(model) 3, "Te", "C.")
-  expect_error(amiss:::extend(linear_simulator(), other), "not a simulator", class = "amiss_error_input")
+  expect_error(amiss:::extend(linear_simulator(), other), "not a simulator",
+               class = "amiss_error_input")
 })
 
 test_that("every mechanism of the shipped catalogues applies to its model", {
@@ -20,26 +21,30 @@ test_that("every mechanism of the shipped catalogues applies to its model", {
   }
   expect_no_warning(amiss:::warn_absent_drivers(study$catalogue, study$measurements))
   for (entry in box_catalogue()) {
-    expect_gt(length(free_parameters(amiss:::extend(paper_box("M2"), entry))), length(free_parameters(paper_box("M2"))))
+    expect_gt(length(free_parameters(amiss:::extend(paper_box("M2"), entry))),
+              length(free_parameters(paper_box("M2"))))
   }
 })
 
 test_that("braces in another's message are left as they are", {
   broken <- mechanism("b", function(model) stop("no {way} }"), "Te", "B.")
-  expect_error(amiss:::extend(linear_simulator(), broken), "no {way} }", fixed = TRUE, class = "amiss_error_input")
+  expect_error(amiss:::extend(linear_simulator(), broken), "no {way} }", fixed = TRUE,
+               class = "amiss_error_input")
 })
 
 test_that("an edit that loses what was adopted before is refused", {
   gain <- free("gain", uniform(0, 1))
   sun <- free("sun", uniform(0, 1))
-  model <- function(...) function_simulator(function(values, drivers) 20 + 0 * drivers[, "Te"], ..., boundary = "Te")
+  model <- function(...)
+    function_simulator(function(values, drivers) 20 + 0 * drivers[, "Te"], ..., boundary = "Te")
   anew <- mechanism("leak", function(m) model(gain, free("leak", uniform(0, 1))), "Te", "It leaks.")
   expect_error(amiss:::extend(model(gain, sun), anew, adopted = "sun"),
                "\"leak\" drops the parameter \"sun\".*adopted before",
                class = "amiss_error_input")
   # What belongs to the base model may be replaced.
   expect_s3_class(amiss:::extend(model(gain, sun), anew), "amiss_function_simulator")
-  expect_s3_class(amiss:::extend(model(gain, sun), anew, adopted = "gain"), "amiss_function_simulator")
+  expect_s3_class(amiss:::extend(model(gain, sun), anew, adopted = "gain"),
+                  "amiss_function_simulator")
 })
 
 test_that("a loop whose second mechanism loses the first one stops with a reason", {
@@ -55,12 +60,13 @@ test_that("a loop whose second mechanism loses the first one stops with a reason
       function_simulator(run, offset, free(name, uniform(0, 1)), boundary = c("Te", column))
     })
   }
-  base <- function_simulator(function(values, drivers) values[["offset"]] + 0.4 * drivers[, "Te"], offset,
-                             boundary = "Te")
-  expect_error(upgrade_model(base, m, catalogue(make("sun", "Gv", 0.02), make("wall", "Te", 0.1)), runs = 20,
-                             seed = 1, quiet = TRUE,
-                             control = list(calibration = quick_ais, attribution = list(surrogates = 19))),
-               "\"wall\" could not be tried|drops the parameter", class = "amiss_error_input")
+  base <- function_simulator(function(values, drivers) values[["offset"]] + 0.4 * drivers[, "Te"],
+                             offset, boundary = "Te")
+  expect_error(
+    upgrade_model(base, m, catalogue(make("sun", "Gv", 0.02), make("wall", "Te", 0.1)), runs = 20,
+                  seed = 1, quiet = TRUE,
+                  control = list(calibration = quick_ais, attribution = list(surrogates = 19))),
+    "\"wall\" could not be tried|drops the parameter", class = "amiss_error_input")
 })
 
 test_that("two mechanisms of a function, adopted one after the other, are both kept", {
@@ -71,22 +77,26 @@ test_that("two mechanisms of a function, adopted one after the other, are both k
   added <- function(name, column, prior) {
     mechanism(name, boundary = column, sentence = "It acts.", edit = function(model) {
       with_parameters(model, free(name, prior), boundary = column,
-                      f = function(values, drivers, base) base(values) + values[[name]] * drivers[, column])
+                      f = function(values, drivers, base)
+                        base(values) + values[[name]] * drivers[, column])
     })
   }
-  upgrade <- upgrade_model(linear_simulator(), m,
-                           catalogue(added("wind", "Ws", normal(0, 1)), added("sun", "Gv", uniform(0, 0.02))),
-                           runs = 30, seed = 1, quiet = TRUE,
-                           control = list(calibration = quick_ais, attribution = list(surrogates = 19)))
+  upgrade <- upgrade_model(
+    linear_simulator(), m,
+    catalogue(added("wind", "Ws", normal(0, 1)), added("sun", "Gv", uniform(0, 0.02))), runs = 30,
+    seed = 1, quiet = TRUE,
+    control = list(calibration = quick_ais, attribution = list(surrogates = 19)))
   expect_setequal(vapply(upgrade$models[-1], `[[`, "", "mechanism"), c("sun", "wind"))
   last <- upgrade$models[[3]]$fit
   expect_setequal(names(last$emulator$parameters), c("offset", "gain", "sun", "wind"))
-  expect_equal(coef(last)[c("gain", "sun", "wind")], c(gain = 0.4, sun = 0.01, wind = -0.5), tolerance = 0.1)
+  expect_equal(coef(last)[c("gain", "sun", "wind")], c(gain = 0.4, sun = 0.01, wind = -0.5),
+               tolerance = 0.1)
   expect_lt(upgrade$models[[3]]$scores$calibrate[["rmse"]], 0.12)  # the noise is 0.1
   # Had the second no evidence alone and traded off with the first, it would be likely at most.
   expect_identical(upgrade$models[[3]]$verdict, "named")
   second <- upgrade$models[[3]]$mechanism
-  upgrade$candidates$log10_bf[upgrade$candidates$from == "base" & upgrade$candidates$mechanism == second] <- -1
+  upgrade$candidates$log10_bf[upgrade$candidates$from == "base" &
+                              upgrade$candidates$mechanism == second] <- -1
   expect_identical(rejudged(upgrade)$models[[3]]$verdict, "named")
   at <- match(c("sun", "wind"), names(last$emulator$parameters))
   upgrade$models[[3]]$fit$posterior$unit[, at[1]] <- last$posterior$unit[, at[2]]
@@ -103,13 +113,15 @@ test_that("a driver that is not among the conditions is told", {
   expect_warning(amiss:::warn_absent_drivers(catalogue(make("both", c("Wd", "Gv"))), m),
                  "\"Wd\" and \"Gv\", which are not among",
                  class = "amiss_warning_input")
-  expect_no_warning(amiss:::warn_absent_drivers(catalogue(make("film", "Te"), make("drift", character())), m))
+  expect_no_warning(
+    amiss:::warn_absent_drivers(catalogue(make("film", "Te"), make("drift", character())), m))
   # As the loop begins; what follows is stopped by an edit.
   stopped <- mechanism("sun", function(model) stop("far enough"), "Gv", "Sun.")
-  expect_warning(expect_error(upgrade_model(linear_simulator(), m, catalogue(stopped), runs = 20, seed = 1,
-                                            quiet = TRUE,
+  expect_warning(expect_error(upgrade_model(linear_simulator(), m, catalogue(stopped), runs = 20,
+                                            seed = 1, quiet = TRUE,
                                             control = list(calibration = quick_ais,
-                                                           attribution = list(surrogates = 19))), "far enough"),
+                                                           attribution = list(surrogates = 19))),
+                              "far enough"),
                  "driven by", class = "amiss_warning_input")
 })
 
@@ -125,7 +137,8 @@ test_that("a part of a catalogue is a catalogue", {
 
 test_that("held-out data are judged at the step that adopted a mechanism", {
   data <- linear_data(240)
-  # The sun has an effect in calibration, the wind in both, and held out the wind hides what the sun brings.
+  # The sun has an effect in calibration, the wind in both, and held out the wind hides what the sun
+  # brings.
   held <- data$hour > 180
   data$Ws <- data$Gv / 100 * ifelse(held, 1, 0) + withr::with_seed(4, stats::rnorm(240, 0, 0.1))
   data$Ti <- data$Ti + 0.01 * data$Gv - 1.6 * data$Ws
@@ -133,12 +146,14 @@ test_that("held-out data are judged at the step that adopted a mechanism", {
   added <- function(name, column, prior) {
     mechanism(name, boundary = column, sentence = "It acts.", edit = function(model) {
       with_parameters(model, free(name, prior), boundary = column,
-                      f = function(values, drivers, base) base(values) + values[[name]] * drivers[, column])
+                      f = function(values, drivers, base)
+                        base(values) + values[[name]] * drivers[, column])
     })
   }
   both <- catalogue(added("wind", "Ws", uniform(-3, 0)), added("sun", "Gv", uniform(0, 0.02)))
   upgrade <- upgrade_model(linear_simulator(), m, both, seed = 1, quiet = TRUE,
-                           control = list(calibration = quick_ais, attribution = list(surrogates = 19)))
+                           control = list(calibration = quick_ais,
+                                          attribution = list(surrogates = 19)))
   expect_identical(vapply(upgrade$models[-1], `[[`, "", "mechanism"), c("sun", "wind"))
   first <- upgrade$models[[2]]
   expect_false(first$held_out_gain$improves)
@@ -149,6 +164,6 @@ test_that("held-out data are judged at the step that adopted a mechanism", {
 
 test_that("a list is no catalogue, and how it becomes one is told", {
   expect_error(catalogue(list()), "do.call\\(catalogue, list\\)", class = "amiss_error_input")
-  expect_error(upgrade_model(linear_simulator(), linear_measurements(), list()), "Make it with `catalogue\\(\\)`",
-               class = "amiss_error_input")
+  expect_error(upgrade_model(linear_simulator(), linear_measurements(), list()),
+               "Make it with `catalogue\\(\\)`", class = "amiss_error_input")
 })

@@ -55,9 +55,11 @@ test_that("update() repeats a calibration, with what changes", {
   expect_equal(free$reach, c("Inf" = 1))
   expect_identical(free$control$ais, fit$control$ais)
   # What follows from the measurements follows from the new ones.
-  expect_equal(update(fit, measurements = linear_measurements(noise_sd = 0.2))$control$amplitude, 0.2)
+  expect_equal(update(fit, measurements = linear_measurements(noise_sd = 0.2))$control$amplitude,
+               0.2)
   expect_error(update(fit, runs = 3), class = "rlib_error_dots_nonempty")
-  expect_error(update(fit, control = list(reaches = 3)), "unknown option", class = "amiss_error_input")
+  expect_error(update(fit, control = list(reaches = 3)), "unknown option",
+               class = "amiss_error_input")
 })
 
 test_that("an upgrade answers by its last model", {
@@ -79,9 +81,8 @@ test_that("an upgrade answers by its last model", {
 })
 
 test_that("what is asked and not known is an error", {
-  calls <- list(coef, confint, vcov, fitted, residuals, nobs, generics::tidy, generics::glance, generics::augment,
-                summary,
-                predict, simulate, as.data.frame, as.matrix, update)
+  calls <- list(coef, confint, vcov, fitted, residuals, nobs, generics::tidy, generics::glance,
+                generics::augment, summary, predict, simulate, as.data.frame, as.matrix, update)
   for (own in list(fit, paper)) for (call in calls)
     expect_error(call(own, nonsense = 1), class = "rlib_error_dots_nonempty")
   for (call in list(coef, confint, generics::tidy, generics::glance, predict)) {
@@ -92,12 +93,12 @@ test_that("what is asked and not known is an error", {
 })
 
 test_that("everything prints on standard output, in fifteen lines, and names the next step", {
-  shown <- list(upgrade, upgrade$catalogue, upgrade$catalogue$sun, upgrade$models[[1]]$attribution, fit, paper,
-                summary(fit),
-                summary(paper), fit$measurements, discrepancy(fit), fit$emulator, fit$emulator$simulator,
+  shown <- list(upgrade, upgrade$catalogue, upgrade$catalogue$sun, upgrade$models[[1]]$attribution,
+                fit, paper, summary(fit), summary(paper), fit$measurements, discrepancy(fit),
+                fit$emulator, fit$emulator$simulator,
                 simulate_design(linear_simulator(), fit$measurements, runs = 12, seed = 1),
-                ais(function(values) -0.5 * rowSums(values^2), list(a = normal(0, 1)), list(pilot_chains = 24),
-                    seed = 1))
+                ais(function(values) -0.5 * rowSums(values^2), list(a = normal(0, 1)),
+                    list(pilot_chains = 24), seed = 1))
   for (x in shown) {
     expect_silent(lines <- capture.output(same <- print(x)))
     expect_identical(same, x)
@@ -106,7 +107,8 @@ test_that("everything prints on standard output, in fifteen lines, and names the
   }
 })
 
-test_that("a summary of the paper's calibration leads to its index, not to an attribution that it does not have", {
+test_that(paste("a summary of the paper's calibration leads to its index, not to an attribution",
+                "that it does not have"), {
   told <- paste(capture.output(print(summary(paper))), collapse = " ")
   expect_match(told, "index")
   expect_no_match(told, "attribute_discrepancy")
@@ -116,7 +118,9 @@ test_that("the print of an upgrade names every mechanism, however many", {
   many <- upgrade
   step <- upgrade$models[[2]]
   names <- paste("mechanism", 1:12)
-  many$models <- c(many$models[1], lapply(names, function(n) utils::modifyList(step, list(name = n, mechanism = n))))
+  many$models <- c(many$models[1],
+                   lapply(names,
+                          function(n) utils::modifyList(step, list(name = n, mechanism = n))))
   row <- upgrade$candidates[upgrade$candidates$mechanism == "sun", ]
   many$candidates <- do.call(rbind, lapply(names, function(n) transform(row, mechanism = n)))
   many$catalogue[names] <- list(upgrade$catalogue$sun)

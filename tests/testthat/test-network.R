@@ -1,5 +1,5 @@
-# Networks of nodes, links, flows and gains, against computations of other kinds. Formulas of the engine are tested in
-# tests/cpp/network.
+# Networks of nodes, links, flows and gains, against computations of other kinds. Formulas of the
+# engine are tested in tests/cpp/network.
 
 house <- function(...) {
   network(network_node("air", free("C_air", uniform(0.2, 5), "kWh/K")),
@@ -11,8 +11,8 @@ house <- function(...) {
 
 house_drivers <- function(n = 48) {
   hour <- seq_len(n)
-  cbind(Te = 5 + 4 * sin(hour / 4), P = ifelse(hour %% 8 < 3, 2, 0), Gv = pmax(0, 400 * sin(hour / 4 - 1)),
-        wind = 3 + 2 * cos(hour / 5))
+  cbind(Te = 5 + 4 * sin(hour / 4), P = ifelse(hour %% 8 < 3, 2, 0),
+        Gv = pmax(0, 400 * sin(hour / 4 - 1)), wind = 3 + 2 * cos(hour / 5))
 }
 
 house_values <- function(...) rbind(c(C_air = 0.8, C_wall = 6, R_inside = 0.7, R_outside = 6, ...))
@@ -20,9 +20,11 @@ house_values <- function(...) rbind(c(C_air = 0.8, C_wall = 6, R_inside = 0.7, R
 test_that("a house follows lsoda of deSolve", {
   skip_if_not_installed("deSolve")
   drivers <- house_drivers()
-  leak <- network_link("air", "Te", conductance = free("leak", uniform(0, 0.1)), by = "wind", name = "leak")
+  leak <- network_link("air", "Te", conductance = free("leak", uniform(0, 0.1)), by = "wind",
+                       name = "leak")
   sun <- network_gain("wall", "Gv", free("A", uniform(0, 10), "m2") * 1e-3)
-  model <- change_component(change_component(house(leak, sun), "air", start = 20), "wall", start = 12)
+  model <- change_component(change_component(house(leak, sun), "air", start = 20), "wall",
+                            start = 12)
   model <- change_component(model, "network", output_at = "end")
   v <- house_values(leak = 0.01, A = 4)
   change <- function(t, x, p) {
@@ -33,7 +35,8 @@ test_that("a house follows lsoda of deSolve", {
     list(c(air / v[, "C_air"], wall / v[, "C_wall"]))
   }
   x <- c(20, 12)
-  other <- vapply(seq_len(nrow(drivers)), function(k) {  # restarted at each row, where the drivers jump
+  # restarted at each row, where the drivers jump
+  other <- vapply(seq_len(nrow(drivers)), function(k) {
     x <<- deSolve::lsoda(x, c(k - 1, k - 1e-9), change, NULL, rtol = 1e-10, atol = 1e-10)[2, -1]
     x[1]
   }, 0)
@@ -45,7 +48,8 @@ test_that("slopes are those of differences, in units of the parameters", {
   sun <- network_gain("wall", "Gv", free("A", uniform(0, 10), "m2") * 1e-3)
   ground <- network_node("ground", Inf, start = free("T_ground", normal(12, 2)))
   below <- network_link("air", "ground", conductance = 0.05)
-  model <- change_component(house(sun, ground, below), "network", before = list(Te = free("Te_before", normal(5, 2))))
+  model <- change_component(house(sun, ground, below), "network",
+                            before = list(Te = free("Te_before", normal(5, 2))))
   v <- house_values(A = 4, T_ground = 11, Te_before = 3)
   drivers <- house_drivers()
   hold <- c(rep(20.5, 6), rep(NA, 42))
@@ -66,9 +70,11 @@ test_that("slopes are those of differences, in units of the parameters", {
 test_that("water that rains into two stores leaves by the river or is still there", {
   rain <- cbind(rain = c(rep(0, 5), 4, 2, rep(0, 500)))
   catchment <- function(output) {
-    network(network_node("soil", 1, start = 20), network_node("ground", 1, start = 30), network_gain("soil", "rain"),
+    network(network_node("soil", 1, start = 20), network_node("ground", 1, start = 30),
+            network_gain("soil", "rain"),
             network_flow("soil", "ground", rate = free("k", uniform(0, 1), "1/h")),
-            network_flow("ground", NULL, rate = 0.03, name = "river"), output = output, output_at = "mean")
+            network_flow("ground", NULL, rate = 0.03, name = "river"), output = output,
+            output_at = "mean")
   }
   k <- cbind(k = 0.1)
   flowed <- sum(simulate_runs(catchment("river"), k, rain, 1))
@@ -78,14 +84,16 @@ test_that("water that rains into two stores leaves by the river or is still ther
   }, 0)
   expect_equal(flowed + sum(left), 20 + 30 + 6, tolerance = 1e-10)
   # The soil empties as exp(-k t) until it rains.
-  expect_equal(simulate_runs(change_component(catchment("soil"), "network", output_at = "end"), k, rain, 1)[1:5, 1],
-               20 * exp(-0.1 * 1:5))
+  expect_equal(simulate_runs(change_component(catchment("soil"), "network", output_at = "end"), k,
+                             rain, 1)[1:5, 1], 20 * exp(-0.1 * 1:5))
 })
 
 test_that("a tracer that flows through two tanks keeps its amount", {
   tanks <- network(network_node("first", 4, start = 10), network_node("second", 2, start = 0),
-                   network_flow("first", "second", rate = 0.5), network_flow("second", NULL, rate = 0.5, name = "out"),
-                   network_flow("inlet", "first", rate = free("q", uniform(0, 1), "m3/h")), output = "out")
+                   network_flow("first", "second", rate = 0.5),
+                   network_flow("second", NULL, rate = 0.5, name = "out"),
+                   network_flow("inlet", "first", rate = free("q", uniform(0, 1), "m3/h")),
+                   output = "out")
   inlet <- cbind(inlet = rep(0, 400))
   expect_equal(sum(simulate_runs(tanks, cbind(q = 0.5), inlet, 1)), 40, tolerance = 1e-9)
 })
@@ -103,7 +111,8 @@ test_that("rows half as long give the same means", {
   v <- house_values()
   drivers <- house_drivers()
   half <- simulate_runs(house(), v, drivers[rep(1:48, each = 2), ], 0.5)[, 1]
-  expect_equal(colMeans(matrix(half, 2)), simulate_runs(house(), v, drivers, 1)[, 1], tolerance = 1e-12)
+  expect_equal(colMeans(matrix(half, 2)), simulate_runs(house(), v, drivers, 1)[, 1],
+               tolerance = 1e-12)
 })
 
 test_that("edits add, change and take away", {
@@ -128,10 +137,11 @@ test_that("what does not fit together is refused, by name", {
   refused <- function(code, words) expect_error(code, words, class = "amiss_error_input")
   refused(network(network_node("air", 1), output = "wall"), "no such part")
   refused(network(network_link("air", "Te", 1), output = "air-Te"), "at least one")
-  refused(network(network_node("air", 1), network_link("wall", "Te", 1), output = "air"), "no such node")
+  refused(network(network_node("air", 1), network_link("wall", "Te", 1), output = "air"),
+          "no such node")
   refused(network(network_node("air", 1), network_node("air", 2), output = "air"), "more than once")
-  refused(network(network_node("air", 1), network_node("wall", 1), network_gain("air", "wall"), output = "air"),
-          "is a node")
+  refused(network(network_node("air", 1), network_node("wall", 1), network_gain("air", "wall"),
+                  output = "air"), "is a node")
   refused(network_link("air", "Te"), "one of")
   refused(network_link("air", "air", 1), "to itself")
   refused(network_link("air", "Te", free("H", normal(0, 1))), "reaches")
@@ -146,13 +156,15 @@ test_that("what does not fit together is refused, by name", {
   refused(simulate_runs(house(), house_values(), gap, 1), "missing or infinite")
 })
 
-test_that("the catalogue has ten mechanisms, each extends the house, and what is there is left out", {
-  all <- network_catalogue(house(), envelope = "wall", outdoors = "Te", sun = "Gv", heating = "P", wind = "wind",
-                           neighbour = "Tn")
+test_that(
+  "the catalogue has ten mechanisms, each extends the house, and what is there is left out", {
+  all <- network_catalogue(house(), envelope = "wall", outdoors = "Te", sun = "Gv", heating = "P",
+                           wind = "wind", neighbour = "Tn")
   expect_length(all, 10)
   for (one in all) {
     extended <- one$edit(house())
-    expect_true(all(names(free_parameters(house())) %in% names(free_parameters(extended))), info = one$name)
+    expect_true(all(names(free_parameters(house())) %in% names(free_parameters(extended))),
+                info = one$name)
     expect_gt(length(free_parameters(extended)), length(free_parameters(house())))
   }
   sunny <- house(network_gain("air", "Gv", 1e-3))
@@ -167,10 +179,13 @@ test_that("a hidden sun is found with exact slopes, in fewer runs than differenc
   set.seed(4)
   n <- 24 * 12
   weather <- synthetic_weather(12, step_h = 1, seed = 3)
-  data <- data.frame(hour = seq_len(n), Te = weather$Te, Gv = weather$Gv, P = rolbs(n, 1, power = 2, seed = 2))
-  data$Ti <- simulate_runs(truth, house_values(), as.matrix(data[c("Te", "P", "Gv")]), 1)[, 1] + rnorm(n, 0, 0.1)
-  m <- suppressMessages(measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv + P, noise_sd = 0.1,
-                                     warmup = 24, calibrate = seq_len(n) <= 200, validate = seq_len(n) > 200))
+  data <- data.frame(hour = seq_len(n), Te = weather$Te, Gv = weather$Gv,
+                     P = rolbs(n, 1, power = 2, seed = 2))
+  data$Ti <- simulate_runs(truth, house_values(), as.matrix(data[c("Te", "P", "Gv")]), 1)[, 1] +
+    rnorm(n, 0, 0.1)
+  m <- suppressMessages(measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv + P,
+                                     noise_sd = 0.1, warmup = 24, calibrate = seq_len(n) <= 200,
+                                     validate = seq_len(n) > 200))
   causes <- network_catalogue(house(), outdoors = "Te", sun = "Gv", heating = "P")
   found <- suppressWarnings(upgrade_model(house(), m, causes, seed = 1, quiet = TRUE))
   expect_identical(found$models[[length(found$models)]]$mechanism, "sun on the air")

@@ -2,20 +2,23 @@
 paper_data_frame <- function(extra = function(data) 0, seed = 5, n = 60) {
   set.seed(seed)
   hour <- seq_len(n)
-  data <- data.frame(hour = hour, Te = 10 + 5 * sin(2 * pi * hour / 24) + stats::rnorm(n), Gv = stats::runif(n, 0, 300),
-                     Wd = stats::runif(n, 0, 360))
+  data <- data.frame(hour = hour, Te = 10 + 5 * sin(2 * pi * hour / 24) + stats::rnorm(n),
+                     Gv = stats::runif(n, 0, 300), Wd = stats::runif(n, 0, 360))
   data$Ti <- 20 + 0.4 * data$Te + extra(data) + stats::rnorm(n, 0, 0.1)
   data
 }
 
 paper_measurements <- function(data) {
-  measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv + circular(Wd), noise_sd = 0.1, unit = "K")
+  measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv + circular(Wd),
+               noise_sd = 0.1, unit = "K")
 }
 
-paper_fit <- made_once(function(data = paper_data_frame(), control = list(), seed = 3, threads = 2) {
+paper_fit <- made_once(function(data = paper_data_frame(), control = list(), seed = 3,
+                                threads = 2) {
   m <- paper_measurements(data)
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
-  calibrate_paper(emulator, m, utils::modifyList(quick_ais, control), seed = seed, threads = threads)
+  calibrate_paper(emulator, m, utils::modifyList(quick_ais, control), seed = seed,
+                  threads = threads)
 })
 
 sun <- function(data) 1.5 * sin(data$Gv / 100)
@@ -34,11 +37,14 @@ test_that("a planted effect is significant, first, and its share known; the para
   data <- paper_data_frame(sun)
   outside <- function(v) stats::lm.fit(cbind(1, data$Te), v)$residuals
   noise <- data$Ti - 20 - 0.4 * data$Te - sun(data)
-  expect_equal(table$difference[1], 1 - sum(outside(noise)^2) / sum(outside(data$Ti)^2), tolerance = 0.05)
-  # A discrepancy outside the simulation space does not widen (5): within four of its standard deviations.
+  expect_equal(table$difference[1], 1 - sum(outside(noise)^2) / sum(outside(data$Ti)^2),
+               tolerance = 0.05)
+  # A discrepancy outside the simulation space does not widen (5): within four of its standard
+  # deviations.
   gain <- fit$values[, "gain"]
   centre <- sum(fit$weights * gain)
-  expect_lt(abs(centre - stats::lm(Ti ~ Te, data)$coefficients[["Te"]]), 4 * sqrt(sum(fit$weights * (gain - centre)^2)))
+  expect_lt(abs(centre - stats::lm(Ti ~ Te, data)$coefficients[["Te"]]),
+            4 * sqrt(sum(fit$weights * (gain - centre)^2)))
 })
 
 test_that("the total is the product of the two evidences, a density of the record", {
@@ -79,12 +85,14 @@ test_that("draws have the shape that is promised and obey their priors' limits",
   expect_identical(ncol(paper_fit()$lambda), ncol(fit$emulator$basis$vectors))
   expect_identical(nrow(fit$values), length(fit$weights))
   # Posterior mean discrepancy: orthogonal to the simulation space.
-  d <- amiss:::paper_discrepancy_(amiss:::paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
-                                  lapply(fit$hyperparameters[c("alpha", "t2", "lambda")],
-                                         function(v) if (is.matrix(v)) v[1:2, ] else v[1:2]),
-                                  amiss:::engine_context(1, 1))
+  d <- amiss:::paper_discrepancy_(
+    amiss:::paper_data(fit$emulator, fit$measurements, fit$rows, fit$control),
+    fit$priors, lapply(fit$hyperparameters[c("alpha", "t2", "lambda")],
+                       function(v) if (is.matrix(v)) v[1:2, ] else v[1:2]),
+    amiss:::engine_context(1, 1))
   expect_identical(dim(d$mean), c(60L, 2L))
-  expect_lt(max(abs(crossprod(fit$emulator$basis$vectors, d$mean))), 1e-6 * max(abs(fit$emulator$basis$vectors)))
+  expect_lt(max(abs(crossprod(fit$emulator$basis$vectors, d$mean))),
+            1e-6 * max(abs(fit$emulator$basis$vectors)))
   expect_true(all(d$variance >= 0 & d$variance < 10))
 })
 
@@ -111,9 +119,11 @@ test_that("a longer record is annealed through thinned ones, and its values are 
   expect_identical(names(approximation$values), c("earlier", "skeleton", "direct"))
   dense <- paper_fit(data, control = list(tolerance = 0))
   expect_identical(dense$outside$approximation$values[["skeleton"]], 0L)
-  expect_lt(abs(fast$log_evidence - dense$log_evidence), 4 * sqrt(fast$standard_error^2 + dense$standard_error^2))
+  expect_lt(abs(fast$log_evidence - dense$log_evidence),
+            4 * sqrt(fast$standard_error^2 + dense$standard_error^2))
   expect_identical(fast$index$boundary[1], "Gv")
-  expect_error(paper_fit(data, control = list(tolerance = 2)), "tolerance", class = "amiss_error_input")
+  expect_error(paper_fit(data, control = list(tolerance = 2)), "tolerance",
+               class = "amiss_error_input")
 })
 
 test_that("it prints, and options are checked", {
@@ -121,23 +131,25 @@ test_that("it prints, and options are checked", {
   expect_match(printed(fit), "log10 evidence.*significant")
   expect_error(calibrate_paper(fit$emulator, fit$measurements, list(chains = 3)), "unknown option",
                class = "amiss_error_input")
-  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(alpha = 1)), "alpha", class = "amiss_error_input")
-  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(t2 = c(1, -1))), "t2", class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(alpha = 1)), "alpha",
+               class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(t2 = c(1, -1))), "t2",
+               class = "amiss_error_input")
   expect_error(calibrate_paper(fit$emulator, fit$measurements, list(confidence = 3)), "confidence",
                class = "amiss_error_input")
-  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(shared_lambda = 2)), "shared_lambda",
-               class = "amiss_error_input")
-  expect_error(calibrate_paper(fit$emulator, paper_measurements(paper_data_frame(n = 40))), "60 steps.*40",
-               class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, fit$measurements, list(shared_lambda = 2)),
+               "shared_lambda", class = "amiss_error_input")
+  expect_error(calibrate_paper(fit$emulator, paper_measurements(paper_data_frame(n = 40))),
+               "60 steps.*40", class = "amiss_error_input")
 })
 
 test_that("the unit of the basis does not matter", {
   m <- paper_measurements(paper_data_frame(sun))
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
   fit <- calibrate_paper(emulator, m, quick_ais, seed = 3)
-  # Rounding of the last digit, which chains and the emulator's inverse (condition 1e10) amplify, is all that remains:
-  # by a power of two only that of the logarithms. Without the Jacobian |K'K|^(-1/2) it would be Q log(factor), more
-  # than 13.
+  # Rounding of the last digit, which chains and the emulator's inverse (condition 1e10) amplify, is
+  # all that remains: by a power of two only that of the logarithms. Without the Jacobian
+  # |K'K|^(-1/2) it would be Q log(factor), more than 13.
   for (factor in c(2^10, 2^-10, 1000)) {
     other <- calibrate_paper(rescaled(emulator, factor), m, quick_ais, seed = 3)
     tolerance <- if (factor == 1000) 1e-5 else 1e-8

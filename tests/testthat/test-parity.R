@@ -7,5 +7,6 @@ test_that("every stage gives what it gave", {
   sys.source(file.path(folder, "cases.R"), scope)
   reference <- jsonlite::read_json(file.path(folder, "reference.json"), simplifyVector = TRUE)
   differences <- scope$parity_differences(scope$parity_rows(), reference)
-  expect_identical(nrow(differences), 0L, info = paste(utils::capture.output(print(differences)), collapse = "\n"))
+  expect_identical(nrow(differences), 0L,
+                   info = paste(utils::capture.output(print(differences)), collapse = "\n"))
 })

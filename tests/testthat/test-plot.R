@@ -5,7 +5,8 @@ test_that("every figure of an upgrade draws, whatever is missing from it", {
   grDevices::pdf(NULL)
   withr::defer(grDevices::dev.off())
   full <- small_upgrade()
-  for (upgrade in list(full, base_only(full), without_held_out(full), without_held_out(base_only(full)))) {
+  for (upgrade in list(full, base_only(full), without_held_out(full),
+                       without_held_out(base_only(full)))) {
     for (which in figure_names) {
       figure <- ggplot2::autoplot(upgrade, which)
       expect_true(ggplot2::is.ggplot(figure))
@@ -27,7 +28,8 @@ test_that("figures show what they are for", {
   expect_identical(as.character(candidates$data$mechanism[candidates$data$adopted]), "sun")
   expect_true(all(c("GeomVline", "GeomLinerange", "GeomPoint") %in% layers_of(candidates)))
 
-  expect_setequal(ggplot2::autoplot(upgrade, "parameters")$data$name, c("offset", "gain", "sun_gain"))
+  expect_setequal(ggplot2::autoplot(upgrade, "parameters")$data$name,
+                  c("offset", "gain", "sun_gain"))
   expect_setequal(ggplot2::autoplot(upgrade, "attribution")$data$boundary, c("Te", "Gv"))
   expect_setequal(ggplot2::autoplot(upgrade, "gain")$data$score, c("rmse", "crps", "coverage95"))
   expect_lte(max(ggplot2::autoplot(upgrade, "mean_day")$data$hour), 24)
@@ -39,11 +41,13 @@ test_that("titles tell of a change what the numbers beside them say", {
     upgrade$models[[1]]$scores$validate[["rmse"]] <- before
     upgrade$models[[2]]$scores$validate[["rmse"]] <- after
     upgrade$models <- upgrade$models[1:2]
-    vapply(c("gain", "steps", "fit"), function(which) ggplot2::autoplot(upgrade, which)$labels$title, "")
+    vapply(c("gain", "steps", "fit"),
+           function(which) ggplot2::autoplot(upgrade, which)$labels$title, "")
   }
   same <- with_errors(0.0838, 0.0842)
   expect_match(same[["gain"]], "the error stays at 0.084 K;", fixed = TRUE)
-  expect_identical(same[["steps"]], "No step lowers the typical error (held out)")  # though it falls in calibration
+  # though it falls in calibration
+  expect_identical(same[["steps"]], "No step lowers the typical error (held out)")
   expect_match(same[["fit"]], "it stays at 0.084 K", fixed = TRUE)
   less <- with_errors(0.4, 0.1)
   expect_match(less[["gain"]], "the error falls by 75 %;", fixed = TRUE)
@@ -56,7 +60,8 @@ test_that("stages have figures of their own", {
   withr::defer(grDevices::dev.off())
   upgrade <- small_upgrade()
   model <- upgrade$models[[1]]
-  for (x in list(upgrade, model$fit, model$attribution, discrepancy(model$fit), upgrade$measurements)) {
+  for (x in list(upgrade, model$fit, model$attribution, discrepancy(model$fit),
+                 upgrade$measurements)) {
     drawn <- withVisible(plot(x))
     expect_true(ggplot2::is.ggplot(drawn$value))
     expect_false(drawn$visible)
@@ -77,7 +82,8 @@ test_that("figures are saved, one PNG each", {
 })
 
 test_that("numbers are short and readable", {
-  expect_identical(short(c(1.108, 0.1656, 0.0801, 10.4, 1.6e6)), c("1.1", "0.17", "0.080", "10", "1,600,000"))
+  expect_identical(short(c(1.108, 0.1656, 0.0801, 10.4, 1.6e6)),
+                   c("1.1", "0.17", "0.080", "10", "1,600,000"))
   expect_identical(change_words(1.11, 0.166, "K"), "falls from 1.1 to 0.17 K")
   expect_identical(change_words(0.1, 0.1001, ""), "stays at 0.10")
   expect_identical(level_unit("K", c(20, 30)), "\u00b0C")
@@ -87,14 +93,16 @@ test_that("numbers are short and readable", {
 
 test_that("a circular condition is shown in degrees", {
   table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Wd = (1:48 * 15) %% 360)
-  m <- measurements(table, time = "hour", target = "Ti", boundary = ~ circular(Wd), noise_sd = 0.1, warmup = 6)
+  m <- measurements(table, time = "hour", target = "Ti", boundary = ~ circular(Wd), noise_sd = 0.1,
+                    warmup = 6)
   expect_equal(condition_values(m, "Wd"), table$Wd)
 })
 
 test_that("an argument that a figure does not know is an error", {
   upgrade <- small_upgrade()
   fit <- upgrade$models[[1]]$fit
-  for (x in list(upgrade, fit, upgrade$models[[1]]$attribution, discrepancy(fit), upgrade$measurements)) {
+  for (x in list(upgrade, fit, upgrade$models[[1]]$attribution, discrepancy(fit),
+                 upgrade$measurements)) {
     expect_error(plot(x, colour = "red"), "must be empty")
     expect_error(ggplot2::autoplot(x, colour = "red"), "must be empty")
   }

@@ -9,8 +9,10 @@ test_that("intervals hold the share of the weight that they should", {
     ends <- confint(fit, level = level)
     for (name in rownames(ends)) {
       # One draw more or less on each side.
-      expect_lte(abs(share_below(fit$values[, name], ends[name, 1]) - (1 - level) / 2), max(w) + 1e-12)
-      expect_lte(abs(share_below(fit$values[, name], ends[name, 2]) - (1 + level) / 2), max(w) + 1e-12)
+      expect_lte(abs(share_below(fit$values[, name], ends[name, 1]) - (1 - level) / 2),
+                 max(w) + 1e-12)
+      expect_lte(abs(share_below(fit$values[, name], ends[name, 2]) - (1 + level) / 2),
+                 max(w) + 1e-12)
     }
   }
   expect_identical(colnames(confint(fit)), c("2.5 %", "97.5 %"))
@@ -53,7 +55,8 @@ test_that("equal draws have the moments of the weighted ones, in an order that s
   mean <- colSums(w * fit$values)
   sd <- sqrt(diag(vcov(fit)))
   draws <- as.matrix(fit, draws = 2000)
-  # Systematic draws are off by less than independent ones, whose mean has an error of sd / sqrt(2000) = 0.022 sd.
+  # Systematic draws are off by less than independent ones, whose mean has an error of sd /
+  # sqrt(2000) = 0.022 sd.
   expect_lt(max(abs(colMeans(draws) - mean) / sd), 0.022)
   expect_equal(apply(draws, 2, stats::sd), sd, tolerance = 0.05)
   # Of 2000 values in random order: five standard errors.

@@ -12,7 +12,8 @@ lacking <- made_once(function(reach = c(13, 300, Inf), ...) {
 
 scores <- function(p) amiss:::prediction_scores(p)$validate
 
-test_that("the discrepancy carried along lowers the error of held-out rows, and its band is honest", {
+test_that(
+  "the discrepancy carried along lowers the error of held-out rows, and its band is honest", {
   for (reach in list(c(13, 300, Inf), Inf)) {
     fit <- lacking(reach)
     without <- scores(predict(fit))
@@ -51,7 +52,8 @@ test_that("how the simulator moves at other rows is told by the same runs", {
   both <- amiss:::moves_at(fit, c("calibrate", "validate"), 1)
   expect_equal(both[1:320, ], moves, tolerance = 1e-10)
   # The space of offset and gain: the vectors of all rows lie in it as well.
-  expect_lt(max(abs(stats::lm.fit(cbind(1, linear_data(480)$Te), both)$residuals)), 1e-8 * max(abs(both)))
+  expect_lt(max(abs(stats::lm.fit(cbind(1, linear_data(480)$Te), both)$residuals)),
+            1e-8 * max(abs(both)))
 })
 
 test_that("so it is of an emulator of a region, whose mean is the simulator's tangent", {
@@ -89,14 +91,14 @@ test_that("the discrepancy is the whole response that the model lacks", {
   truth <- 0.3 * lagged(hidden, 3)[1:320]
   fit <- lacking(Inf)
   own <- discrepancy(fit)$series
-  # But for its level, which the simulator's offset takes. The filter bank's time constants are 2 and 4 h, that of
-  # the truth 3 h.
+  # But for its level, which the simulator's offset takes. The filter bank's time constants are 2
+  # and 4 h, that of the truth 3 h.
   expect_lt(sd(own$discrepancy - truth), 0.05 * sd(truth))
   expect_true(all(own$lower95 <= own$discrepancy & own$discrepancy <= own$upper95))
   for (reach in list(Inf, c(13, 300, Inf))) {
     own <- discrepancy(lacking(reach))$series
-    # Where it keeps out of the parameters' way they take a part. Both together are what was made, to a third of the
-    # noise.
+    # Where it keeps out of the parameters' way they take a part. Both together are what was made,
+    # to a third of the noise.
     made <- 20 + 0.4 * linear_data(480)$Te[1:320] + truth
     expect_lt(sqrt(mean((own$simulated + own$discrepancy - made)^2)), 0.1 / 3)
     expect_equal(own$residual, own$observed - own$simulated)
@@ -113,7 +115,8 @@ test_that("each condition's response is told, and their sum is the discrepancy w
 
 test_that("where nothing lacks, nothing is carried", {
   data <- linear_data()
-  fit <- linear_fit(linear_measurements(data, calibrate = data$hour <= 160, validate = data$hour > 160))
+  fit <- linear_fit(linear_measurements(data, calibrate = data$hour <= 160,
+                                        validate = data$hour > 160))
   with <- predict(fit, use = "validate", discrepancy = TRUE)
   # A sixth of the noise of 0.1 K.
   expect_lt(max(abs(with$mean - predict(fit, use = "validate")$mean)), 0.1 / 6)
@@ -122,8 +125,10 @@ test_that("where nothing lacks, nothing is carried", {
 test_that("what cannot be carried is refused", {
   m <- linear_measurements(linear_data(60))
   emulator <- train_emulator(simulate_design(linear_simulator(), m, runs = 20, seed = 3), m)
-  paper <- calibrate_paper(emulator, m, list(ais = list(pilot_chains = 24, groups = 4, chains = 12)), seed = 1)
-  expect_error(predict(paper, discrepancy = TRUE), "needs a fit of `calibrate\\(\\)`", class = "amiss_error_input")
+  paper <- calibrate_paper(emulator, m,
+                           list(ais = list(pilot_chains = 24, groups = 4, chains = 12)), seed = 1)
+  expect_error(predict(paper, discrepancy = TRUE), "needs a fit of `calibrate\\(\\)`",
+               class = "amiss_error_input")
   expect_s3_class(predict(paper, use = "calibrate"), "data.frame")
   expect_error(predict(lacking(), discrepancy = "yes"), "discrepancy", class = "amiss_error_input")
   expect_error(predict(plain_linear_fit(), use = "validate"), "no row", class = "amiss_error_input")
@@ -156,8 +161,10 @@ test_that("averages and directions of a data frame are those of measurements()",
     expect_identical(own[[field]], m[[field]], info = field)
   }
   expect_identical(own$observed, m$y)
-  expect_error(amiss:::new_record(m, as_new(data[-5, ])), "without a gap", class = "amiss_error_input")
-  expect_error(amiss:::new_record(m, as_new(data[names(data) != "Te"])), "Te", class = "amiss_error_input")
+  expect_error(amiss:::new_record(m, as_new(data[-5, ])), "without a gap",
+               class = "amiss_error_input")
+  expect_error(amiss:::new_record(m, as_new(data[names(data) != "Te"])), "Te",
+               class = "amiss_error_input")
 })
 
 test_that("bands hold what they should, and the simulation's own is that of its runs", {
@@ -175,7 +182,8 @@ test_that("bands hold what they should, and the simulation's own is that of its 
   expect_equal(own$upper80, apply(runs, 1, quantile, 0.9, names = FALSE), tolerance = 1e-10)
   expect_error(predict(fit, level = 95), "level", class = "amiss_error_input")
   expect_error(predict(fit, "validate"), "chosen by `use`", class = "amiss_error_input")
-  expect_error(predict(fit, linear_measurements()), "boundary conditions", class = "amiss_error_input")
+  expect_error(predict(fit, linear_measurements()), "boundary conditions",
+               class = "amiss_error_input")
 })
 
 test_that("simulated records look like the record", {
@@ -212,7 +220,8 @@ test_that("the discrepancy of a record of its own answers to its own conditions"
   data <- linear_data(480)
   data$Tn <- hidden
   warmer <- transform(data, Tn = Tn + 1)
-  gain <- predict(fit, as_new(warmer), discrepancy = TRUE)$mean - predict(fit, as_new(data), discrepancy = TRUE)$mean
+  gain <- predict(fit, as_new(warmer), discrepancy = TRUE)$mean -
+    predict(fit, as_new(data), discrepancy = TRUE)$mean
   expect_equal(mean(gain), 0.3, tolerance = 0.15)  # what was made answers to Tn by 0.3
 })
 
@@ -234,12 +243,13 @@ test_that("a table to predict is checked as the record was", {
   fit <- plain_linear_fit()
   expect_no_warning(predict(fit, new_table("Te", 1, 10)))
   for (code in c(-9999, -999, -99.9, 9999, 1e30, 32767)) for (column in c("Te", "Ti")) {
-    expect_error(predict(fit, new_table(column, 20:23, code)), "rows 20 to 23: a code for a missing value",
-                 class = "amiss_error_input")
+    expect_error(predict(fit, new_table(column, 20:23, code)),
+                 "rows 20 to 23: a code for a missing value", class = "amiss_error_input")
   }
   expect_warning(predict(fit, new_table("Te", 40, 500)), "Te is 500 in row 40, far outside",
                  class = "amiss_warning_input")
-  expect_warning(augment(fit, newdata = new_table("Gv", 30, 1e5)), "Gv is 1e\\+05", class = "amiss_warning_input")
+  expect_warning(augment(fit, newdata = new_table("Gv", 30, 1e5)), "Gv is 1e\\+05",
+                 class = "amiss_warning_input")
   expect_warning(predict(fit, new_table("Te", 30:70, 11.7)), "stuck", class = "amiss_warning_input")
 })
 
@@ -249,7 +259,8 @@ test_that("codes and the range that the record declares hold in a table to predi
   table <- predict(fit, new_table("Ti", 20:23, -9999))
   expect_true(all(is.na(table$observed[20:23])))
   expect_true(is.na(predict(fit, new_table("Ti", 30, 36))$observed[30]))
-  expect_error(predict(fit, new_table("Te", 20:23, -9999)), "missing or infinite", class = "amiss_error_input")
+  expect_error(predict(fit, new_table("Te", 20:23, -9999)), "missing or infinite",
+               class = "amiss_error_input")
   fit$measurements <- linear_measurements(missing = NA)
   expect_no_warning(table <- predict(fit, new_table("Te", 20:23, -9999)))
   expect_lt(table$mean[20], -1000)

@@ -1,7 +1,8 @@
 test_that("quantile and distribution function are inverse, truncated or not", {
   u <- c(0.001, 0.2, 0.5, 0.9, 0.999)
-  for (prior in list(uniform(2, 5), normal(1, 2), normal(1, 2, lower = 0), lognormal(0, 0.5, upper = 2),
-                     beta_prior(2, 3, 1, 4), triangular(0, 1, 5), triangular(0, 0, 1))) {
+  for (prior in list(uniform(2, 5), normal(1, 2), normal(1, 2, lower = 0),
+                     lognormal(0, 0.5, upper = 2), beta_prior(2, 3, 1, 4), triangular(0, 1, 5),
+                     triangular(0, 0, 1))) {
     expect_equal(amiss:::prior_cdf(prior, amiss:::prior_quantile(prior, u)), u, tolerance = 1e-8)
     expect_true(all(diff(amiss:::prior_quantile(prior, u)) > 0))
   }
@@ -24,7 +25,8 @@ test_that("impossible priors are refused", {
 
 test_that("labels tell parameters apart", {
   labels <- function(...) {
-    parameters <- named_parameters(lapply(list(...), function(x) free(x[1], uniform(0, 1), "", x[2])))
+    parameters <- named_parameters(lapply(list(...),
+                                          function(x) free(x[1], uniform(0, 1), "", x[2])))
     unname(distinct_labels(parameters))
   }
   expect_identical(labels(c("a", "a"), c("b", "gain"), c("c", "gain"), c("d", "a"), c("e", " ")),

@@ -5,8 +5,8 @@ skip_on_os("windows")
 model_folder <- function(frame = parent.frame()) {
   folder <- withr::local_tempdir(.local_envir = frame)
   dir.create(file.path(folder, "cfg"))
-  writeLines(c("cat cfg/walls.con cfg/.hidden > all.txt", "echo Ti; tail -n 1 cfg/walls.con; cat cfg/.hidden"),
-             file.path(folder, "run.sh"))
+  writeLines(c("cat cfg/walls.con cfg/.hidden > all.txt",
+               "echo Ti; tail -n 1 cfg/walls.con; cat cfg/.hidden"), file.path(folder, "run.sh"))
   Sys.chmod(file.path(folder, "run.sh"), "755")
   writeLines(c("# {{not a placeholder here", "{{k:%.3f}}"), file.path(folder, "cfg", "walls.con"))
   writeLines("7", file.path(folder, "cfg", ".hidden"))
@@ -14,10 +14,11 @@ model_folder <- function(frame = parent.frame()) {
   folder
 }
 
-house <- function(folder, command = c("sh", "run.sh"), templates = "cfg/walls.con", ..., frame = parent.frame()) {
+house <- function(folder, command = c("sh", "run.sh"), templates = "cfg/walls.con", ...,
+                  frame = parent.frame()) {
   program_simulator(command, free("k", uniform(1, 2)), files = folder, templates = templates,
-                    output = c(file = "stdout.txt", column = "Ti"), cache = withr::local_tempdir(.local_envir = frame),
-                    ...)
+                    output = c(file = "stdout.txt", column = "Ti"),
+                    cache = withr::local_tempdir(.local_envir = frame), ...)
 }
 
 two_rows <- matrix(0, 2, 0)
@@ -28,7 +29,8 @@ test_that("a folder is copied byte for byte, and only the templates named in it 
   program <- house(folder, keep = 1)
   expect_equal(simulate_runs(program, cbind(k = 1.5), two_rows, 1)[, 1], c(1.5, 7))
   kept <- dir(program$cache, "^kept-", full.names = TRUE)
-  expect_identical(file_bytes(file.path(kept, "climate.bin")), file_bytes(file.path(folder, "climate.bin")))
+  expect_identical(file_bytes(file.path(kept, "climate.bin")),
+                   file_bytes(file.path(folder, "climate.bin")))
   expect_identical(readLines(file.path(kept, "cfg", "walls.con"))[2], "1.500")
   expect_true(dir.exists(file.path(kept, "tmp", "deep")))
   expect_match(printed(program), "4 files of the model")
@@ -66,7 +68,8 @@ test_that("single files are copied under their names or those given", {
 
 test_that("a mechanism edits a file of the folder that was no template", {
   program <- house(model_folder())
-  more <- with_template(program, list(run.sh = function(lines) sub("cat cfg/.hidden$", "echo {{e}}", lines)),
+  more <- with_template(program,
+                        list(run.sh = function(lines) sub("cat cfg/.hidden$", "echo {{e}}", lines)),
                         free("e", uniform(3, 4)))
   expect_equal(simulate_runs(more, cbind(k = 1.5, e = 3.5), two_rows, 1)[, 1], c(1.5, 3.5))
 })
@@ -75,7 +78,8 @@ test_that("files and templates that cannot be are refused before anything is exe
   folder <- model_folder()
   refused <- function(code, pattern) expect_error(code, pattern, class = "amiss_error_input")
   refused(house("nowhere"), "nowhere.*not there")
-  refused(house(c(file.path(folder, "run.sh"), file.path(folder, "cfg"))), "cfg.*a folder among files")
+  refused(house(c(file.path(folder, "run.sh"), file.path(folder, "cfg"))),
+          "cfg.*a folder among files")
   refused(house(withr::local_tempdir()), "holds no files")
   refused(house(c(file.path(folder, "run.sh"), file.path(folder, "run.sh"))), "two files for")
   refused(house(c("../run.sh" = file.path(folder, "run.sh"))), "run's directory")
@@ -92,13 +96,15 @@ test_that("files and templates that cannot be are refused before anything is exe
 test_that("one run's folder is made to look at, and nothing runs", {
   program <- house(model_folder())
   folder <- file.path(withr::local_tempdir(), "look")
-  expect_message(commands <- render_run(program, c(k = 1.75), folder), "sh run.sh", class = "amiss_message_render")
+  expect_message(commands <- render_run(program, c(k = 1.75), folder), "sh run.sh",
+                 class = "amiss_message_render")
   expect_identical(commands, "sh run.sh")
   expect_setequal(dir(folder, recursive = TRUE, all.files = TRUE),
                   c("run.sh", "climate.bin", "cfg/walls.con", "cfg/.hidden"))
   expect_identical(readLines(file.path(folder, "cfg", "walls.con"))[2], "1.750")
   expect_error(render_run(program, c(k = 1.75), folder), "not empty", class = "amiss_error_input")
-  expect_error(render_run(program, c(j = 1), tempfile()), "value for each parameter", class = "amiss_error_input")
+  expect_error(render_run(program, c(j = 1), tempfile()), "value for each parameter",
+               class = "amiss_error_input")
   m <- measurements(small_record(48), time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.05)
   driven <- house(model_folder(), boundary = "Te")
   folder <- file.path(withr::local_tempdir(), "driven")

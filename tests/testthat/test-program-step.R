@@ -5,8 +5,9 @@ skip_on_os("windows")
 chain <- function(..., output = program_output("stdout.txt", "Ti"),
                   cache = withr::local_tempdir(.local_envir = parent.frame()),
                   templates = list(model.awk = I(chain_rule)), more = list()) {
-  do.call(program_simulator, c(list(list(...), free("gain", uniform(0, 2)), output = output, templates = templates,
-                                    boundary = "Te", cache = cache, name = "chain"), more))
+  do.call(program_simulator,
+          c(list(list(...), free("gain", uniform(0, 2)), output = output, templates = templates,
+                 boundary = "Te", cache = cache, name = "chain"), more))
 }
 
 chain_rule <- c("BEGIN { FS = \",\"; print \"# by awk\"; print \"hours Ti\" }",
@@ -25,12 +26,13 @@ told_by <- function(simulator) {
 }
 
 test_that("steps run one after the other in one folder, each with its input and its output", {
-  program <- chain(simulate_step(stdout = "all.txt", makes = "all.txt"),
-                   program_step("sh", "-c",
-                                "read f; awk -v f=$f '/^#/ { next } { print $2 == \"Ti\" ? $2 : f * $2 }' all.txt",
-                                input = I("{{2 * gain:%.3f}}")))
-  expect_equal(simulate_runs(program, cbind(gain = c(0.5, 1)), te, 1), cbind(20 + 0.5 * te[, 1], 2 * (20 + te[, 1])),
-               ignore_attr = TRUE)
+  program <- chain(
+    simulate_step(stdout = "all.txt", makes = "all.txt"),
+    program_step("sh", "-c",
+                 "read f; awk -v f=$f '/^#/ { next } { print $2 == \"Ti\" ? $2 : f * $2 }' all.txt",
+                 input = I("{{2 * gain:%.3f}}")))
+  expect_equal(simulate_runs(program, cbind(gain = c(0.5, 1)), te, 1),
+               cbind(20 + 0.5 * te[, 1], 2 * (20 + te[, 1])), ignore_attr = TRUE)
   expect_match(printed(program), "awk.*sh.*driven by Te.*s a run; 2 finished runs")
 })
 
@@ -38,11 +40,13 @@ test_that("the input of a step is text, a file with placeholders, or a file of t
   script <- withr::local_tempfile(lines = c("Ti", "{{gain}}", "7"))
   for (input in list(I(c("Ti", "{{gain}}", "7")), script)) {
     program <- chain(program_step("cat", input = input), templates = list())
-    expect_equal(simulate_runs(program, cbind(gain = 0.5), te[1:2, , drop = FALSE], 1)[, 1], c(0.5, 7))
+    expect_equal(simulate_runs(program, cbind(gain = 0.5), te[1:2, , drop = FALSE], 1)[, 1],
+                 c(0.5, 7))
   }
   program <- chain(simulate_step(stdout = "all.txt"), program_step("cat", input = "all.txt"))
   expect_equal(simulate_runs(program, cbind(gain = 1), te, 1)[, 1], 20 + te[, 1])
-  expect_error(chain(program_step("cat", input = "nowhere.txt")), "nowhere.txt.*neither", class = "amiss_error_input")
+  expect_error(chain(program_step("cat", input = "nowhere.txt")), "nowhere.txt.*neither",
+               class = "amiss_error_input")
 })
 
 test_that("the step that fails is named, with the end of what it and the one before wrote", {
@@ -56,12 +60,17 @@ test_that("the step that fails is named, with the end of what it and the one bef
 })
 
 test_that("a program that exits with 0 fails by what it says, does not say or does not make", {
-  say <- function(...) chain(program_step("sh", "-c", "echo no weather; echo log > l.txt", ...), simulate_step())
-  expect_match(told_by(say(fails_if = "no [a-z]+er")), "step 1 of 2 \\(sh\\): its standard output says \"no weather\"")
+  say <- function(...)
+    chain(program_step("sh", "-c", "echo no weather; echo log > l.txt", ...), simulate_step())
+  expect_match(told_by(say(fails_if = "no [a-z]+er")),
+               "step 1 of 2 \\(sh\\): its standard output says \"no weather\"")
   expect_match(told_by(say(fails_if = "^log$", log = "l.txt")), "its l.txt says \"log\"")
-  expect_match(told_by(say(needs = "finished", log = "l.txt")), "End of l.txt of step 1 \\(sh\\): log")
-  expect_match(told_by(say(needs = "finished")), "standard output and standard error.* does not say \"finished\"")
-  expect_match(told_by(say(makes = c("l.txt", "house.res"))), "exit status 0 and wrote nothing into house.res")
+  expect_match(told_by(say(needs = "finished", log = "l.txt")),
+               "End of l.txt of step 1 \\(sh\\): log")
+  expect_match(told_by(say(needs = "finished")),
+               "standard output and standard error.* does not say \"finished\"")
+  expect_match(told_by(say(makes = c("l.txt", "house.res"))),
+               "exit status 0 and wrote nothing into house.res")
   expect_match(told_by(chain(program_step("sh", "-c", "echo bad; exit 3", fails_if = "bad"))),
                "exit status 3; its standard output says \"bad\"")
   expect_null(told_by(say(needs = c("weather", "(?i)NO W"), fails_if = "error", makes = "l.txt")))
@@ -78,7 +87,8 @@ test_that("exit statuses, time limits and folders are those of a step", {
 
 test_that("a step that is checked in another way is another run", {
   log <- tempfile()
-  note <- function(...) chain(program_step("sh", "-c", paste("echo ran >>", log), ...), simulate_step(), cache = cache)
+  note <- function(...)
+    chain(program_step("sh", "-c", paste("echo ran >>", log), ...), simulate_step(), cache = cache)
   cache <- withr::local_tempdir()
   simulate_runs(note(), cbind(gain = 1), te, 1)
   simulate_runs(note(), cbind(gain = 1), te, 1)
@@ -96,13 +106,15 @@ test_that("what a person would type is shown", {
 })
 
 test_that("an unknown argument or pattern is refused", {
-  expect_error(program_step("a", fail_if = "x"), "no argument `fail_if`", class = "amiss_error_input")
+  expect_error(program_step("a", fail_if = "x"), "no argument `fail_if`",
+               class = "amiss_error_input")
   expect_error(program_step("a", needs = "("), "no regular expression", class = "amiss_error_input")
   expect_error(program_step("a", 1), class = "amiss_error_input")
   expect_error(program_step("a", makes = "/tmp/x"), "run's directory", class = "amiss_error_input")
   expect_error(chain(program_step("cat"), 3), "Number 2 of `command`", class = "amiss_error_input")
   expect_error(chain(), class = "amiss_error_input")
-  expect_error(simulate_runs(chain(program_step("no-such-program"), simulate_step()), cbind(gain = 1), te, 1),
+  expect_error(simulate_runs(chain(program_step("no-such-program"), simulate_step()),
+                             cbind(gain = 1), te, 1),
                "no-such-program.*not there", class = "amiss_error_input")
 })
 
@@ -123,7 +135,8 @@ test_that("runs that the cache has do not count, and those of another segment do
   hours <- 1:60
   record <- data.frame(hour = ifelse(hours > 30, hours + 5, hours), Te = 10 + 5 * sin(hours / 4))
   record$Ti <- 20 + 0.4 * record$Te + 0.1 * cos(hours * 1.7)
-  m <- suppressWarnings(measurements(record, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1))
+  m <- suppressWarnings(measurements(record, time = "hour", target = "Ti", boundary = ~Te,
+                                     noise_sd = 0.1))
   expect_length(unique(m$segment), 2)
   program <- chain(simulate_step())
   spent <- function(gain, m) {

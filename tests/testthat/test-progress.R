@@ -9,7 +9,8 @@ said <- function(code) {
 }
 
 loudly <- function(interval = 0, frame = parent.frame()) {
-  withr::local_options(amiss.progress = "lines", amiss.progress_interval = interval, .local_envir = frame)
+  withr::local_options(amiss.progress = "lines", amiss.progress_interval = interval,
+                       .local_envir = frame)
 }
 
 broken_record <- function() {
@@ -43,11 +44,13 @@ test_that("runs are counted over all segments, with the time left", {
   expect_match(lines, "^runs of the simulator \\(2 segments\\), [0-9]+ of 20, about [0-9]+ s left$")
   expect_match(lines[1], ", 1 of 20,")
   # A simulator that does not count its runs is followed by segments.
-  registerS3method("free_parameters", "silent", function(simulator) free_parameters(linear_simulator()),
+  registerS3method("free_parameters", "silent",
+                   function(simulator) free_parameters(linear_simulator()),
                    envir = asNamespace("amiss"))
   registerS3method("driver_names", "silent", function(simulator) "Te", envir = asNamespace("amiss"))
   registerS3method("simulate_runs", "silent", envir = asNamespace("amiss"),
-                   function(simulator, values, drivers, ...) tcrossprod(drivers[, "Te"], values[, "gain"]))
+                   function(simulator, values, drivers, ...)
+                     tcrossprod(drivers[, "Te"], values[, "gain"]))
   silent <- structure(list(), class = "silent")
   lines <- said(simulate_design(silent, broken_record(), runs = 10, seed = 1))
   expect_match(lines, "(10|20) of 20")
@@ -72,16 +75,20 @@ test_that("runs in parallel are counted as they end", {
   skip_if(!nzchar(Sys.which("awk")))
   withr::defer(future::plan(future::sequential))
   program <- function() {
-    program_simulator(c("awk", "NR > 1 { if (NR == 2) print \"Ti\"; print {{gain}} * $3 }", "FS=,", "drivers.csv"),
-                      free("gain", uniform(0, 1)), output = c(file = "stdout.txt", column = "Ti"), boundary = "Te",
-                      cache = withr::local_tempdir(.local_envir = parent.frame(2)))
+    program_simulator(c("awk", "NR > 1 { if (NR == 2) print \"Ti\"; print {{gain}} * $3 }", "FS=,",
+                        "drivers.csv"),
+                      free("gain", uniform(0, 1)), output = c(file = "stdout.txt", column = "Ti"),
+                      boundary = "Te", cache = withr::local_tempdir(.local_envir = parent.frame(2)))
   }
-  second_tier <- identical(Sys.getenv("NOT_CRAN"), "true")  # as skip_on_cran(): sessions are long to start
-  for (plan in c("sequential", if (.Platform$OS.type == "unix") "multicore", if (second_tier) "multisession")) {
+  # as skip_on_cran(): sessions are long to start
+  second_tier <- identical(Sys.getenv("NOT_CRAN"), "true")
+  for (plan in c("sequential", if (.Platform$OS.type == "unix") "multicore",
+                 if (second_tier) "multisession")) {
     if (plan == "sequential") future::plan(plan) else future::plan(plan, workers = 2)
     seen <- 0
     simulate <- function() {
-      simulate_runs(program(), cbind(gain = c(0.1, 0.2, 0.3, 0.4)), cbind(Te = c(1, 5, 2)), step_h = 1)
+      simulate_runs(program(), cbind(gain = c(0.1, 0.2, 0.3, 0.4)), cbind(Te = c(1, 5, 2)),
+                    step_h = 1)
     }
     runs <- withCallingHandlers(simulate(), amiss_piece_done = function(piece) seen <<- seen + 1)
     expect_equal(runs[2, ], 5 * c(0.1, 0.2, 0.3, 0.4))
@@ -105,12 +112,14 @@ test_that("a terminal has a bar as long as the work lasts", {
 })
 
 test_that("the loop says where it is, and is silent if asked", {
-  m <- measurements(small_record(120), time = "time", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.05)
+  m <- measurements(small_record(120), time = "time", target = "Ti", boundary = ~ Te + Gv,
+                    noise_sd = 0.05)
   base <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
                              free("gain", uniform(0, 2)), boundary = "Te")
   sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters.", edit = function(model) {
     with_parameters(model, free("sun", uniform(0, 0.02)), boundary = "Gv",
-                    f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+                    f = function(values, drivers, base)
+                      base(values) + values[["sun"]] * drivers[, "Gv"])
   })
   coarse <- list(pilot_chains = 24, groups = 2, max_groups = 2, importance_draws = 0)
   control <- list(max_steps = 1, rounds = 1, calibration = list(ais = coarse),

@@ -10,11 +10,11 @@ random_object <- function() {
     function() c(-Inf, NaN, NA)[sample(3, 1)],
     function() intToUtf8(sample(c(33:126, 0x20ac, 0x1f600), n, TRUE)),
     function() replicate(n, random_object(), simplify = FALSE),
-    function() factor(letters[seq_len(n)]), function() Sys.time(), function() as.Date("2024-03-01") + n,
-    function() identity,
-    function() globalenv(), function() quote(a + b), function() ~ a, function() matrix(0, n, 2),
-    function() data.frame(a = seq_len(n)),
-    function() complex(n), function() as.raw(n), function() 10^stats::runif(1, -300, 300),
+    function() factor(letters[seq_len(n)]), function() Sys.time(),
+    function() as.Date("2024-03-01") + n, function() identity, function() globalenv(),
+    function() quote(a + b), function() ~ a, function() matrix(0, n, 2),
+    function() data.frame(a = seq_len(n)), function() complex(n), function() as.raw(n),
+    function() 10^stats::runif(1, -300, 300),
     function() stats::setNames(seq_len(n), letters[seq_len(n)]))
   draws[[sample(length(draws), 1)]]()
 }
@@ -25,7 +25,8 @@ random_prior <- function() {
   priors <- list(
     function() uniform(x[1], x[3]), function() normal(x[2], k[1]),
     function() normal(x[2], k[1], lower = x[1], upper = x[3]),
-    function() lognormal(x[2] / 5, k[1] / 5), function() lognormal(x[2] / 5, k[1], upper = exp(x[3])),
+    function() lognormal(x[2] / 5, k[1] / 5),
+    function() lognormal(x[2] / 5, k[1], upper = exp(x[3])),
     function() beta_prior(k[1], k[2], x[1], x[3]), function() triangular(x[1], x[2], x[3]))
   priors[[sample(length(priors), 1)]]()
 }
@@ -39,7 +40,8 @@ test_that("quantiles of a prior are the inverse of its probabilities, within its
     expect_false(is.unsorted(x))
     expect_true(all(x >= prior$lower & x <= prior$upper))
     inside <- prior_quantile(prior, c(0.2, 0.7))
-    mass <- stats::integrate(function(v) prior_density(prior, v), inside[1], inside[2], rel.tol = 1e-8)$value
+    mass <- stats::integrate(function(v) prior_density(prior, v), inside[1], inside[2],
+                             rel.tol = 1e-8)$value
     expect_equal(mass, 0.5, tolerance = 1e-5)
   })
 })
@@ -51,11 +53,12 @@ test_that("any object is told in a few words, and refused in the package's own",
     expect_true(checkmate::test_string(seen(x), min.chars = 1))
     expect_lt(nchar(seen(x)), 100)
     for (make in list(function() uniform(x, 1e9), function() merge_control(list(a = 1), x),
-                      function() free(x, uniform(0, 1)),
-                      function() zone_layer(0.1, x, 1), function() check_simulator(x), function() ensemble(x, x),
+                      function() free(x, uniform(0, 1)), function() zone_layer(0.1, x, 1),
+                      function() check_simulator(x), function() ensemble(x, x),
                       function() catalogue(x))) {
       made <- tryCatch(make(), error = identity)
-      expect_true(!inherits(made, "error") || inherits(made, "amiss_error_input"), info = deparse1(x))
+      expect_true(!inherits(made, "error") || inherits(made, "amiss_error_input"),
+                  info = deparse1(x))
     }
   })
 })
@@ -96,7 +99,8 @@ test_that("averages keep the mean of what they hold, wherever time begins", {
 })
 
 test_that("the order of a design's columns and runs makes no difference to an ensemble", {
-  world <- simulate_design(linear_simulator(), linear_measurements(linear_data(60)), runs = 20, seed = 1)
+  world <- simulate_design(linear_simulator(), linear_measurements(linear_data(60)), runs = 20,
+                           seed = 1)
   each_of(20, function(i) {
     runs <- sample(20)
     columns <- sample(2)
@@ -110,18 +114,19 @@ test_that("the order of a design's columns and runs makes no difference to an en
 
 test_that("no text of a study file or of a condition gets past the checks", {
   path <- withr::local_tempfile(fileext = ".yml")
-  alphabet <- c(letters[1:4], "study", "data", ":", " ", "\n", "-", "[", "]", "{", "}", "!", "&a", "*a", "#", "'", "\"",
-                "|", "%", "~", "1e9", "yes")
+  alphabet <- c(letters[1:4], "study", "data", ":", " ", "\n", "-", "[", "]", "{", "}", "!", "&a",
+                "*a", "#", "'", "\"", "|", "%", "~", "1e9", "yes")
   data <- data.frame(hour = 1:6, a = 1)
   each_of(60, function(i) {
     text <- paste(sample(alphabet, 30, TRUE), collapse = "")
     writeLines(text, path)
     read <- tryCatch(read_study_file(path), error = identity)
     expect_true(!inherits(read, "error") || inherits(read, "amiss_error_input"), info = text)
-    words <- c("hour", "a", "<", "==", "(", ")", "&", "|", "c", ",", "1", "'x'", "system", "{", "}", "%in%", "!", "-",
-               "<-", "::", "function")
+    words <- c("hour", "a", "<", "==", "(", ")", "&", "|", "c", ",", "1", "'x'", "system", "{", "}",
+               "%in%", "!", "-", "<-", "::", "function")
     condition <- paste(sample(words, 6, TRUE), collapse = " ")
     rows <- tryCatch(row_condition(condition, data, "calibrate"), error = identity)
-    expect_true(is.logical(rows) && length(rows) == 6 || inherits(rows, "amiss_error_input"), info = condition)
+    expect_true(is.logical(rows) && length(rows) == 6 || inherits(rows, "amiss_error_input"),
+                info = condition)
   })
 })

@@ -33,14 +33,15 @@ test_that("a clean record has no findings, and neither has what is natural for a
     holiday = ifelse(hour > 150, 12, ifelse(hour %% 24 > 7, 21, 16)),
     valve = pmin(100, pmax(0, 50 + 80 * sin(hour / 9) + rnorm(288))),
     power = 2000 * (sin(hour / 9) > -0.5),
-    rounded = round(8 + 5 * sin(2 * pi * hour / 24) + as.numeric(stats::filter(rnorm(288), 0.9, "recursive"))),
-    pressure = 999 + round(cumsum(rnorm(288)) / 3, 1),
-    clock = hour %% 24, people = rpois(288, 3)))
+    rounded = round(8 + 5 * sin(2 * pi * hour / 24) +
+                    as.numeric(stats::filter(rnorm(288), 0.9, "recursive"))),
+    pressure = 999 + round(cumsum(rnorm(288)) / 3, 1), clock = hour %% 24, people = rpois(288, 3)))
   data <- cbind(weather(), natural)
   expect_identical(ids(data, boundary = c("Te", "circular(Wd)", names(natural))), character())
 })
 
-test_that("codes for a missing value are refused in target and conditions, with rows and what to write", {
+test_that(
+  "codes for a missing value are refused in target and conditions, with rows and what to write", {
   refused <- function(name, code, rows = c(40, 41, 120), ...) {
     edit <- stats::setNames(list(function(v) replace(v, rows, code)), name)
     expect_error(measure(do.call(weather, edit)), "rows 40 to 41 and 120: a code.*Give `missing = ",
@@ -56,11 +57,13 @@ test_that("codes for a missing value are refused in target and conditions, with 
 })
 
 test_that("missing sets codes to NA, or says that there are none", {
-  data <- weather(Ti = function(v) replace(v, 40:41, -9999), Te = function(v) replace(v, 100, -9999))
+  data <- weather(Ti = function(v) replace(v, 40:41, -9999),
+                  Te = function(v) replace(v, 100, -9999))
   m <- suppressMessages(measure(data, missing = -9999, fill_gaps = 2))
   expect_identical(which(is.na(m$y)), 40:41)
   expect_true(all(abs(m$raw$drivers[, "Te"]) < 50))
-  expect_identical(ids(weather(Te = function(v) replace(v, 40, 999)), missing = NA), "Te missing_code")
+  expect_identical(ids(weather(Te = function(v) replace(v, 40, 999)), missing = NA),
+                   "Te missing_code")
   expect_error(measure(data, missing = "none"), "missing", class = "amiss_error_input")
   # A column that is not analysed may hold codes.
   other <- cbind(weather(), spare = replace(rnorm(288), 9, -9999))
@@ -87,9 +90,11 @@ test_that("readings at the end of a sensor's range are found, and left out if as
   expect_identical(ids(weather(Ti = function(v) pmax(v, 21))), "Ti range_end")
   expect_identical(ids(weather(Ti = function(v) round(pmin(v, 23), 1))), "Ti range_end")
   # Rounded values of a sine pile up at its ends by themselves; nothing is less than no flow.
-  expect_identical(ids(weather(Ti = function(v) round(20 + 3 * sin(seq_along(v) / 5), 1))), character())
+  expect_identical(ids(weather(Ti = function(v) round(20 + 3 * sin(seq_along(v) / 5), 1))),
+                   character())
   expect_identical(ids(weather(Ti = function(v) pmax(0, v - 23))), character())
-  expect_error(measure(data, range = c(23, 23)), "lower end comes first", class = "amiss_error_input")
+  expect_error(measure(data, range = c(23, 23)), "lower end comes first",
+               class = "amiss_error_input")
 })
 
 test_that("a sensor that is stuck is found", {
@@ -109,7 +114,8 @@ test_that("a sensor that is stuck is found", {
 test_that("a target in steps that are coarse for its noise is found", {
   expect_identical(ids(weather(Ti = function(v) round(2 * v) / 2)), "Ti quantised")
   expect_identical(ids(weather(Ti = function(v) round(v, 1))), character())
-  expect_match(measure(weather(Ti = function(v) round(2 * v) / 2))$findings$says, "state a noise of 0.14 at least")
+  expect_match(measure(weather(Ti = function(v) round(2 * v) / 2))$findings$says,
+               "state a noise of 0.14 at least")
 })
 
 test_that("values that stand in several rows are found, unless averages are of as many", {
@@ -123,16 +129,19 @@ test_that("a counter and a direction are found", {
   counter <- function(v) (cumsum(v) %% 9000)
   expect_identical(ids(weather(Gv = counter)), "Gv counter")
   expect_identical(ids(weather(), boundary = ~ Te + Gv + Wd), "Wd direction")
-  expect_identical(ids(weather(Wd = function(v) ifelse(v > 180, v - 360, v)), boundary = ~ Te + Wd), "Wd direction")
+  expect_identical(ids(weather(Wd = function(v) ifelse(v > 180, v - 360, v)), boundary = ~ Te + Wd),
+                   "Wd direction")
   # One that never jumps has a name; another quantity in such a range has neither.
   narrow <- weather(Wd = function(v) 100 + v / 2)
   expect_identical(ids(narrow, boundary = ~ Te + Wd), "Wd direction")
   expect_identical(ids(transform(narrow, power = Wd), boundary = ~ Te + power), character())
 })
 
-test_that("a condition that is constant in calibration only is found, and nobody is asked to name it", {
+test_that(
+  "a condition that is constant in calibration only is found, and nobody is asked to name it", {
   data <- weather(Gv = function(v) replace(v, 1:200, 0))
-  expect_warning(m <- measure(data, validate = data$hour > 200), "Gv.*not vary", class = "amiss_warning_input")
+  expect_warning(m <- measure(data, validate = data$hour > 200), "Gv.*not vary",
+                 class = "amiss_warning_input")
   expect_identical(paste(m$findings$column, m$findings$id), "Gv constant")
   upgrade <- small_upgrade()
   upgrade$measurements$constant <- "Gv"
@@ -146,8 +155,8 @@ test_that("stamps that stray by fractions of a second move no row", {
   data <- weather()[1:240, ]
   exact <- as.POSIXct("2024-01-01", tz = "UTC") + 600 * data$hour
   of <- function(time) {
-    measurements(transform(data, time = time), time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1,
-                 average = 1, warmup = 6)
+    measurements(transform(data, time = time), time = "time", target = "Ti", boundary = ~Te,
+                 noise_sd = 0.1, average = 1, warmup = 6)
   }
   stray <- of(exact + withr::with_seed(1, runif(240, -0.4, 0.4)))
   expect_identical(stray[c("time", "y", "use")], of(exact)[c("time", "y", "use")])

@@ -20,7 +20,8 @@ test_that("what comes back every day is told with its hour, what drifts with its
   noise <- withr::with_seed(1, rnorm(240))
   door <- model_of(noise - 8 * (hours %% 24 == 10), hours)
   expect_true(door$large)
-  expect_match(door$pattern$what, "every day around 10:00 the measured Ti is on average [78].* K lower than simulated")
+  expect_match(door$pattern$what,
+               "every day around 10:00 the measured Ti is on average [78].* K lower than simulated")
   drift <- model_of(noise + 8 * (hours / 240)^2 - 3, hours)
   expect_match(drift$pattern$what, "it drifts, by \\+[78].*K from the beginning")
   expect_null(model_of(3 * noise, hours)$pattern)
@@ -56,7 +57,8 @@ test_that("a large error that answers to nothing makes the verdict unexplained",
   upgrade$models[[1]]$attribution$table$significant <- FALSE
   p <- upgrade$models[[1]]$prediction
   r <- ifelse(seq_along(p$observed) %% 24 == 9, 1, 0)
-  upgrade$models[[1]]$prediction$observed <- p$mean + withr::with_seed(1, rnorm(nrow(p), 0, 0.05)) + r
+  upgrade$models[[1]]$prediction$observed <- p$mean +
+    withr::with_seed(1, rnorm(nrow(p), 0, 0.05)) + r
   verdict <- amiss:::diagnosis_verdict(upgrade)
   expect_equal(verdict$verdict, "unexplained")
   expect_match(verdict$headline, "every day around")
@@ -72,10 +74,11 @@ test_that("a large error that answers to nothing makes the verdict unexplained",
 test_that("a discrepancy that reaches into what the parameters can do is told", {
   upgrade <- small_upgrade()
   expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "do not read their values")
-  upgrade$models[[2]]$fit$control$reach <- c(13, Inf)  # a grid of which the record prefers the free one
+  # a grid of which the record prefers the free one
+  upgrade$models[[2]]$fit$control$reach <- c(13, Inf)
   upgrade$models[[2]]$fit$reach <- c("13" = 0.02, "Inf" = 0.98)
-  expect_match(summary(upgrade)$remains, "they may hide a part of it, so do not read their values as physical",
-               all = FALSE)
+  expect_match(summary(upgrade)$remains,
+               "they may hide a part of it, so do not read their values as physical", all = FALSE)
 })
 
 test_that("a cause that leaves a good part of the error is only likely", {
@@ -83,29 +86,34 @@ test_that("a cause that leaves a good part of the error is only likely", {
   p <- upgrade$models[[2]]$prediction
   # Both models as they were, plus an error that neither explains.
   extra <- withr::with_seed(1, rnorm(nrow(p), 0, 5))
-  for (k in 1:2) upgrade$models[[k]]$prediction$observed <- upgrade$models[[k]]$prediction$observed + extra
+  for (k in 1:2)
+    upgrade$models[[k]]$prediction$observed <- upgrade$models[[k]]$prediction$observed + extra
   expect_true(amiss:::much_remains(upgrade$models, upgrade$measurements))
   expect_false(amiss:::much_remains(small_upgrade()$models, upgrade$measurements))
 })
 
-# A record that drifts by `by` over its length and feels the sun by `sun`; its models with the sun and with the drift.
+# A record that drifts by `by` over its length and feels the sun by `sun`; its models with the sun
+# and with the drift.
 drift_world <- function(by, sun) {
   data <- linear_data()
   data$Ti <- data$Ti + by * (data$hour / 240)^2 + sun * data$Gv
-  m <- linear_measurements(data, boundary = ~ Te + Gv, calibrate = data$hour <= 192, validate = data$hour > 192)
+  m <- linear_measurements(data, boundary = ~ Te + Gv, calibrate = data$hour <= 192,
+                           validate = data$hour > 192)
   fit <- function(simulator) {
     runs <- simulate_design(simulator, m, runs = 30, seed = 1)
     list(fit = calibrate(train_emulator(runs, m), m, quick_ais, seed = 1))
   }
   base <- linear_simulator()
-  sunny <- with_parameters(base, free("sun", uniform(0, 0.02)), boundary = "Gv", f = function(values, drivers, base) {
+  sunny <- with_parameters(base, free("sun", uniform(0, 0.02)), boundary = "Gv",
+                           f = function(values, drivers, base) {
     base(values) + values[["sun"]] * drivers[, "Gv"]
   })
   list(m = m, base = fit(base), sunny = fit(sunny), fit = fit)
 }
 
 test_that("a drift rivals a mechanism that does no better than it, and none that does", {
-  rivals <- function(world) amiss:::drift_rivals(world[c("base", "sunny")], list(decisive = 2), threads = 1)
+  rivals <- function(world)
+    amiss:::drift_rivals(world[c("base", "sunny")], list(decisive = 2), threads = 1)
   expect_true(rivals(drift_world(by = 3, sun = 0)))
   expect_false(rivals(drift_world(by = 0, sun = 0.01)))
 })
@@ -117,7 +125,8 @@ test_that("the evidence for a drift is that of a full calibration with such a dr
   parabola <- sqrt(length(hours)) * stats::poly(hours, 2)
   size <- 0.5
   whole <- sqrt(length(hours)) * stats::predict(stats::poly(hours, 2), world$m$hours)
-  drifting <- with_parameters(linear_simulator(), free("slope", normal(0, size)), free("bend", normal(0, size)),
+  drifting <- with_parameters(linear_simulator(), free("slope", normal(0, size)),
+                              free("bend", normal(0, size)),
                               f = function(values, drivers, info, base) {
     rows <- match(info$time, world$m$time)
     base(values) + as.numeric(whole[rows, ] %*% c(values[["slope"]], values[["bend"]]))
@@ -125,7 +134,8 @@ test_that("the evidence for a drift is that of a full calibration with such a dr
   full <- bayes_factor(world$fit(drifting)$fit, base)
   seen <- amiss:::responses_factor(base, size * parabola, threads = 1, scales = 1)
   # Within what the two samplers state.
-  expect_lt(abs(seen$log10_bf - full$log10_bf), (seen$upper95 - seen$log10_bf) + (full$upper95 - full$log10_bf) + 0.1)
+  expect_lt(abs(seen$log10_bf - full$log10_bf),
+            (seen$upper95 - seen$log10_bf) + (full$upper95 - full$log10_bf) + 0.1)
   expect_gt(full$log10_bf, 2)
 })
 
@@ -146,8 +156,10 @@ test_that("a cause that a drift rivals is only likely", {
   upgrade$models[[2]]$fit$log_evidence <- upgrade$models[[1]]$fit$log_evidence
   expect_true(amiss:::drift_rivals(upgrade$models, upgrade$control, threads = 1))
   upgrade <- rejudged(upgrade)
-  expect_match(upgrade$models[[2]]$doubts, "a drifting sensor would explain the error as well", all = FALSE)
-  expect_match(amiss:::diagnosis_verdict(upgrade)$tag, "a drifting sensor would explain the error as well")
+  expect_match(upgrade$models[[2]]$doubts, "a drifting sensor would explain the error as well",
+               all = FALSE)
+  expect_match(amiss:::diagnosis_verdict(upgrade)$tag,
+               "a drifting sensor would explain the error as well")
 })
 
 test_that("a drift in what the error answers to does not put the sensor under suspicion", {
@@ -164,7 +176,8 @@ test_that("readings that stand apart are told, and what a model leaves otherwise
   expect_length(apart(noise), 0)
   expect_length(apart(as.numeric(stats::filter(noise, 0.95, "recursive"))), 0)
   expect_length(apart(noise + 30 * (seq_len(2000) %% 400 > 200)), 0)  # a step is no spike
-  expect_length(apart(noise + 15 * pmin(pmax(seq_len(2000) - 1000, 0), 2)), 0)  # nor is a ramp of two
+  # nor is a ramp of two
+  expect_length(apart(noise + 15 * pmin(pmax(seq_len(2000) - 1000, 0), 2)), 0)
   at <- c(50, 700, 1500)
   with_spikes <- noise
   with_spikes[at] <- with_spikes[at] + c(12, -14, 20)
@@ -180,5 +193,6 @@ test_that("readings that stand apart are told, and what a model leaves otherwise
     unname(upgrade_inspections(upgrade)["spikes"])
   }
   expect_true(is.na(told(integer())))
-  expect_match(told(c(40, 90)), "^2 of 1[0-9][0-9] readings, the first at 2024-03-.* stand apart from those before")
+  expect_match(told(c(40, 90)),
+               "^2 of 1[0-9][0-9] readings, the first at 2024-03-.* stand apart from those before")
 })

@@ -25,7 +25,8 @@ test_that("a summary says when nothing is named, and why", {
   expect_match(told$headline, lead)
   upgrade$models[[1]]$attribution$table$significant <- FALSE
   told <- summary(upgrade)
-  expect_identical(told$verdict, "unexplained")  # the sun is left out: the error is far above the noise
+  # the sun is left out: the error is far above the noise
+  expect_identical(told$verdict, "unexplained")
   expect_match(told$headline, "times the stated noise")
   upgrade$measurements$noise_sd <- 10  # as if so much noise had been stated
   told <- summary(without_held_out(upgrade))
@@ -60,13 +61,12 @@ test_that("a change without gain on held-out data is a hint, and no cause", {
 test_that("each step tells what it brought, and what could do the same", {
   told <- summary(small_upgrade())$change
   expect_match(told[1], "^sun \\(named\\), driven by Gv: Sun enters")
-  expect_match(told,
-               "With sun the typical error falls from .* in calibration; on held-out data it falls .*, a gain of",
-               all = FALSE)
+  expect_match(told, paste("With sun the typical error falls from .* in calibration; on held-out",
+                           "data it falls .*, a gain of"), all = FALSE)
   upgrade <- small_upgrade()
   upgrade$models[[2]]$confounded_with <- "gain"
-  expect_match(summary(upgrade)$change, "How much sun does hangs together with gain .correlation beyond 0.4",
-               all = FALSE)
+  expect_match(summary(upgrade)$change,
+               "How much sun does hangs together with gain .correlation beyond 0.4", all = FALSE)
   upgrade$models[[2]]["confounded_with"] <- list(character())
   expect_no_match(paste(summary(upgrade)$change, collapse = " "), "could also be done")
 })
@@ -95,13 +95,15 @@ test_that("an upgrade prints each mechanism with its verdict, within fifteen lin
   expect_match(lines, "named: .*sun.* \\(Gv\\), log10 Bayes factor [0-9.]+", all = FALSE)
   # As if five had been adopted, and all doubted: each is printed.
   upgrade$models[[2]][c("verdict", "doubts")] <- list("likely", c(
-    "other causes are possible", "the numbers behind it are not trusted", "the error in calibration rose with it",
-    "the error still answers to what drives it", "its value lies at the edge of what was thought possible",
-    "a good part of the error remains", "a drifting sensor would explain the error as well"))
+    "other causes are possible", "the numbers behind it are not trusted",
+    "the error in calibration rose with it", "the error still answers to what drives it",
+    "its value lies at the edge of what was thought possible", "a good part of the error remains",
+    "a drifting sensor would explain the error as well"))
   sun <- upgrade$models[[2]]
   for (name in paste("mechanism", letters[1:4])) {
     parent <- upgrade$models[[length(upgrade$models)]]
-    step <- utils::modifyList(sun, list(name = paste(parent$name, "+", name), parent = parent$name, mechanism = name))
+    step <- utils::modifyList(sun, list(name = paste(parent$name, "+", name), parent = parent$name,
+                                        mechanism = name))
     row <- upgrade$candidates[1, ]
     row[c("from", "mechanism")] <- list(parent$name, name)
     upgrade$candidates <- rbind(upgrade$candidates, row)
@@ -128,17 +130,18 @@ test_that("odds are written out while they can be read", {
 
 test_that("text from data is never markup", {
   skip_without_pandoc()
-  hostile <- c("javascript:alert(1)", "see http://a.b/c", "```\n\n# x", "1. a", "- a", "[a](b)", "![a](b)",
-               "$a$ \\(b\\) 'c'",
-               "<script>alert(1)</script>", "&lt;b&gt;", "{.a} *b* _c_", "# h", ": d", "a | b", "~~s~~ @k",
-               "`r stop()`")
+  hostile <- c("javascript:alert(1)", "see http://a.b/c", "```\n\n# x", "1. a", "- a", "[a](b)",
+               "![a](b)", "$a$ \\(b\\) 'c'", "<script>alert(1)</script>", "&lt;b&gt;",
+               "{.a} *b* _c_", "# h", ": d", "a | b", "~~s~~ @k", "`r stop()`")
   file <- withr::local_tempfile(fileext = ".md")
   html <- withr::local_tempfile(fileext = ".html")
   for (text in hostile) {
     writeLines(markdown_text(text), file)
-    rmarkdown::pandoc_convert(file, "html", "markdown+autolink_bare_uris+tex_math_single_backslash", html)
+    rmarkdown::pandoc_convert(file, "html", "markdown+autolink_bare_uris+tex_math_single_backslash",
+                              html)
     expect_identical(paste(readLines(html), collapse = "\n"),
-                     paste0("<p>", gsub("\\s+", " ", htmltools::htmlEscape(text)), "</p>"), info = text)
+                     paste0("<p>", gsub("\\s+", " ", htmltools::htmlEscape(text)), "</p>"),
+                     info = text)
   }
   sheet <- utils::capture.output(html_sheet(data.frame(unit = "```\n<b>")))
   expect_length(grep("```", sheet), 2)
@@ -159,7 +162,8 @@ small_report <- function() {
 # Tables of a page or, as XML, of a Word document, as lists of rows of cells.
 tables_of <- function(page, table = "//table", row = ".//tr", cell = "th|td") {
   lapply(xml2::xml_find_all(page, table), function(t) {
-    lapply(xml2::xml_find_all(t, row), function(r) trimws(xml2::xml_text(xml2::xml_find_all(r, cell))))
+    lapply(xml2::xml_find_all(t, row),
+           function(r) trimws(xml2::xml_text(xml2::xml_find_all(r, cell))))
   })
 }
 
@@ -183,10 +187,12 @@ test_that("a report is one file that names the cause and needs nothing from outs
   folder <- withr::local_tempdir()
   file <- file.path(folder, "diagnosis.html")
   file.copy(small_report(), file)
-  expect_identical(list.files(dirname(small_report()), "^[.]amiss-report", all.files = TRUE), character())
+  expect_identical(list.files(dirname(small_report()), "^[.]amiss-report", all.files = TRUE),
+                   character())
   expect_lt(file.size(file), 3e6)
   html <- paste(readLines(file, warn = FALSE), collapse = "\n")
-  expect_match(html, "Sun enters through a window &lt;that&gt; the model *leaves* out.", fixed = TRUE)
+  expect_match(html, "Sun enters through a window &lt;that&gt; the model *leaves* out.",
+               fixed = TRUE)
   links <- regmatches(html, gregexpr("(src|srcset|href)=\"[^\"]{0,20}", html))[[1]]
   expect_true(all(grepl("=\"(data:|#)", links)))
   expect_gte(sum(grepl("src=\"data:image/png", links)), length(figure_names))
@@ -227,20 +233,25 @@ test_that("a report says what result.json says", {
   skip_without_pandoc()
   skip_if_not_installed("xml2")
   file <- withr::local_tempfile(fileext = ".json")
-  jsonlite::write_json(result_list(small_upgrade()), file, auto_unbox = TRUE, digits = NA, null = "null", na = "null")
+  jsonlite::write_json(result_list(small_upgrade()), file, auto_unbox = TRUE, digits = NA,
+                       null = "null", na = "null")
   told <- jsonlite::read_json(file)
   page <- xml2::read_html(small_report())
-  text <- function(class) trimws(xml2::xml_text(xml2::xml_find_all(page,
-                                                                   sprintf("//*[contains(@class, '%s')]", class))))
+  text <- function(class)
+    trimws(xml2::xml_text(xml2::xml_find_all(page,
+                                             sprintf("//*[contains(@class, '%s')]", class))))
   expect_identical(text("headline"), told$diagnosis$headline)
   expect_identical(text("tag"), told$diagnosis$tag)
-  expect_true(grepl(told$diagnosis$verdict, text("verdict")[1]) || length(text(told$diagnosis$verdict)) > 0)
+  expect_true(grepl(told$diagnosis$verdict, text("verdict")[1]) ||
+              length(text(told$diagnosis$verdict)) > 0)
   tables <- tables_of(page)
 
   adopted <- Filter(function(m) !is.null(m$mechanism), told$models)
-  heads <- gsub("\\s+", " ", xml2::xml_text(xml2::xml_find_all(page, "//*[contains(@class, 'mechanism')]//h3")))
+  heads <- gsub("\\s+", " ",
+                xml2::xml_text(xml2::xml_find_all(page, "//*[contains(@class, 'mechanism')]//h3")))
   expect_identical(heads, vapply(adopted, function(m) paste(m$mechanism, m$verdict), ""))
-  for (doubt in unlist(lapply(adopted, `[[`, "doubts"))) expect_match(text("mechanism"), doubt, fixed = TRUE)
+  for (doubt in unlist(lapply(adopted, `[[`, "doubts")))
+    expect_match(text("mechanism"), doubt, fixed = TRUE)
 
   trials <- table_with(tables, c("step", "mechanism"))
   for (trial in told$candidates) {
@@ -250,24 +261,29 @@ test_that("a report says what result.json says", {
                        paste(signed(unlist(trial$interval)), collapse = " to "),
                        signed(trial$beside_unknown),
                        percent(trial$probability),
-                       if (is.null(trial$error_ratio)) "" else paste(short(trial$error_ratio), "times"),
+                       if (is.null(trial$error_ratio)) ""
+                       else paste(short(trial$error_ratio), "times"),
                        if (trial$judged_by == "runs") "verified"
                        else if (trial$trusted) "trial" else "rough"))
-    expect_identical(row[11] == "adopted", trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
+    expect_identical(row[11] == "adopted",
+                     trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
   }
 
   first <- told$models[[1]]
   last <- told$models[[length(told$models)]]
   tiles <- xml2::xml_text(xml2::xml_find_all(page, "//*[@class = 'big']//b"))
-  expect_identical(tiles[1:2], c(paste(short(first$rmse_validation), "\u2192", short(last$rmse_validation), "K"),
-                                 paste(short(first$rmse_calibration), "\u2192", short(last$rmse_calibration), "K")))
-  parameters <- table_with(tables, c("parameter", "unit", "median", "95 % interval", "range thought possible"))
+  expect_identical(
+    tiles[1:2],
+    c(paste(short(first$rmse_validation), "\u2192", short(last$rmse_validation), "K"),
+      paste(short(first$rmse_calibration), "\u2192", short(last$rmse_calibration), "K")))
+  parameters <- table_with(tables, c("parameter", "unit", "median", "95 % interval",
+                                     "range thought possible"))
   expect_setequal(parameters[, 3], vapply(last$parameters, function(p) short(p$median, 3), ""))
   drivers <- table_with(tables, "boundary condition")
   for (condition in last$attribution) {
     row <- drivers[drivers[, 1] == condition$boundary, ]
-    expect_identical(row[c(2, 5)],
-                     c(sprintf("%+.1f", condition$log10_bf_dropped), if (condition$significant) "yes" else "no"))
+    expect_identical(row[c(2, 5)], c(sprintf("%+.1f", condition$log10_bf_dropped),
+                                     if (condition$significant) "yes" else "no"))
   }
   method <- table_with(tables, "quantity")
   expect_identical(as.numeric(method[1:3, 3]), as.numeric(unlist(last[c("N", "Q", "M")])))
@@ -307,11 +323,12 @@ test_that("a new file from the template works at once", {
 test_that("fragments go into a document of one's own, of any level, twice", {
   skip_without_pandoc()
   made <- small_upgrade()
-  text <- c("# Mine", "```{r}", "report_fragment(made, \"mechanisms\", level = 3)", "```", "```{r}", "1 + 1", "```",
-            "```{r}", "report_fragment(made, \"words\", level = 1)", "```")
+  text <- c("# Mine", "```{r}", "report_fragment(made, \"mechanisms\", level = 3)", "```", "```{r}",
+            "1 + 1", "```", "```{r}", "report_fragment(made, \"words\", level = 1)", "```")
   figures <- withr::local_tempdir()
   withr::local_dir(figures)
-  said <- knitr::knit(text = text, quiet = TRUE, envir = list2env(list(made = made), parent = globalenv()))
+  said <- knitr::knit(text = text, quiet = TRUE,
+                      envir = list2env(list(made = made), parent = globalenv()))
   expect_match(said, "\n### What would change in the model")
   expect_match(said, "\n#### sun: named")
   expect_match(said, "\n# Words")
@@ -330,8 +347,10 @@ test_that("a report is refused with a reason, and nothing half-written stays", {
   expect_error(report(small_upgrade(), file.path(folder, "absent", "a.html")), "does not exist",
                class = "amiss_error_input")
   expect_error(report(small_upgrade(), folder), "is a folder", class = "amiss_error_input")
-  expect_error(report(small_upgrade(), file.path(folder, "a.tex")), "html.*pdf.*docx", class = "amiss_error_input")
-  expect_error(report(list(), file.path(folder, "a.html")), "upgrade_model", class = "amiss_error_input")
+  expect_error(report(small_upgrade(), file.path(folder, "a.tex")), "html.*pdf.*docx",
+               class = "amiss_error_input")
+  expect_error(report(list(), file.path(folder, "a.html")), "upgrade_model",
+               class = "amiss_error_input")
   skip_without_pandoc()
   withr::local_envvar(CHROMOTE_CHROME = "/nowhere/chrome")
   expect_error(report(small_upgrade(), file.path(folder, "a.pdf")), "apt-get install chromium",
@@ -342,14 +361,15 @@ test_that("a report is refused with a reason, and nothing half-written stays", {
   expect_length(list.files(folder, all.files = TRUE, no.. = TRUE), 0)
 })
 
-browser_or_skip <- function() tryCatch(find_browser(),
-                                       amiss_error_input = function(e) skip("no browser of the Chromium family"))
+browser_or_skip <- function()
+  tryCatch(find_browser(),
+           amiss_error_input = function(e) skip("no browser of the Chromium family"))
 
 # What a browser makes of a page in a frame of a given width, and what its console says.
 seen_in_browser <- function(browser, file, width) {
   page <- withr::local_tempfile(fileext = ".html")
-  html <- htmltools::htmlEscape(paste(readLines(file, warn = FALSE, encoding = "UTF-8"), collapse = "\n"),
-                                attribute = TRUE)
+  html <- htmltools::htmlEscape(
+    paste(readLines(file, warn = FALSE, encoding = "UTF-8"), collapse = "\n"), attribute = TRUE)
   script <- "frame.onload = function() {
     const page = frame.contentDocument, images = [...page.images];
     probe.textContent = JSON.stringify({width: page.documentElement.scrollWidth,
@@ -357,11 +377,12 @@ seen_in_browser <- function(browser, file, width) {
       natural: images.map(i => i.naturalWidth), shown: images.map(i => i.clientWidth)});
   }"
   writeLines(sprintf("<pre id='probe'></pre><script>%s</script>",
-                     paste0("</script><iframe id='frame' style='border:0; height:900px; width:", width, "px' srcdoc=\"",
-                            html,
-                            "\"></iframe><script>", script)), page, useBytes = TRUE)
+                     paste0("</script><iframe id='frame' style='border:0; height:900px; width:",
+                            width, "px' srcdoc=\"", html, "\"></iframe><script>", script)),
+             page, useBytes = TRUE)
   ran <- browse(browser, page, c("--enable-logging=stderr", "--dump-dom"))
-  seen <- jsonlite::fromJSON(sub(".*<pre id=\"probe\">(\\{[^<]*\\}).*", "\\1", substr(ran$stdout, 1, 10000)))
+  seen <- jsonlite::fromJSON(sub(".*<pre id=\"probe\">(\\{[^<]*\\}).*", "\\1",
+                                 substr(ran$stdout, 1, 10000)))
   c(seen, console = list(grep("CONSOLE", strsplit(ran$stderr, "\n")[[1]], value = TRUE)))
 }
 
@@ -385,6 +406,7 @@ test_that("a browser shows the report on a desk and on a phone, and prints it", 
   print_page(small_report(), pdf, browser)
   expect_identical(readChar(pdf, 5, useBytes = TRUE), "%PDF-")
   expect_gt(file.size(pdf), 2e5)
-  expect_error(print_page(small_report(), file.path(tempdir(), "absent", "a.pdf"), Sys.which("false")), "did not print",
-               class = "amiss_error_input")
+  expect_error(print_page(small_report(), file.path(tempdir(), "absent", "a.pdf"),
+                          Sys.which("false")),
+               "did not print", class = "amiss_error_input")
 })

@@ -6,7 +6,8 @@ used_folder <- local({
     if (is.null(used)) {
       folder <- withr::local_tempdir(.local_envir = teardown_env())
       out <- file.path(folder, "out")
-      theirs <- file.path(out, c("probe", "stages/notes.txt", "stages/mine.rds", "figures/mine.png"))
+      theirs <- file.path(out,
+                          c("probe", "stages/notes.txt", "stages/mine.rds", "figures/mine.png"))
       for (file in theirs) {
         dir.create(dirname(file), recursive = TRUE, showWarnings = FALSE)
         writeLines("theirs", file)
@@ -34,7 +35,8 @@ test_that("old and new results do not mix", {
 
 # Results of three pieces, written into a folder; why some are missing.
 write_pieces <- function(out, ...) {
-  pieces <- list(result.rds = function(path) saveRDS(1:3, path), result.json = function(path) writeLines("3", path),
+  pieces <- list(result.rds = function(path) saveRDS(1:3, path),
+                 result.json = function(path) writeLines("3", path),
                  "figures/fit.png" = function(path) writeLines("fit", path),
                  "figures/gain.png" = function(path) writeLines("gain", path),
                  report.html = function(path) writeLines("all of it", path))
@@ -49,23 +51,27 @@ fails <- function(path) {
 test_that("what cannot be made is missed, and told; the result is there", {
   out <- withr::local_tempdir()
   expect_null(write_pieces(out))
-  told <- expect_warning(missing <- write_pieces(out, report.html = fails, "figures/gain.png" = fails),
+  told <- expect_warning(missing <- write_pieces(out, report.html = fails,
+                                                 "figures/gain.png" = fails),
                          class = "amiss_warning_missing")
-  expect_match(conditionMessage(told), "2 files .*gain.png.*report.html.*no \\{pandoc\\} here.*result.rds")
+  expect_match(conditionMessage(told),
+               "2 files .*gain.png.*report.html.*no \\{pandoc\\} here.*result.rds")
   expect_named(missing, c("figures/gain.png", "report.html"))
   expect_equal(readRDS(file.path(out, "result.rds")), 1:3)
   there <- dir(out, recursive = TRUE)
   expect_setequal(grep("^earlier", there, value = TRUE, invert = TRUE),
                   c("result.rds", "result.json", "figures/fit.png"))
-  # What was there before has been moved as a whole: the old report does not stand beside the new result.
+  # What was there before has been moved as a whole: the old report does not stand beside the new
+  # result.
   expect_length(grep("^earlier", there), 5)
 })
 
 test_that("without room for the result nothing is written", {
   out <- withr::local_tempdir()
-  expect_error(write_pieces(out, result.rds = fails), "could not be written.*pandoc", class = "amiss_error_input")
-  expect_error(write_pieces(out, result.rds = function(path) writeLines("cut", path)), "could not be written",
+  expect_error(write_pieces(out, result.rds = fails), "could not be written.*pandoc",
                class = "amiss_error_input")
+  expect_error(write_pieces(out, result.rds = function(path) writeLines("cut", path)),
+               "could not be written", class = "amiss_error_input")
   expect_length(dir(out, all.files = TRUE, no.. = TRUE), 0)
 })
 
@@ -83,14 +89,16 @@ test_that("a copy that is cut short, as on a full disk, is missed and removed", 
   expect_equal(readLines(file.path(beside, "a", "report.html")), "all of it")
 })
 
-test_that("a study whose report fails keeps its result and its stages, and the same call makes the rest", {
+test_that(
+  "a study whose report fails keeps its result and its stages, and the same call makes the rest", {
   folder <- withr::local_tempdir()
   out <- file.path(folder, "out")
   study <- write_comparison_study(folder)
   stand_in(report = function(...) stop("pandoc stopped"),
            save_figure = function(figure, path, ...) writeLines("a figure", path))
   words <- c("run", study, "--out", out, "--trust", "--quiet")
-  expect_warning(expect_equal(run_command(words), 1), "report.html.*pandoc stopped", class = "amiss_warning_missing")
+  expect_warning(expect_equal(run_command(words), 1), "report.html.*pandoc stopped",
+                 class = "amiss_warning_missing")
   kept <- jsonlite::read_json(file.path(out, "result.json"))
   expect_s3_class(readRDS(file.path(out, "result.rds")), "amiss_comparison")
   expect_length(dir(file.path(out, "stages")), 1)
@@ -105,13 +113,14 @@ test_that("a folder is used by one run at a time, and free when that is killed",
   skip_on_os("windows")
   folder <- withr::local_tempdir()
   out <- file.path(folder, "out")
-  code <- sprintf("h <- amiss:::hold_folder('%s'); cat(Sys.getpid(), file = '%s'); Sys.sleep(60)", out,
-                  file.path(folder, "pid"))
+  code <- sprintf("h <- amiss:::hold_folder('%s'); cat(Sys.getpid(), file = '%s'); Sys.sleep(60)",
+                  out, file.path(folder, "pid"))
   withr::local_envvar(R_LIBS = paste(.libPaths(), collapse = ":"))
   system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)), wait = FALSE)
   while (!isTRUE(file.size(file.path(folder, "pid")) > 0)) Sys.sleep(0.1)
   pid <- scan(file.path(folder, "pid"), quiet = TRUE)
-  refused <- expect_error(hold_folder(out), paste0("in use by process ", pid, " on "), class = "amiss_error_input")
+  refused <- expect_error(hold_folder(out), paste0("in use by process ", pid, " on "),
+                          class = "amiss_error_input")
   expect_match(conditionMessage(refused), Sys.info()[["nodename"]], fixed = TRUE)
   tools::pskill(pid, tools::SIGKILL)
   Sys.sleep(0.5)

@@ -1,5 +1,5 @@
-# The checks of bench/calibration.R: a short form with fixed seeds, and the long one when AMISS_EXTENDED_TESTS is
-# "true".
+# The checks of bench/calibration.R: a short form with fixed seeds, and the long one when
+# AMISS_EXTENDED_TESTS is "true".
 skip_on_cran()  # second tier: tools/test --quick
 bench <- test_path("..", "..", "bench", "calibration")
 extended <- identical(Sys.getenv("AMISS_EXTENDED_TESTS"), "true")
@@ -9,12 +9,15 @@ if (dir.exists(bench)) {
     sys.source(file.path(bench, paste0(part, ".R")), checks)
   checks$world <- checks$sbc_world()
 }
-skip_without_bench <- function() if (!dir.exists(bench)) skip("bench/ is not part of the installed package")
+skip_without_bench <- function()
+  if (!dir.exists(bench)) skip("bench/ is not part of the installed package")
 
-# A right implementation fails with probability 0.001 for a fresh seed (Holm's method over the quantities).
+# A right implementation fails with probability 0.001 for a fresh seed (Holm's method over the
+# quantities).
 expect_uniform <- function(...) {
   rows <- do.call(rbind, list(...))
-  expect_gt(min(p.adjust(rows$p_value, "holm")), 0.001, label = paste(rows$quantity[which.min(rows$p_value)], "ranks"))
+  expect_gt(min(p.adjust(rows$p_value, "holm")), 0.001,
+            label = paste(rows$quantity[which.min(rows$p_value)], "ranks"))
 }
 records <- if (extended) 200 else 60
 
@@ -22,7 +25,8 @@ test_that("ranks of draws from the prior are uniform among draws of posteriors (
   skip_without_bench()
   for (shared in if (extended) c(FALSE, TRUE) else FALSE) {
     results <- checks$sbc_run("paper", checks$world, records, 4e4, list(shared_lambda = shared))
-    expect_uniform(checks$sbc_rows("(5)", results, "inside"), checks$sbc_rows("(6)", results, "outside"))
+    expect_uniform(checks$sbc_rows("(5)", results, "inside"),
+                   checks$sbc_rows("(6)", results, "outside"))
   }
 })
 
@@ -44,7 +48,9 @@ test_that("probabilities of models are calibrated", {
   skip_if_not(extended, "the long form runs with AMISS_EXTENDED_TESTS=true")
   worlds <- checks$box_worlds()
   for (name in names(checks$sources)) {
-    cases <- do.call(rbind, lapply(6e4 + 1:300, function(seed) checks$model_case(worlds, checks$sources[[name]], seed)))
+    cases <- do.call(rbind,
+                     lapply(6e4 + 1:300,
+                            function(seed) checks$model_case(worlds, checks$sources[[name]], seed)))
     expect_uniform(checks$probability_rows(cases, name))
   }
 })

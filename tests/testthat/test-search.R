@@ -17,7 +17,8 @@ runs_of <- function(model) ncol(model$runs$outputs)
 
 # ---- coordinates
 
-space_of <- function(...) amiss:::coordinates_of(lapply(list(...), function(prior) free("k", prior)))
+space_of <- function(...)
+  amiss:::coordinates_of(lapply(list(...), function(prior) free("k", prior)))
 
 test_that("coordinates go to the unit cube and back, of mean 0 and variance 1 over a prior", {
   unit <- withr::with_seed(1, matrix(runif(4000), 1000))
@@ -35,7 +36,8 @@ test_that("coordinates go to the unit cube and back, of mean 0 and variance 1 ov
 })
 
 test_that("a prior that is cut is linear in z, or in the logarithm, as far as its limits", {
-  for (prior in list(normal(20, 3, 18, 29), lognormal(log(2), 0.6, 0.7, 6), normal(0, 1, lower = 2))) {
+  for (prior in list(normal(20, 3, 18, 29), lognormal(log(2), 0.6, 0.7, 6),
+                     normal(0, 1, lower = 2))) {
     space <- space_of(prior)
     z <- seq(space$lower, space$upper, length.out = 50)
     value <- amiss:::prior_quantile(prior, amiss:::to_unit(cbind(z), space)[, 1])
@@ -65,7 +67,8 @@ test_that("a prior is flat if it is uniform, or wider than its limits", {
 })
 
 test_that("differences stay within priors that are cut, at either end", {
-  space <- space_of(normal(0, 1, -2, 2), normal(0, 1, lower = 1, upper = 2.5), uniform(0, 1), normal(0, 1))
+  space <- space_of(normal(0, 1, -2, 2), normal(0, 1, lower = 1, upper = 2.5), uniform(0, 1),
+                    normal(0, 1))
   for (z in list(space$lower, space$upper, (space$lower + space$upper) / 2)) {
     for (step in c(rules$search_difference, rules$wide_difference)) {
       to <- z + step * amiss:::difference_side(z, space)
@@ -74,13 +77,15 @@ test_that("differences stay within priors that are cut, at either end", {
   }
 })
 
-test_that("runs lie as far out in a region as their points of the unit cube do, if no prior is flat", {
+test_that(
+  "runs lie as far out in a region as their points of the unit cube do, if no prior is flat", {
   parameters <- list(a = free("a", normal(0, 1, -2, 0.5)), b = free("b", lognormal(0, 1)))
   unit <- withr::with_seed(5, matrix(runif(400), 200))
   region <- amiss:::region_of_draws(unit, rep(1, 200), parameters)
   space <- amiss:::coordinates_of(parameters)
   apart <- amiss:::along_axes(region, space, amiss:::from_unit(unit, space))
-  expect_equal(sqrt(colSums(apart^2)) / region$radius, amiss:::region_distance(region, unit), tolerance = 1e-9)
+  expect_equal(sqrt(colSums(apart^2)) / region$radius, amiss:::region_distance(region, unit),
+               tolerance = 1e-9)
 })
 
 # The most probable point in a box, by trying every set of coordinates at their ends.
@@ -154,7 +159,8 @@ test_that("draws within limits have the moments of the truncated normal distribu
   }
 })
 
-test_that("draws leave a corner of the limits in which all of eight correlated coordinates are pressed", {
+test_that(
+  "draws leave a corner of the limits in which all of eight correlated coordinates are pressed", {
   root <- withr::with_seed(1, matrix(rnorm(64), 8))
   covariance <- crossprod(root) + diag(0.01, 8)
   mean <- rep(c(-5, 5), 4) * sqrt(diag(covariance))
@@ -203,10 +209,11 @@ test_that("one run corrects slopes of which nothing else is known as Broyden's u
   broyden <- start + missed %*% way / sum(way^2)
   # The reference is trusted by 1 / stale^2 = 1e-6 beside 1 / |way|^2 = 3.
   expect_equal(own, broyden, tolerance = 1e-6, ignore_attr = TRUE)
-  # Of slopes that were exact at that run, s away, they turn by 2 c |s| and the simulator bends by c |s|^2; a third
-  # order adds c |s|^3 / 3. So 4 parts of 5 + s^2 / 9 are the slopes'.
+  # Of slopes that were exact at that run, s away, they turn by 2 c |s| and the simulator bends by c
+  # |s|^2; a third order adds c |s|^3 / 3. So 4 parts of 5 + s^2 / 9 are the slopes'.
   part <- amiss:::secant_slopes(model, 2, list(z = model$runs$z[1, ], slopes = start, stale = 0))
-  expect_equal(part, start + (broyden - start) * 4 / (5 + sum(way^2) / 9), tolerance = 1e-6, ignore_attr = TRUE)
+  expect_equal(part, start + (broyden - start) * 4 / (5 + sum(way^2) / 9), tolerance = 1e-6,
+               ignore_attr = TRUE)
 })
 
 test_that("the slopes of a linear simulator are exact once runs go along every coordinate", {
@@ -392,7 +399,8 @@ test_that("a search that the budget ends keeps its best run", {
 
 test_that("searches begin at the run nearest to the record and at near ones far from it", {
   m <- linear_measurements()
-  z <- amiss:::from_unit(withr::with_seed(3, lhs::randomLHS(10, 2)), space_of(uniform(0, 1), uniform(0, 1)))
+  z <- amiss:::from_unit(withr::with_seed(3, lhs::randomLHS(10, 2)),
+                         space_of(uniform(0, 1), uniform(0, 1)))
   model <- run_model(linear_simulator(), m, z)
   misfit <- colMeans((model$runs$outputs - model$target)^2)
   starts <- amiss:::start_runs(model)
@@ -553,12 +561,15 @@ test_that("a trial whose first search leads no nearer to the record goes on from
   m <- measured_run(simulator, c(offset = 20, amount = 0.7))
   z <- amiss:::from_unit(rbind(c(0.42, 0), c(0.42, 0.6)), space_of(uniform(0, 1), uniform(0, 1)))
   model <- run_model(simulator, m, z)
-  start <- function(at) list(at = at, slopes = amiss:::difference_slopes(model, at, search_context())$slopes)
+  start <- function(at)
+    list(at = at, slopes = amiss:::difference_slopes(model, at, search_context())$slopes)
   looked <- list(model = model, off_at = 1, starts = list(start(1), start(2)))
   found <- amiss:::search_trial(looked, search_context())
-  amount <- amiss:::unit_to_values(amiss:::to_unit(found$model$runs$z[found$least$at, , drop = FALSE],
-                                                   model$space), model$parameters)[, "amount"]
-  # Known to the noise of 0.1 over the 5 degrees by which the weather varies, in a hundred hours and more.
+  amount <- amiss:::unit_to_values(
+    amiss:::to_unit(found$model$runs$z[found$least$at, , drop = FALSE], model$space),
+    model$parameters)[, "amount"]
+  # Known to the noise of 0.1 over the 5 degrees by which the weather varies, in a hundred hours and
+  # more.
   expect_equal(amount, 0.7, tolerance = 0.02, ignore_attr = TRUE)
   # Nothing is nearer than itself.
   expect_false(amiss:::comes_nearer(model, 1, 1))

@@ -10,12 +10,14 @@ ishigami_ensemble <- function(runs) {
 ishigami_indices <- function() {
   alone <- c((1 + 0.1 * pi^4 / 5)^2 / 2, 7^2 / 8, 0)
   both <- 0.01 * pi^8 * (1 / 18 - 1 / 50)
-  list(first = alone / (sum(alone) + both), total = (alone + both * c(1, 0, 1)) / (sum(alone) + both))
+  list(first = alone / (sum(alone) + both),
+       total = (alone + both * c(1, 0, 1)) / (sum(alone) + both))
 }
 
 test_that("indices of Ishigami's function are those of the closed form, within their errors", {
   truth <- unlist(ishigami_indices(), use.names = FALSE)
-  emulators <- lapply(c(60, 200), function(runs) train_emulator(ishigami_ensemble(runs), noise_sd = 0.01))
+  emulators <- lapply(c(60, 200),
+                      function(runs) train_emulator(ishigami_ensemble(runs), noise_sd = 0.01))
   indices <- list(sobol_indices(emulators[[1]], points = 128, replicates = 8, seed = 2),
                   sobol_indices(emulators[[2]], seed = 2))
   rows <- lapply(indices, generics::tidy)
@@ -55,7 +57,8 @@ test_that("functions drawn go through the runs and vary elsewhere as the emulato
   expect_lt(max(abs(rowMeans(drawn[41:44, ]) - known$mean[, 1]) / sqrt(known$variance[, 1])), 0.4)
 })
 
-test_that("a fit and a refined emulator have the indices over the priors, and R's generator stays as it was", {
+test_that(paste("a fit and a refined emulator have the indices over the priors, and R's generator",
+                "stays as it was"), {
   m <- linear_measurements(linear_data(48))
   made <- simulate_design(linear_simulator(), m, runs = 30, seed = 1)
   emulator <- train_emulator(made, m)
@@ -72,13 +75,15 @@ test_that("a fit and a refined emulator have the indices over the priors, and R'
 
 test_that("indices are printed, tidied and drawn", {
   indices <- sobol_indices(train_emulator(ishigami_ensemble(80), noise_sd = 0.01), 64, 4, seed = 1)
-  expect_match(printed(indices), "Sobol indices of 3 parameters.*x2.*x1.*x3.*first orders add up.*unexplained")
+  expect_match(printed(indices),
+               "Sobol indices of 3 parameters.*x2.*x1.*x3.*first orders add up.*unexplained")
   table <- generics::tidy(indices)
   expect_equal(table$order, rep(c("first", "total"), each = 3))
   expect_true(all(table$conf.low <= table$conf.high & table$conf.low >= 0 & table$conf.high <= 1))
   expect_identical(as.data.frame(indices), indices$table)
   figure <- ggplot2::autoplot(indices)
-  expect_match(figure$labels$title, "^x2 moves the simulation most: [0-9]+ % of its variance by itself, [0-9]+ % with")
+  expect_match(figure$labels$title,
+               "^x2 moves the simulation most: [0-9]+ % of its variance by itself, [0-9]+ % with")
   expect_s3_class(ggplot2::ggplot_build(figure), "ggplot_built")
 })
 
@@ -87,5 +92,6 @@ test_that("what has no indices is refused", {
   expect_error(sobol_indices(ishigami_ensemble(40)), "train_emulator", class = "amiss_error_input")
   expect_error(sobol_indices(emulator, points = 10), "too few", class = "amiss_error_input")
   expect_error(sobol_indices(emulator, replicates = 2), "too few", class = "amiss_error_input")
-  expect_error(generics::tidy(sobol_indices(emulator, 32, 4), what = 1), class = "rlib_error_dots_nonempty")
+  expect_error(generics::tidy(sobol_indices(emulator, 32, 4), what = 1),
+               class = "rlib_error_dots_nonempty")
 })

@@ -30,19 +30,20 @@ test_that("a study is quiet only as long as it runs", {
 
 test_that("a study's result has the agreed fields", {
   json <- ran_study()$json
-  expect_true(all(c("schema", "study", "seed", "wall_s", "models", "candidates", "named_cause", "gain",
-                    "stopped_because") %in% names(json)))
-  expect_true(all(c("name", "parent", "mechanism", "Q", "N", "M", "noise_sd", "discarded_rms", "log10_evidence",
-                    "log10_evidence_interval",
-                    "trusted", "rmse_calibration", "rmse_validation", "coverage95_validation", "parameters",
-                    "attribution") %in% names(json$models[[1]])))
+  expect_true(all(c("schema", "study", "seed", "wall_s", "models", "candidates", "named_cause",
+                    "gain", "stopped_because") %in% names(json)))
+  expect_true(all(c("name", "parent", "mechanism", "Q", "N", "M", "noise_sd", "discarded_rms",
+                    "log10_evidence", "log10_evidence_interval", "trusted", "rmse_calibration",
+                    "rmse_validation", "coverage95_validation", "parameters", "attribution") %in%
+                  names(json$models[[1]])))
   expect_named(json$models[[1]]$parameters[[1]], c("name", "unit", "median", "lower95", "upper95"))
   expect_named(json$models[[1]]$attribution[[1]],
                c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group"))
-  expect_true(all(c("from", "mechanism", "log10_bf", "interval", "probability") %in% names(json$candidates[[1]])))
-  expect_true(all(c("verdict", "doubts", "confounded_with", "held_out_gain", "emulator_error", "emulator_ratio",
-                    "emulator_checked", "refinements",
-                    "reach", "trust") %in% names(json$models[[2]])))
+  expect_true(all(c("from", "mechanism", "log10_bf", "interval", "probability") %in%
+                  names(json$candidates[[1]])))
+  expect_true(all(c("verdict", "doubts", "confounded_with", "held_out_gain", "emulator_error",
+                    "emulator_ratio", "emulator_checked", "refinements", "reach", "trust") %in%
+                  names(json$models[[2]])))
 })
 
 test_that("a study's result says of an adopted model what the upgrade says", {
@@ -86,12 +87,13 @@ interrupted_loop <- function() {
     kept <- file.path(folder, "kept")
     study <- read_study(write_study_file(folder), trust = TRUE)
     loop <- function(catalogue, checkpoint = NULL, model = study$model) {
-      upgrade_model(model, study$measurements, catalogue, runs = 30, control = study$control, seed = 4, quiet = TRUE,
-                    checkpoint = checkpoint)
+      upgrade_model(model, study$measurements, catalogue, runs = 30, control = study$control,
+                    seed = 4, quiet = TRUE, checkpoint = checkpoint)
     }
     edits <- new.env()
     edits$broken <- TRUE
-    fragile <- catalogue(mechanism("sun", boundary = "Gv", sentence = "Sun.", edit = function(model) {
+    fragile <- catalogue(mechanism("sun", boundary = "Gv", sentence = "Sun.",
+                                   edit = function(model) {
       if (edits$broken) stop("power cut")
       study$catalogue$sun$edit(model)
     }))
@@ -100,7 +102,8 @@ interrupted_loop <- function() {
     times <- file.mtime(before)
     edits$broken <- FALSE
     resumed <- loop(fragile, kept)
-    study_cache$loop <- list(study = study, loop = loop, kept = kept, stopped = stopped, before = before,
+    study_cache$loop <- list(study = study, loop = loop, kept = kept, stopped = stopped,
+                             before = before,
                              times = times, times_after = file.mtime(before), resumed = resumed)
   }
   study_cache$loop
@@ -116,15 +119,18 @@ test_that("an interrupted loop keeps the stages that were done", {
 test_that("an interrupted loop goes on where it stopped, with the same result", {
   own <- interrupted_loop()
   expect_identical(own$times_after, own$times)
-  expect_identical(own$resumed$models[[2]]$fit$values, own$loop(own$study$catalogue)$models[[2]]$fit$values)
+  expect_identical(own$resumed$models[[2]]$fit$values,
+                   own$loop(own$study$catalogue)$models[[2]]$fit$values)
 })
 
 test_that("what is kept of one model does not serve another", {
   own <- interrupted_loop()
-  turned <- function_simulator(function(values, drivers) values[["offset"]] - values[["gain"]] * drivers[, "Te"],
-                               free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
+  turned <- function_simulator(
+    function(values, drivers) values[["offset"]] - values[["gain"]] * drivers[, "Te"],
+    free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te")
   other <- own$loop(catalogue(), own$kept, model = turned)
-  expect_false(identical(other$models[[1]]$fit$log_evidence, own$resumed$models[[1]]$fit$log_evidence))
+  expect_false(identical(other$models[[1]]$fit$log_evidence,
+                         own$resumed$models[[1]]$fit$log_evidence))
 })
 
 test_that("a bad study is refused and nothing is written", {
@@ -145,17 +151,20 @@ test_that("a bad study is refused and nothing is written", {
 })
 
 test_that("a study that does not exist is refused", {
-  expect_error(run_study(file.path(withr::local_tempdir(), "nothing.yml")), class = "amiss_error_input")
+  expect_error(run_study(file.path(withr::local_tempdir(), "nothing.yml")),
+               class = "amiss_error_input")
 })
 
 test_that("a study refused for its settings leaves nothing", {
   folder <- withr::local_tempdir()
   out <- file.path(folder, "out")
   dir.create(out)
-  for (control in list(list(calibration = list(nonsense = 1)), list(attribution = list(nonsense = 1)),
+  for (control in list(list(calibration = list(nonsense = 1)),
+                       list(attribution = list(nonsense = 1)),
                        list(emulator = list(nonsense = 1)))) {
-    expect_error(run_study(write_study_file(folder, control = control), out, quiet = TRUE, trust = TRUE), "nonsense",
-                 class = "amiss_error_input")
+    expect_error(run_study(write_study_file(folder, control = control), out, quiet = TRUE,
+                           trust = TRUE),
+                 "nonsense", class = "amiss_error_input")
     expect_length(dir(out, all.files = TRUE, no.. = TRUE), 0)
   }
 })
@@ -164,22 +173,23 @@ test_that("a folder that cannot be used is refused before anything is computed",
   folder <- withr::local_tempdir()
   study <- write_study_file(folder)
   file.create(file.path(folder, "afile"))
-  expect_error(run_study(study, file.path(folder, "afile", "sub"), quiet = TRUE, trust = TRUE), "not a folder",
-               class = "amiss_error_input")
+  expect_error(run_study(study, file.path(folder, "afile", "sub"), quiet = TRUE, trust = TRUE),
+               "not a folder", class = "amiss_error_input")
 })
 
 # A study whose model leaves a file behind when its code is run.
 tracing_study <- function(folder) {
   path <- write_study_file(folder)
-  write(sprintf("file.create('%s')", file.path(folder, "touched")), file.path(folder, "model.R"), append = TRUE)
+  write(sprintf("file.create('%s')", file.path(folder, "touched")), file.path(folder, "model.R"),
+        append = TRUE)
   path
 }
 
 test_that("R files need trust and are not run without it", {
   folder <- withr::local_tempdir()
   path <- tracing_study(folder)
-  error <- expect_error(run_study(path, file.path(folder, "out"), quiet = TRUE), "model.R.*catalogue.R",
-                        class = "amiss_error_trust")
+  error <- expect_error(run_study(path, file.path(folder, "out"), quiet = TRUE),
+                        "model.R.*catalogue.R", class = "amiss_error_trust")
   expect_false(grepl("data.csv", conditionMessage(error)))
   expect_false(file.exists(file.path(folder, "touched")) || file.exists(file.path(folder, "out")))
 })
@@ -206,7 +216,8 @@ test_that("files outside a study's folder need trust", {
   dir.create(inside)
   file.symlink(file.path(folder, "data.csv"), file.path(inside, "linked.csv"))
   file.copy(file.path(folder, "data.csv"), inside)
-  need <- function(data) require_trust(c(data = file.path(inside, data)), normalizePath(inside), FALSE)
+  need <- function(data)
+    require_trust(c(data = file.path(inside, data)), normalizePath(inside), FALSE)
   expect_silent(need("data.csv"))
   expect_error(need("../data.csv"), "outside its folder", class = "amiss_error_trust")
   expect_error(need("linked.csv"), "outside its folder", class = "amiss_error_trust")
@@ -221,9 +232,11 @@ test_that("a study with other letters is read whole in the C locale", {
   path <- write_study_file(folder, title = "K\u00fche in der K\u00e4lte", unit = "\u00b0C",
                            calibrate = "`T\u00fcr` <= 180", validate = "`T\u00fcr` > 180")
   csv <- file.path(folder, "data.csv")
-  writeLines(sub("\"hour\"", "\"hour\",\"T\u00fcr\"", sub("^([0-9]+),", "\\1,\\1,", readLines(csv))), csv,
-             useBytes = TRUE)
-  code <- sprintf("s <- amiss::read_study('%s', trust = TRUE); saveRDS(s, '%s')", path, file.path(folder, "s.rds"))
+  writeLines(sub("\"hour\"", "\"hour\",\"T\u00fcr\"",
+                 sub("^([0-9]+),", "\\1,\\1,", readLines(csv))),
+             csv, useBytes = TRUE)
+  code <- sprintf("s <- amiss::read_study('%s', trust = TRUE); saveRDS(s, '%s')", path,
+                  file.path(folder, "s.rds"))
   withr::with_envvar(c(LC_ALL = "C", R_LIBS = paste(.libPaths(), collapse = ":")),
                      system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code))))
   study <- readRDS(file.path(folder, "s.rds"))
@@ -236,10 +249,11 @@ test_that("a study with other letters is read whole in the C locale", {
 ran_comparison <- function() {
   if (is.null(study_cache$comparison)) {
     folder <- session_folder()
-    writeLines('list(simulator = source("models.R", local = TRUE)$value$line, values = c(offset = 20, gain = 0.4))',
-               file.path(folder, "truth.R"))
+    writeLines(paste('list(simulator = source("models.R", local = TRUE)$value$line,',
+                     "values = c(offset = 20, gain = 0.4))"), file.path(folder, "truth.R"))
     out <- file.path(folder, "out")
-    comparison <- run_study(write_comparison_study(folder, truth = "truth.R"), out, quiet = TRUE, trust = TRUE)
+    comparison <- run_study(write_comparison_study(folder, truth = "truth.R"), out, quiet = TRUE,
+                            trust = TRUE)
     study_cache$comparison <- list(out = out, comparison = comparison,
                                    json = jsonlite::read_json(file.path(out, "result.json")))
   }
@@ -258,11 +272,12 @@ test_that("a comparison study writes its files", {
 
 test_that("a comparison study's result has the agreed fields", {
   json <- ran_comparison()$json
-  expect_true(all(c("schema", "study", "seed", "wall_s", "method", "best", "models", "disagreements", "doubts",
+  expect_true(all(c("schema", "study", "seed", "wall_s", "method", "best", "models",
+                    "disagreements", "doubts",
                     "truth") %in% names(json)))
   model <- json$models[[2]]
-  expect_true(all(c("log10_evidence", "log10_evidence_interval", "log10_bf", "against", "word", "probability",
-                    "criteria", "parameters", "attribution") %in% names(model)))
+  expect_true(all(c("log10_evidence", "log10_evidence_interval", "log10_bf", "against", "word",
+                    "probability", "criteria", "parameters", "attribution") %in% names(model)))
   expect_true(all(c("aic", "bic", "lr", "rmse_validation", "k") %in% names(model$criteria)))
 })
 
@@ -275,8 +290,10 @@ test_that("a comparison study's result says what the comparison found", {
   expect_equal(vapply(own$json$models[[2]]$attribution, `[[`, "", "boundary"), boundary)
 })
 
-test_that("a comparison study's report says for which model the record is, and needs no other file", {
-  html <- paste(readLines(file.path(ran_comparison()$out, "report.html"), warn = FALSE), collapse = "\n")
+test_that(
+  "a comparison study's report says for which model the record is, and needs no other file", {
+  html <- paste(readLines(file.path(ran_comparison()$out, "report.html"), warn = FALSE),
+                collapse = "\n")
   expect_match(html, "The record is decisively for line among 2 models", fixed = TRUE)
   links <- regmatches(html, gregexpr("(src|href)=\"[^\"]{0,20}", html))[[1]]
   expect_gt(length(links), 0)
@@ -306,7 +323,8 @@ test_that("a comparison study whose code gives no simulators or no data is refus
 
 test_that("the fields of a comparison and of an upgrade do not mix", {
   folder <- withr::local_tempdir()
-  expect_error(read_study(write_study_file(folder, truth = "model.R")), "models.*only", class = "amiss_error_input")
+  expect_error(read_study(write_study_file(folder, truth = "model.R")), "models.*only",
+               class = "amiss_error_input")
   expect_error(read_study(write_study_file(folder, drop = "catalogue")), "lacks field.*catalogue",
                class = "amiss_error_input")
   path <- write_comparison_study(folder)
@@ -316,7 +334,8 @@ test_that("the fields of a comparison and of an upgrade do not mix", {
   refuse_comparison("field.*catalogue.*which goes with", path)
 })
 
-paper_study <- function(name) read_study(system.file("studies", paste0(name, ".yml"), package = "amiss"))
+paper_study <- function(name)
+  read_study(system.file("studies", paste0(name, ".yml"), package = "amiss"))
 
 test_that("the paper's studies that ship can be read", {
   for (name in c("paper_synthetic", "paper_real_like")) {
@@ -341,7 +360,8 @@ test_that("the noise of the paper's studies is as stated", {
 
 test_that("the noise of the paper's synthetic study has a hundredth of the record's variance", {
   m <- paper_study("paper_synthetic")$measurements
-  expect_equal(m$noise_sd^2, 0.01 * stats::var(m$raw$drivers[m$use == "calibrate", "Ti_clean"]), tolerance = 0.01)
+  expect_equal(m$noise_sd^2, 0.01 * stats::var(m$raw$drivers[m$use == "calibrate", "Ti_clean"]),
+               tolerance = 0.01)
 })
 
 test_that("a study says which values are missing and where a sensor ends", {
@@ -350,19 +370,21 @@ test_that("a study says which values are missing and where a sensor ends", {
   data$Ti[7] <- -9999
   data$Ti[20] <- 31
   write.csv(data, file.path(folder, "data.csv"), row.names = FALSE)
-  writeLines(c("library(amiss)", "function_simulator(function(v, d) v[['a']] * d[, 'Te'], free('a', uniform(0, 1)),",
+  writeLines(c("library(amiss)",
+               "function_simulator(function(v, d) v[['a']] * d[, 'Te'], free('a', uniform(0, 1)),",
                "                   boundary = 'Te')"), file.path(folder, "model.R"))
   writeLines("amiss::catalogue()", file.path(folder, "catalogue.R"))
   written <- function(...) {
     path <- file.path(folder, "study.yml")
-    writeLines(c("study: marks", "data: data.csv", "time: hour", "target: Ti", "boundary: [Te, Gv]", "noise_sd: 0.1",
-                 "model: model.R", "catalogue: catalogue.R", ...), path)
+    writeLines(c("study: marks", "data: data.csv", "time: hour", "target: Ti", "boundary: [Te, Gv]",
+                 "noise_sd: 0.1", "model: model.R", "catalogue: catalogue.R", ...), path)
     read_study(path, trust = TRUE)$measurements
   }
   expect_error(written(), "-9999", class = "amiss_error_input")
   expect_setequal(which(is.na(written("missing: -9999")$y)), 7)
   expect_setequal(which(is.na(written("missing: [-9999, 85]", "range: [-.inf, 31]")$y)), c(7, 20))
   expect_equal(written("missing: none")$y[7], -9999)
-  expect_error(written("missing: [-9999]", "range: [31, 0]"), "lower end comes first", class = "amiss_error_input")
+  expect_error(written("missing: [-9999]", "range: [31, 0]"), "lower end comes first",
+               class = "amiss_error_input")
   expect_error(written("missing: broken"), "missing", class = "amiss_error_input")
 })

@@ -14,13 +14,16 @@ write_table <- function(lines, bytes = charToRaw(paste0(enc2utf8(lines), "\n", c
 }
 read <- function(lines, ..., bytes = NULL) {
   path <- if (is.null(bytes)) write_table(lines) else write_table(bytes = bytes)
-  suppressMessages(read_table_file(path, c("Zeit", "Ti", "Te"), ...), classes = "amiss_message_file")
+  suppressMessages(read_table_file(path, c("Zeit", "Ti", "Te"), ...),
+                   classes = "amiss_message_file")
 }
 expect_read <- function(lines, time = when, ...) {
   table <- read(lines, ...)
-  expect_identical(as.data.frame(table)[c("Zeit", "Te", "Ti")], data.frame(Zeit = time, Te = Te, Ti = Ti))
+  expect_identical(as.data.frame(table)[c("Zeit", "Te", "Ti")],
+                   data.frame(Zeit = time, Te = Te, Ti = Ti))
 }
-refused <- function(lines, pattern, ...) expect_error(read(lines, ...), pattern, class = "amiss_error_input")
+refused <- function(lines, pattern, ...)
+  expect_error(read(lines, ...), pattern, class = "amiss_error_input")
 
 test_that("separators and decimal commas are recognised", {
   expect_read(c("Zeit,Te,Ti", plain))
@@ -30,15 +33,19 @@ test_that("separators and decimal commas are recognised", {
     expect_read(c(paste("Zeit", "Te", "Ti", sep = sep), comma(rows(when, Te, Ti, sep = sep))))
   }
   expect_read(c("Zeit  Te   Ti", paste("  ", 1:n, Te, "  ", Ti)), as.numeric(1:n))
-  expect_read(c("sep=;", "Zeit;Te;Ti;", paste0(comma(rows(when, Te, Ti, sep = ";")), ";"), ";;;", ";;;"))
-  expect_read(c("Zeit,Te,Ti", sprintf("%s,\"%s\",\"%s\"", when, comma(format(Te)), comma(format(Ti)))))
-  expect_read(c("Zeit;Te;Ti", paste0(when, "$", Te, "$", Ti)[0], comma(sprintf("%s;%.3f;%.3f", when, Te, Ti))))
+  expect_read(c("sep=;", "Zeit;Te;Ti;", paste0(comma(rows(when, Te, Ti, sep = ";")), ";"), ";;;",
+                ";;;"))
+  expect_read(c("Zeit,Te,Ti",
+                sprintf("%s,\"%s\",\"%s\"", when, comma(format(Te)), comma(format(Ti)))))
+  expect_read(c("Zeit;Te;Ti", paste0(when, "$", Te, "$", Ti)[0],
+                comma(sprintf("%s;%.3f;%.3f", when, Te, Ti))))
   expect_read(c("Zeit$Te$Ti", rows(when, Te, Ti, sep = "$")), separator = "$")
 })
 
 test_that("signs between thousands are no decimals", {
   value <- function(text, sep = ";", ...) {
-    read(c(paste("Zeit", "Te", "Ti", "p", sep = sep), paste(when, comma(Te), comma(Ti), text, sep = sep)), ...)$p[1]
+    read(c(paste("Zeit", "Te", "Ti", "p", sep = sep),
+           paste(when, comma(Te), comma(Ti), text, sep = sep)), ...)$p[1]
   }
   expect_identical(value("1.013,25"), 1013.25)
   expect_identical(value("101'325"), 101325)
@@ -55,13 +62,14 @@ test_that("lines above the header, comments and rows of units are left out", {
   expect_read(c("# made by", "Zeit,Te,Ti", append(plain, "# a gap", 9)))
   expect_read(c("# Zeit,Te,Ti", plain))
   expect_read(c("Station: A, 12", "1,2,3,4,5", "", "Zeit,Te,Ti", ",degC,degC", plain))
-  expect_read(c("\"TOA5\",\"a\",\"b\"", "\"Zeit\",\"Te\",\"Ti\"", "\"TS\",\"Deg C\",\"Deg C\"", "\"\",\"Avg\",\"Smp\"",
-                sprintf("\"%s\",%s,%s", when, Te, Ti)))
+  expect_read(c("\"TOA5\",\"a\",\"b\"", "\"Zeit\",\"Te\",\"Ti\"", "\"TS\",\"Deg C\",\"Deg C\"",
+                "\"\",\"Avg\",\"Smp\"", sprintf("\"%s\",%s,%s", when, Te, Ti)))
   expect_read(c("# USGS", "Zeit\tTe\tTi", "20d\t14n\t14n", rows(when, Te, Ti, sep = "\t")))
 })
 
 test_that("every row has the fields of the header", {
-  refused(c("Zeit,Te,Ti", paste(1:n, plain, sep = ",")), "Row 1 \\(line 2\\) has 4 fields, its header 3: 1 | 2024")
+  refused(c("Zeit,Te,Ti", paste(1:n, plain, sep = ",")),
+          "Row 1 \\(line 2\\) has 4 fields, its header 3: 1 | 2024")
   refused(c("Zeit,Te,Ti,Note", rows(1:n, 1:n, Te, Ti, "")), "has 5 fields")
   refused(c("Zeit,Te,Ti", "", replace(plain, 7, paste0(plain[7], ",x"))), "Row 7 \\(line 9\\)")
   refused(c("Zeit,Te,Ti", replace(plain, n, when[n])), "Row 30 \\(line 31\\) has 1 field.*cut off")
@@ -75,11 +83,14 @@ test_that("every row has the fields of the header", {
 
 test_that("numbers of Fortran and of loggers are read, and what is none is said", {
   expect_read(c("Zeit,Te,Ti", sub("e", "D", sprintf("%s,%.6e,%.6e", when, Te, Ti), fixed = TRUE)))
-  expect_identical(marked_column(c("1.5-102", "-2.0d+03", "NAN", ""), "."), c(1.5e-102, -2000, NA, NA))
+  expect_identical(marked_column(c("1.5-102", "-2.0d+03", "NAN", ""), "."),
+                   c(1.5e-102, -2000, NA, NA))
   expect_warning(x <- read(c("Zeit,Te,Ti,x", paste(plain, replace(Ti, 5, "****"), sep = ",")))$x,
-                 "\"x\" is read as text: row 5 holds \"\\*\\*\\*\\*\"", class = "amiss_warning_input")
+                 "\"x\" is read as text: row 5 holds \"\\*\\*\\*\\*\"",
+                 class = "amiss_warning_input")
   expect_type(x, "character")
-  table <- read(c("Zeit,Te,Ti,on,phase", paste(plain, rep(c("True", "False"), n / 2), "NA", sep = ",")))
+  table <- read(c("Zeit,Te,Ti,on,phase",
+                  paste(plain, rep(c("True", "False"), n / 2), "NA", sep = ",")))
   expect_identical(table$on, rep(c(TRUE, FALSE), n / 2))
 })
 
@@ -92,8 +103,8 @@ test_that("other encodings are read", {
   lines <- c("Zeit,Te,Ti,Gr\u00f6\u00dfe", paste0(plain, ",1"))
   text <- paste0(lines, "\r\n", collapse = "")
   coded <- function(to) iconv(text, "UTF-8", to, toRaw = TRUE)[[1]]
-  marks <- list("UTF-8" = c(0xef, 0xbb, 0xbf), "UTF-16LE" = c(0xff, 0xfe), "UTF-16BE" = c(0xfe, 0xff),
-                "windows-1252" = numeric())
+  marks <- list("UTF-8" = c(0xef, 0xbb, 0xbf), "UTF-16LE" = c(0xff, 0xfe),
+                "UTF-16BE" = c(0xfe, 0xff), "windows-1252" = numeric())
   for (code in names(marks)) {
     table <- read(bytes = c(as.raw(marks[[code]]), coded(code)))
     expect_identical(names(table), c("Zeit", "Te", "Ti", "Gr\u00f6\u00dfe"))
@@ -101,14 +112,16 @@ test_that("other encodings are read", {
   }
 })
 
-test_that("a study says what separates its fields and decimals, and names a value that is no number", {
+test_that(
+  "a study says what separates its fields and decimals, and names a value that is no number", {
   folder <- withr::local_tempdir()
   path <- write_study_file(folder, separator = "tab", decimal = ",")
   data <- utils::read.csv(file.path(folder, "data.csv"))
   own <- read_study(write_study_file(withr::local_tempdir()), trust = TRUE)$measurements
   write <- function(data) {
     data[] <- lapply(data, function(x) comma(format(x, digits = 15, trim = TRUE)))
-    utils::write.table(data, file.path(folder, "data.csv"), sep = "\t", quote = FALSE, row.names = FALSE)
+    utils::write.table(data, file.path(folder, "data.csv"), sep = "\t", quote = FALSE,
+                       row.names = FALSE)
   }
   write(data)
   expect_equal(read_study(path, trust = TRUE)$measurements, own)
@@ -118,14 +131,17 @@ test_that("a study says what separates its fields and decimals, and names a valu
   table <- readLines(file.path(folder, "data.csv"))
   target <- match("Ti", strsplit(gsub("\"", "", table[1]), ",")[[1]])
   fields <- strsplit(table[8], ",")[[1]]
-  writeLines(replace(table, 8, paste(replace(fields, target, "****"), collapse = ",")), file.path(folder, "data.csv"))
-  expect_error(read_study(path, trust = TRUE), "Ti.*row 7 holds \"\\*\\*\\*\\*\"", class = "amiss_error_input")
+  writeLines(replace(table, 8, paste(replace(fields, target, "****"), collapse = ",")),
+             file.path(folder, "data.csv"))
+  expect_error(read_study(path, trust = TRUE), "Ti.*row 7 holds \"\\*\\*\\*\\*\"",
+               class = "amiss_error_input")
 })
 
 test_that("what cannot stand between fields is no separator", {
   path <- withr::local_tempfile(lines = c("hour,Ti,Te", paste(1:20, 1:20, 1:20, sep = ",")))
   for (bad in c("[a", "ab", "a", "1", "\"", "#", "\u00e9", "\n", ",,")) {
-    expect_error(read_table_file(path, c("hour", "Ti", "Te"), bad), "separator", class = "amiss_error_input")
+    expect_error(read_table_file(path, c("hour", "Ti", "Te"), bad), "separator",
+                 class = "amiss_error_input")
   }
   expect_identical(read_table_file(path, c("hour", "Ti", "Te"), "comma"),
                    read_table_file(path, c("hour", "Ti", "Te"), ","))
@@ -136,6 +152,6 @@ test_that("a line of a great many fields is refused before a table is made of it
   lines[10] <- strrep(",", 1e5)
   path <- withr::local_tempfile(lines = lines)
   stand_in(scan_fields = function(...) stop("a table is made"))
-  expect_error(read_table_file(path, c("hour", "Ti", "Te")), "Line 10 has 100001 fields, its header 3",
-               class = "amiss_error_input")
+  expect_error(read_table_file(path, c("hour", "Ti", "Te")),
+               "Line 10 has 100001 fields, its header 3", class = "amiss_error_input")
 })

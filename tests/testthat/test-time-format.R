@@ -1,22 +1,27 @@
 quietly <- function(code) suppressMessages(code, classes = "amiss_message_time")
 reading <- function(values, name = "t", ...) quietly(amiss:::time_reading(values, name, ...))
-refused <- function(pattern, values, ...) expect_error(reading(values, ...), pattern, class = "amiss_error_input")
+refused <- function(pattern, values, ...)
+  expect_error(reading(values, ...), pattern, class = "amiss_error_input")
 from <- as.POSIXct("2014-06-01 00:30", tz = "UTC")
 days <- from + 86400 * 0:99 - 1800
 hours <- from + 3600 * 0:599
 halves <- from + 1800 * 0:599
 
 expect_recognised <- function(numbers, stamps, format) {
-  expect_message(amiss:::read_time(numbers, "t"), format, fixed = TRUE, class = "amiss_message_time")
+  expect_message(amiss:::read_time(numbers, "t"), format, fixed = TRUE,
+                 class = "amiss_message_time")
   read <- reading(numbers)
   expect_identical(read$format, format)
-  expect_identical(read$time, structure(as.numeric(stamps), class = c("POSIXct", "POSIXt"), tzone = "UTC"))
-  expect_identical(as.numeric(reading(numbers[1:12], format = format)$time), as.numeric(stamps[1:12]))
+  expect_identical(read$time,
+                   structure(as.numeric(stamps), class = c("POSIXct", "POSIXt"), tzone = "UTC"))
+  expect_identical(as.numeric(reading(numbers[1:12], format = format)$time),
+                   as.numeric(stamps[1:12]))
 }
 
 test_that("digits of a date are read as the date, also without the zero in front", {
-  cases <- list("%Y%m%d" = days, "%d%m%Y" = days, "%m%d%Y" = days, "%Y%m%d%H" = hours - 1800, "%Y%j%H" = hours - 1800,
-                "%Y%m%d%H%M" = halves, "%y%m%d%H%M" = halves, "%Y%m%d%H%M%S" = halves, "%y%m%d%H%M%S" = halves)
+  cases <- list("%Y%m%d" = days, "%d%m%Y" = days, "%m%d%Y" = days, "%Y%m%d%H" = hours - 1800,
+                "%Y%j%H" = hours - 1800, "%Y%m%d%H%M" = halves, "%y%m%d%H%M" = halves,
+                "%Y%m%d%H%M%S" = halves, "%y%m%d%H%M%S" = halves)
   for (format in names(cases)) {
     text <- format(cases[[format]], format)
     expect_recognised(as.numeric(text), cases[[format]], format)
@@ -44,13 +49,16 @@ test_that("numbers that could be hours and something else are refused with the f
   for (step in c(300, 600, 900, 1800, 3600, 86400)) refused("\"hours\".*\"seconds\"", step * 0:99)
   for (step in c(5, 10, 15, 20, 30, 60)) refused("\"seconds\".*\"minutes\"", step * 0:99)
   for (step in 1 / c(24, 144, 1440)) refused("\"days\"", step * 0:99)
-  for (name in c("day", "doy", "Time [d]")) refused("\"hours\".*\"days\"`: steps of 24 h", 1:99, name)
+  for (name in c("day", "doy", "Time [d]"))
+    refused("\"hours\".*\"days\"`: steps of 24 h", 1:99, name)
   for (name in c("t_s", "seconds")) refused("\"hours\".*\"seconds\"`: steps of 1 s", 0:99, name)
   refused("\"hours\".*%y%m%d", as.numeric(format(days, "%y%m%d")))
   refused("\"hours\".*%Y%j", as.numeric(format(days, "%Y%j")))
-  refused("\"hours\".*%Y%m", as.numeric(format(seq(as.Date("2010-01-01"), by = "month", length.out = 40), "%Y%m")))
+  refused("\"hours\".*%Y%m",
+          as.numeric(format(seq(as.Date("2010-01-01"), by = "month", length.out = 40), "%Y%m")))
   refused("neither hours nor Unix time.*excel", 20140601 + 0:50 / 4)
-  for (step in c(1, 600, 5)) expect_identical(reading(step * 0:99, "day", format = "hours")$time, step * 0:99)
+  for (step in c(1, 600, 5))
+    expect_identical(reading(step * 0:99, "day", format = "hours")$time, step * 0:99)
 })
 
 test_that("hours in usual steps stay hours", {
@@ -64,9 +72,11 @@ test_that("hours in usual steps stay hours", {
 test_that("a format that lacks a part of the date, or leaves a rest, is refused", {
   refused("has no year, month and day", format(hours, "%H:%M"), format = "%H:%M")
   refused("has no year, for which", format(hours, "%d.%m. %H:%M"), format = "%d.%m. %H:%M")
-  refused("only the beginning of.*30.08.2013.*row 1", c("30.08.2013", "31.08.2013"), format = "%d.%m.%y")
+  refused("only the beginning of.*30.08.2013.*row 1", c("30.08.2013", "31.08.2013"),
+          format = "%d.%m.%y")
   refused("row 1 holds.*201406010030", format(halves, "%Y%m%d%H%M"), format = "%Y%m%d%H")
-  expect_equal(format(reading(c("2014-06", "2014-07"), format = "%Y-%m")$time), c("2014-06-01", "2014-07-01"))
+  expect_equal(format(reading(c("2014-06", "2014-07"), format = "%Y-%m")$time),
+               c("2014-06-01", "2014-07-01"))
 })
 
 test_that("weeks are no change of clocks", {

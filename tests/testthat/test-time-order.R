@@ -29,11 +29,13 @@ test_that("an exchange of day and month is named", {
   for (step in c(1, 24)) {
     stamps <- as.POSIXct("2014-03-01", tz = "UTC") + 3600 * step * 0:1999
     stamps <- stamps[stamps < as.POSIXct("2014-11-01", tz = "UTC")]
-    expect_match(hint(amiss:::exchanged_days(stamps)), "Day and month are exchanged in some rows, so do not sort")
+    expect_match(hint(amiss:::exchanged_days(stamps)),
+                 "Day and month are exchanged in some rows, so do not sort")
   }
 })
 
 test_that("years of two digits that were read as four are refused", {
   expect_match(hint(as.Date("0013-08-30") + 0:20), "row 1 holds .*, in the year 13.*%y")
-  expect_match(hint(as.POSIXct(1.4e12 + 0:20, origin = "1970-01-01", tz = "UTC")), "in the year 46334")
+  expect_match(hint(as.POSIXct(1.4e12 + 0:20, origin = "1970-01-01", tz = "UTC")),
+               "in the year 46334")
 })

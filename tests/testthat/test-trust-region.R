@@ -1,7 +1,8 @@
 # What a search does after a poor step, and what a trial is given before it is verified.
 
 test_that("a step that fails shrinks the trusted distance to the least value of a parabola", {
-  # It falls by 2 per way at first, promised 1 at its least value, and ends 2 higher: 1 / (2 + 2) of the way.
+  # It falls by 2 per way at first, promised 1 at its least value, and ends 2 higher: 1 / (2 + 2) of
+  # the way.
   expect_equal(amiss:::shrinkage(1, -2), 1 / 4)
   # Of one that gained too little a third is left, of one that rose without bound or failed a tenth.
   expect_equal(amiss:::shrinkage(1, 0.1), 1 / rules$trust_changes)
@@ -9,7 +10,8 @@ test_that("a step that fails shrinks the trusted distance to the least value of 
   expect_equal(amiss:::shrinkage(1, -Inf), rules$least_shrinkage)
 })
 
-test_that("slopes are taken again after failures in a row, or once they have had as many steps as they cost", {
+test_that(paste("slopes are taken again after failures in a row, or once they have had as many",
+                "steps as they cost"), {
   search <- list(failed = 0, poor = 0, since = 0, model = list(parameters = letters[1:5]))
   with <- function(...) amiss:::needs_slopes(utils::modifyList(search, list(...)))
   expect_false(with(since = 20))
@@ -46,7 +48,8 @@ test_that("a trial that its runs do not confirm is checked again, once, before i
   models <- small_upgrade()$models
   trial <- c(models[[2]], list(level = "tried", taken = 0))
   present <- models[[1]]
-  asks <- function(bar, ...) amiss:::asks_for_checks(utils::modifyList(trial, list(...)), present, bar)
+  asks <- function(bar, ...)
+    amiss:::asks_for_checks(utils::modifyList(trial, list(...)), present, bar)
   trial$fit$check$effective <- 0.5
   low <- amiss:::lower_bound(trial, present)
   expect_true(asks(low + 1))
@@ -69,7 +72,8 @@ test_that("a model at a lower mode than its run of least squares is searched aga
   found <- function(model, a) {
     made <- amiss:::with_runs(model, rbind(c(0, a * sqrt(3))), context)
     slopes <- amiss:::difference_slopes(made$model, made$at, context)
-    amiss:::run_search(amiss:::begin_search(slopes$model, made$at, slopes$slopes, 0, steps = 3), context)
+    amiss:::run_search(amiss:::begin_search(slopes$model, made$at, slopes$slopes, 0, steps = 3),
+                       context)
   }
   right <- found(model, 0.6)
   wrong <- found(right$model, -0.6)

@@ -322,8 +322,8 @@ model_by_hand <- function(log10_evidence, se = 0.05, level = "verified", passed 
                         posterior = list(annealed = c(log10_evidence * log(10), se * log(10)),
                                          second = c(log10_evidence * log(10), se * log(10)))),
                    class = c("amiss_calibration", "amiss_fit"))
-  list(name = paste("base +", name), mechanism = name, fit = fit, level = level, target = 1:3, noise = rep(1, 3),
-       runs = list(outputs = cbind(1:3 - error)))
+  list(name = paste("base +", name), mechanism = name, fit = fit, level = level, target = 1:3,
+       noise = rep(1, 3), runs = list(outputs = cbind(1:3 - error)))
 }
 
 tried_by_hand <- function(log10_evidence, ...) model_by_hand(log10_evidence, level = "tried", ...)
@@ -409,7 +409,8 @@ test_that("the odds are of what was computed; what was not has no part in them",
 })
 
 test_that("what is adopted was verified, lowers the error, and leads by a decisive evidence", {
-  row <- function(log10_bf = 3, lower95 = 2, judged_by = "runs", error_ratio = 0.5, beside_unknown = -1) {
+  row <- function(log10_bf = 3, lower95 = 2, judged_by = "runs", error_ratio = 0.5,
+                  beside_unknown = -1) {
     data.frame(mechanism = "a", log10_bf, lower95, judged_by, error_ratio, beside_unknown)
   }
   adopted <- function(...) amiss:::may_be_adopted(amiss:::best_trial(row(...)), list(decisive = 2))
@@ -425,7 +426,8 @@ test_that("what is adopted was verified, lowers the error, and leads by a decisi
   expect_equal(amiss:::best_trial(both)$log10_bf, 3)
 })
 
-test_that("of decisive mechanisms with one evidence that is adopted which does best beside an unknown response", {
+test_that(paste("of decisive mechanisms with one evidence that is adopted which does best beside",
+                "an unknown response"), {
   row <- function(mechanism, log10_bf, beside_unknown, lower95 = log10_bf - 0.2) {
     data.frame(mechanism, log10_bf, lower95, judged_by = "runs", error_ratio = 0.5, beside_unknown)
   }
@@ -441,8 +443,8 @@ test_that("of decisive mechanisms with one evidence that is adopted which does b
 test_that("a winner is the cause if it leaves little of the error beyond the noise", {
   # Twelve rows of noise 1 and two parameters: an RMS of e counts as e sqrt(12 / 10).
   model <- function(rms, level = "verified") {
-    list(level = level, target = rep(0, 12), noise = rep(1, 12), parameters = 1:2, least = list(at = 1),
-         runs = list(outputs = matrix(rms * rep(c(-1, 1), 6))))
+    list(level = level, target = rep(0, 12), noise = rep(1, 12), parameters = 1:2,
+         least = list(at = 1), runs = list(outputs = matrix(rms * rep(c(-1, 1), 6))))
   }
   large <- rules$large_remainder / sqrt(12 / 10)
   expect_true(amiss:::leaves_much(model(1.01 * large)))
@@ -517,9 +519,11 @@ test_that("checks of a model end where the control says; one that they refute is
   expect_false(inherits(fit, "error") || fit$trust$trusted)
 })
 
-# Runs of the linear world, with sun and wind beside it, over all rows of a record in which both act.
+# Runs of the linear world, with sun and wind beside it, over all rows of a record in which both
+# act.
 given_upgrade <- function(catalogue, base = world$base, control = list()) {
-  control <- utils::modifyList(list(calibration = quick_ais, attribution = list(surrogates = 19)), control)
+  control <- utils::modifyList(list(calibration = quick_ais, attribution = list(surrogates = 19)),
+                               control)
   upgrade_model(base, world$m, catalogue, control = control, seed = 1, quiet = TRUE)
 }
 
@@ -527,7 +531,8 @@ world <- local({
   data <- linear_data(120)
   data$Ws <- withr::with_seed(4, stats::rnorm(120))
   data$Ti <- data$Ti + 0.01 * data$Gv - 0.5 * data$Ws
-  m <- linear_measurements(data, boundary = ~ Te + Gv + Ws, calibrate = data$hour <= 84, validate = data$hour > 84)
+  m <- linear_measurements(data, boundary = ~ Te + Gv + Ws, calibrate = data$hour <= 84,
+                           validate = data$hour > 84)
   free_of <- list(offset = free("offset", uniform(10, 30)), gain = free("gain", uniform(0, 1)),
                   sun = free("sun", uniform(0, 0.02)), wind = free("wind", uniform(-1, 1)))
   made <- function(names, rows = 1:120) {
@@ -544,7 +549,8 @@ of_runs <- function(name, edit, boundary) mechanism(name, edit, boundary, "It ac
 test_that("mechanisms may be other sets of given runs", {
   # A function of what there is gives runs with what was adopted.
   with <- function(name) function(present) world$made(c(names(free_parameters(present)), name))
-  upgrade <- given_upgrade(catalogue(of_runs("sun", with("sun"), "Gv"), of_runs("wind", with("wind"), "Ws")))
+  upgrade <- given_upgrade(catalogue(of_runs("sun", with("sun"), "Gv"),
+                                     of_runs("wind", with("wind"), "Ws")))
   expect_setequal(vapply(upgrade$models[-1], `[[`, "", "mechanism"), c("sun", "wind"))
   expect_setequal(names(coef(upgrade$models[[3]]$fit)), c("offset", "gain", "sun", "wind"))
   first <- upgrade$candidates[upgrade$candidates$from == "base", ]
@@ -578,17 +584,20 @@ test_that("given runs that do not fit the loop are refused before anything is ca
   refused <- function(what, ...) expect_error(given_upgrade(...), what, class = "amiss_error_input")
   other <- linear_measurements(linear_data(60))
   elsewhere <- simulate_design(linear_simulator(), other, runs = 20, seed = 1)
-  refused("knows its simulator", catalogue(), base = simulate_design(linear_simulator(), world$m, runs = 20, seed = 1))
+  refused("knows its simulator", catalogue(),
+          base = simulate_design(linear_simulator(), world$m, runs = 20, seed = 1))
   elsewhere["simulator"] <- list(NULL)
   refused("have 60 steps.*84", catalogue(of_runs("sun", elsewhere, "Gv")))
   expect_error(mechanism("sun", "runs", "Gv", "It acts."), "edit", class = "amiss_error_input")
   few <- of_runs("sun", world$made(c("offset", "gain", "sun"), rows = 1:84), "Gv")
-  expect_error(amiss:::extend(world$base, few), "not known at the validation rows", class = "amiss_error_input")
+  expect_error(amiss:::extend(world$base, few), "not known at the validation rows",
+               class = "amiss_error_input")
 })
 
 test_that("given runs at the calibration rows alone are judged without held-out rows", {
-  upgrade <- given_upgrade(catalogue(of_runs("sun", world$made(c("offset", "gain", "sun"), rows = 1:84), "Gv")),
-                           base = world$made(c("offset", "gain"), rows = 1:84), control = list(max_steps = 1))
+  upgrade <- given_upgrade(
+    catalogue(of_runs("sun", world$made(c("offset", "gain", "sun"), rows = 1:84), "Gv")),
+    base = world$made(c("offset", "gain"), rows = 1:84), control = list(max_steps = 1))
   expect_true(all(is.na(upgrade$models[[1]]$scores$validate)))
   expect_equal(upgrade$models[[2]]$mechanism, "sun")
   expect_true(is.na(upgrade$models[[2]]$held_out_gain$improves))
@@ -598,17 +607,20 @@ test_that("a mechanism that cannot be made on top of what was adopted is left ou
   table <- linear_data(60)
   table$Ti <- table$Ti + 0.01 * table$Gv
   m <- linear_measurements(table, calibrate = table$hour <= 42, validate = table$hour > 42)
-  base <- function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
-                             free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
+  base <- function_simulator(
+    function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+    free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
   sunny <- function(model) {
     with_parameters(model, free("s", uniform(0, 0.02)), boundary = "Gv",
-                    f = function(values, drivers, base) base(values) + values[["s"]] * drivers[, "Gv"])
+                    f = function(values, drivers, base)
+                      base(values) + values[["s"]] * drivers[, "Gv"])
   }
   sun <- mechanism("sun", sunny, "Gv", "Sun enters.")
   again <- mechanism("sun again", function(model) {
     if ("s" %in% names(free_parameters(model))) stop("there is a sun")
     with_parameters(model, free("r", uniform(0, 1e-6)), boundary = "Gv",
-                    f = function(values, drivers, base) base(values) + values[["r"]] * drivers[, "Gv"])
+                    f = function(values, drivers, base)
+                      base(values) + values[["r"]] * drivers[, "Gv"])
   }, "Gv", "A little sun enters.")
   expect_warning(upgrade <- upgrade_model(base, m, catalogue(sun, again), seed = 1, quiet = TRUE,
                                           control = list(calibration = quick_ais,

@@ -1,6 +1,8 @@
 test_that("units have their powers, and other digits stay", {
-  expect_equal(amiss:::pretty_unit(c("W/m2K", "Km2/W", "m3/s", "m/s2", "kWh/m3", "m0.5", "m2.5", "CO2", "K", "")),
-               c("W/m\u00b2K", "Km\u00b2/W", "m\u00b3/s", "m/s\u00b2", "kWh/m\u00b3", "m0.5", "m2.5", "CO2", "K", ""))
+  expect_equal(amiss:::pretty_unit(c("W/m2K", "Km2/W", "m3/s", "m/s2", "kWh/m3", "m0.5", "m2.5",
+                                     "CO2", "K", "")),
+               c("W/m\u00b2K", "Km\u00b2/W", "m\u00b3/s", "m/s\u00b2", "kWh/m\u00b3", "m0.5",
+                 "m2.5", "CO2", "K", ""))
   expect_equal(amiss:::with_unit(c("1", "2"), "m2"), c("1 m\u00b2", "2 m\u00b2"))
   expect_equal(amiss:::with_unit(c("1", "2"), ""), c("1", "2"))
   expect_equal(amiss:::with_unit(c("1", "2"), c("", "K")), c("1", "2 K"))
@@ -15,7 +17,8 @@ test_that("the ends of an interval are told apart", {
 
 test_that("what rounds to zero has no sign, and a clock no sixtieth minute", {
   expect_equal(amiss:::signed(c(-0.01, 0.04, -0.06, 12.3)), c("0.0", "0.0", "-0.1", "+12"))
-  expect_equal(amiss:::clock_words(c(0, 7.5, 10.9999, 23.25)), c("00:00", "07:30", "11:00", "23:15"))
+  expect_equal(amiss:::clock_words(c(0, 7.5, 10.9999, 23.25)),
+               c("00:00", "07:30", "11:00", "23:15"))
 })
 
 test_that("odds up to a million are told in figures", {

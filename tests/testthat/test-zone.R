@@ -1,6 +1,7 @@
 room <- function(...) {
   zone(
-    zone_wall("facade", 12, zone_layer(0.02, 0.8, 1.4e6), zone_layer(0.2, 0.2, 8e5), outside = "Te", sun = "Gv"),
+    zone_wall("facade", 12, zone_layer(0.02, 0.8, 1.4e6), zone_layer(0.2, 0.2, 8e5), outside = "Te",
+              sun = "Gv"),
     zone_window("window", 2, outside = "Te"),
     zone_heater("heater", power = "P"),
     ..., volume = 40)
@@ -8,7 +9,8 @@ room <- function(...) {
 
 weather <- function(n = 96) {
   t <- 2 * pi * seq_len(n) / 96
-  cbind(Te = 8 + 6 * sin(t), Gv = pmax(0, 400 * sin(t)), P = 300 * (seq_len(n) %% 24 < 12), Ws = 3 + cos(t), Wd = 200)
+  cbind(Te = 8 + 6 * sin(t), Gv = pmax(0, 400 * sin(t)), P = 300 * (seq_len(n) %% 24 < 12),
+        Ws = 3 + cos(t), Wd = 200)
 }
 
 k <- function(prior = uniform(0.1, 0.3)) free("k", prior, "W/mK")
@@ -38,30 +40,36 @@ test_that("components are edited by name", {
 
 test_that("misuse is a classed error that names component, field and value", {
   expect_error(zone_layer(-0.1, 1, 1e6), "thickness.*-0.1", class = "amiss_error_input")
-  expect_error(zone_wall("w", -2, zone_layer(0.1, 1, 1e6)), "'w'.*area.*-2", class = "amiss_error_input")
+  expect_error(zone_wall("w", -2, zone_layer(0.1, 1, 1e6)), "'w'.*area.*-2",
+               class = "amiss_error_input")
   expect_error(zone_wall("w", 2), "layer", class = "amiss_error_input")
-  expect_error(zone_wall("w", 2, zone_layer(0.1, 1, 1e6), wind_film = 1), "wind_speed", class = "amiss_error_input")
+  expect_error(zone_wall("w", 2, zone_layer(0.1, 1, 1e6), wind_film = 1), "wind_speed",
+               class = "amiss_error_input")
   expect_error(zone_opening("o", 1, "Te", exposure = "windy"), "windy", class = "amiss_error_input")
   expect_error(room(zone_heater("heater", "P")), "heater", class = "amiss_error_input")
   expect_error(zone_heater("zone", "P"), "zone", class = "amiss_error_input")
   expect_error(component(room(), "attic"), "attic.*facade", class = "amiss_error_input")
   expect_error(drop_component(room(), "attic"), "attic", class = "amiss_error_input")
-  expect_error(change_component(room(), "heater", lag = 3), "lag.*capacity", class = "amiss_error_input")
+  expect_error(change_component(room(), "heater", lag = 3), "lag.*capacity",
+               class = "amiss_error_input")
   expect_error(change_component(room(), "heater", 3), class = "amiss_error_input")
-  expect_error(change_component(room(), "heater", radiant_fraction = 1.5), "1.5", class = "amiss_error_input")
+  expect_error(change_component(room(), "heater", radiant_fraction = 1.5), "1.5",
+               class = "amiss_error_input")
   expect_error(change_component(room(), "zone", volume = 0), "volume", class = "amiss_error_input")
 })
 
 test_that("a free parameter may stand in several places with one prior only", {
   x <- zone(zone_wall("w", 1, zone_layer(0.1, k(), 1e6), zone_layer(0.2, k(), 1e6)), volume = 1)
   expect_length(zone_parameters(x), 1)
-  x <- zone(zone_wall("w", 1, zone_layer(0.1, k(), 1e6), zone_layer(0.2, k(uniform(0, 1)), 1e6)), volume = 1)
+  x <- zone(zone_wall("w", 1, zone_layer(0.1, k(), 1e6), zone_layer(0.2, k(uniform(0, 1)), 1e6)),
+            volume = 1)
   expect_error(zone_parameters(x), "two different priors", class = "amiss_error_input")
 })
 
 test_that("resolving puts numbers in, in the unit of the field", {
   area <- free("area", uniform(700, 1300), "mm2")
-  x <- room(zone_opening("low", area * 1e-6, "Te"), zone_opening("high", 2 * (area / 1e6), "Te", height = 2))
+  x <- room(zone_opening("low", area * 1e-6, "Te"),
+            zone_opening("high", 2 * (area / 1e6), "Te", height = 2))
   expect_identical(zone_parameters(x)$area$unit, "mm2")
   y <- zone_resolve(x, c(area = 1000))
   expect_length(zone_parameters(y), 0)
@@ -112,7 +120,8 @@ test_that("data that cannot be simulated are refused", {
   gap <- weather()
   gap[3, "Ws"] <- NA
   expect_true(all(is.finite(simulate_zone(room(), NULL, gap, 900))))
-  expect_error(simulate_zone(room(), NULL, weather(), 900, hold = 1:3), "hold", class = "amiss_error_input")
+  expect_error(simulate_zone(room(), NULL, weather(), 900, hold = 1:3), "hold",
+               class = "amiss_error_input")
   expect_error(simulate_zone(room(), NULL, weather(), 900, control = list(cell = 2)), "cells",
                class = "amiss_error_input")
   free_room <- room(zone_infiltration("leaks", free("ach", uniform(0, 1)), outside = "Te"))
@@ -124,8 +133,9 @@ test_that("the paper's box has the paper's parameters and runs", {
   colnames(drivers)[3] <- "RHP"
   middle <- function(p) (p$prior$lower + p$prior$upper) / 2
   outer <- c("outer_k", "outer_c", "insulation_k", "insulation_c", "heater_radiant")
-  expected <- list(M1 = c("wall_k", "wall_c", "heater_radiant"), M2 = outer, M3 = c(outer, "crack_area"),
-                   M4 = c(outer, "window_transmission"), M5 = c(outer, "crack_area"), M6 = c(outer, "crack_area"))
+  expected <- list(M1 = c("wall_k", "wall_c", "heater_radiant"), M2 = outer,
+                   M3 = c(outer, "crack_area"), M4 = c(outer, "window_transmission"),
+                   M5 = c(outer, "crack_area"), M6 = c(outer, "crack_area"))
   for (model in names(expected)) {
     box <- paper_box(model)
     expect_setequal(names(zone_parameters(box)), expected[[model]])
@@ -140,8 +150,8 @@ test_that("the paper's box has the paper's parameters and runs", {
 test_that("the paper's box loses heat as measured, and more with a crack", {
   drivers <- cbind(Te = rep(0, 2000), Gv = 0, Ws = 3, Wd = 180, RHP = 100)
   loss <- function(model, ...) {
-    values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179, heater_radiant = 0.79,
-                    ...)
+    values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = 0.048, insulation_c = 179,
+                    heater_radiant = 0.79, ...)
     100 / simulate_zone(paper_box(model), values, drivers, 3600)[2000, 1]
   }
   expect_gt(loss("M2"), 3.6)
@@ -149,9 +159,11 @@ test_that("the paper's box loses heat as measured, and more with a crack", {
   expect_gt(loss("M3", crack_area = 790), loss("M2") + 0.1)
 })
 
-test_that("the initial offset of the walls is forgotten at the walls' own pace, and only they feel it", {
+test_that(
+  "the initial offset of the walls is forgotten at the walls' own pace, and only they feel it", {
   room <- function(offset) {
-    zone(zone_wall("facade", 10, zone_layer(0.1, 1, 2e6), outside = "Te"), volume = 50, initial_wall_offset = offset)
+    zone(zone_wall("facade", 10, zone_layer(0.1, 1, 2e6), outside = "Te"), volume = 50,
+         initial_wall_offset = offset)
   }
   drivers <- cbind(Te = rep(10, 96))
   difference <- simulate_zone(room(2), drivers = drivers, step_s = 900)[, 1] -
@@ -160,19 +172,20 @@ test_that("the initial offset of the walls is forgotten at the walls' own pace, 
   expect_lt(difference[96], 0.2 * max(difference))
 })
 
-test_that("the engine reads every field of the table, and refuses a component or an exposure that it does not know", {
+test_that(paste("the engine reads every field of the table, and refuses a component or an exposure",
+                "that it does not know"), {
   drivers <- cbind(Te = c(5, 6), P = 100, V = 3, Wd = 90)
   components <- list(
-    zone_wall("w", 10, zone_layer(0.1, 1, 1e6), outside = "Te", sun = "P", sky = "P", wind_speed = "V",
-              wind_direction = "Wd", wind_film = 0.5),
-    zone_window("w", 2, "Te", sun = "P"), zone_opening("o", 0.1, "Te"), zone_crack("c", 0.001, 1, "Te"),
-    zone_infiltration("i", 0.5, "Te"), zone_heater("h", "P"), zone_supply("s", "V", "Te"), zone_coupling("c", 5, "Te"),
-    zone_gain("g", "P"))
+    zone_wall("w", 10, zone_layer(0.1, 1, 1e6), outside = "Te", sun = "P", sky = "P",
+              wind_speed = "V", wind_direction = "Wd", wind_film = 0.5),
+    zone_window("w", 2, "Te", sun = "P"), zone_opening("o", 0.1, "Te"),
+    zone_crack("c", 0.001, 1, "Te"), zone_infiltration("i", 0.5, "Te"), zone_heater("h", "P"),
+    zone_supply("s", "V", "Te"), zone_coupling("c", 5, "Te"), zone_gain("g", "P"))
   fields <- amiss:::zone_fields
   expect_setequal(vapply(components, `[[`, "", "type"), setdiff(names(fields), c("layer", "zone")))
   run <- function(zone) {
-    amiss:::zone_simulate_(zone, list(), matrix(0, 1, 0), drivers, 900, numeric(), amiss:::zone_control,
-                           list(seed = 0, threads = 1))
+    amiss:::zone_simulate_(zone, list(), matrix(0, 1, 0), drivers, 900, numeric(),
+                           amiss:::zone_control, list(seed = 0, threads = 1))
   }
   for (component in components) {
     one <- amiss:::index_zone(unclass(zone(component, volume = 40)), colnames(drivers))
@@ -200,5 +213,6 @@ test_that("drivers that seem to be no measurements are told of", {
                    paste0("Te is ", value, " in row 5"), class = "amiss_warning_input")
   }
   # A record has checked its own.
-  expect_no_warning(simulate_runs(room, matrix(0, 1, 0), cbind(Te = replace(te, 5, 700)), step_h = 0.25))
+  expect_no_warning(simulate_runs(room, matrix(0, 1, 0), cbind(Te = replace(te, 5, 700)),
+                                  step_h = 0.25))
 })
