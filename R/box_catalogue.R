@@ -23,27 +23,27 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
   change_all <- function(model, ...)
     Reduce(function(m, name) change_component(m, name, ...), outer, model)
   all <- list(
-    mechanism(
-      "wind-driven infiltration", boundary = c("Ws", "Wd", "Te"),
-      edit = function(model) {
-        leak <- free("leak_area", uniform(1, 2000), "mm2", "area of each leak") * 1e-6
-        model <- add_component(model, zone_opening("leak_low", leak, outside = "Te", height = 0.2,
-                                                   azimuth = azimuth, wind_speed = "Ws",
-                                                   wind_direction = "Wd"))
-        add_component(model, zone_opening("leak_high", leak, outside = "Te", height = 0.8,
-                                          azimuth = azimuth + 180, wind_speed = "Ws",
-                                          wind_direction = "Wd"))
-      },
-      sentence = "Wind and buoyancy drive outdoor air through leaks that the model does not have."),
+    mechanism("wind-driven infiltration", boundary = c("Ws", "Wd", "Te"),
+              edit = function(model) {
+                leak <- free("leak_area", uniform(1, 2000), "mm2", "area of each leak") * 1e-6
+                model <- add_component(
+                  model, zone_opening("leak_low", leak, outside = "Te", height = 0.2,
+                                      azimuth = azimuth, wind_speed = "Ws", wind_direction = "Wd"))
+                add_component(model, zone_opening("leak_high", leak, outside = "Te", height = 0.8,
+                                                  azimuth = azimuth + 180, wind_speed = "Ws",
+                                                  wind_direction = "Wd"))
+              },
+              sentence = paste("Wind and buoyancy drive outdoor air through leaks that the model",
+                               "does not have.")),
     mechanism("window transmission", boundary = "Gv",
               edit = function(model) change_component(model, "window", solar_factor = free(
                 "transmission", uniform(0.1, 0.9), "", "solar factor of the window")),
               sentence = "The window passes another share of the sun than assumed."),
-    mechanism(
-      "heater lag", boundary = "RHP",
-      edit = function(model) change_component(model, "heater", capacity = free(
-        "heater_capacity", uniform(0, 4e4), "J/K", "heat capacity of the heater")),
-      sentence = "The heater stores heat and gives it off with a delay that the model leaves out."),
+    mechanism("heater lag", boundary = "RHP",
+              edit = function(model) change_component(model, "heater", capacity = free(
+                "heater_capacity", uniform(0, 4e4), "J/K", "heat capacity of the heater")),
+              sentence = paste("The heater stores heat and gives it off with a delay that the",
+                               "model leaves out.")),
     mechanism("missing thermal mass", boundary = c("RHP", "Te"),
               edit = function(model) add_component(model, zone_wall("mass", area = free(
                 "mass_area", uniform(0.01, 3), "m2", "surface of additional mass"),

@@ -216,8 +216,8 @@ fit_trust <- function(fit) {
            if (fit$posterior$trusted && fit$standard_error > rules$evidence_error)
              paste("not trusted: corrected by the runs, the evidence has a standard error of more",
                    "than one nat"))
-  list(trusted = is.null(why), verdict = if (is.null(why)) fit$posterior$verdict
-                                         else paste(why, collapse = "; "))
+  list(trusted = is.null(why),
+       verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }
 
 #' @export

@@ -102,9 +102,10 @@ check_field_counts <- function(path, call) {
   counts <- utils::count.fields(path, ",", quote = "\"", comment.char = "")
   bad <- which(counts != counts[1])[1]
   if (is.na(bad)) return(invisible())
-  abort_input(c(
-    "The file {.file {path}} has {counts[bad]} field{?s} in line {bad} and {counts[1]} in line 1.",
-    i = "Give each row as many fields, and each column a name or none of them."), call = call)
+  abort_input(c(paste("The file {.file {path}} has {counts[bad]} field{?s} in line {bad} and",
+                      "{counts[1]} in line 1."),
+                i = "Give each row as many fields, and each column a name or none of them."),
+              call = call)
 }
 
 check_calibro_steps <- function(tables, files, call = rlang::caller_env()) {

@@ -79,8 +79,8 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
     fit$weights[region_distance(fit$emulator$processes$region, posterior_unit(fit)) > 0.9])
   passed <- ratio <= rules$error_ratio && border <= rules$border
   told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by,
-                  format(signif(ratio, 2)), if (failed) sprintf(" (%d more failed)", failed)
-                                            else "")
+                  format(signif(ratio, 2)),
+                  if (failed) sprintf(" (%d more failed)", failed) else "")
   verdict <- if (ratio > rules$error_ratio)
                paste0(told, ", more than a third: it is not good enough")
              else if (!passed) sprintf(paste("%s, but the posterior reaches the end of the region",

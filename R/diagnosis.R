@@ -269,10 +269,10 @@ trust_sentence <- function(upgrade, best) {
   }
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
   why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
-  sprintf("The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who),
-          why, if (best$lower95 >= upgrade$control$decisive)
-                 "Even the lower end of the interval is decisive."
-               else "The decision may hang on it: more runs or chains would settle it.")
+  sprintf(
+    "The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
+    if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
+    else "The decision may hang on it: more runs or chains would settle it.")
 }
 
 # How large the matter is, beside the noise and on data held out.
@@ -337,8 +337,8 @@ rival_sentence <- function(upgrade, model) {
   kept <- sort(kept[kept >= 0.01], decreasing = TRUE)
   if (!length(kept)) return(paste("Neither another mechanism tried at this step nor \"no change\"",
                                   "keeps one per cent of the probability."))
-  sprintf("At this step %s too: %s.", if (length(kept) > 1) "others are possible"
-                                      else "another is possible",
+  sprintf("At this step %s too: %s.",
+          if (length(kept) > 1) "others are possible" else "another is possible",
           listed(paste0(names(kept), " (", percent(unname(kept)), ")")))
 }
 
@@ -439,12 +439,12 @@ remaining_sentences <- function(upgrade) {
   last <- remaining_error(model, upgrade$measurements)
   c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers))
     else "The remaining error answers to no boundary condition.",
-    if (last$large)
-      sprintf("In calibration the remaining error is %s times the stated noise%s",
-              short(last$ratio), if (is.null(last$pattern)) paste0(
-                ": either the stated noise is too small, or something else is missing",
-                if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
-                                 else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
+    if (last$large) sprintf(
+      "In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
+      if (is.null(last$pattern))
+        paste0(": either the stated noise is too small, or something else is missing",
+               if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
+      else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
     reach_sentence(model$fit) %||% if (last$large)
                                      paste("The parameters may have taken the place of what is",
                                            "missing: do not read their values as physical."),

@@ -262,8 +262,8 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
       sprintf("its 95 %% intervals hold only %.0f %% of the coefficients left out",
               100 * diagnostics$coverage95),
     uncovered_statement(ensemble))
-  list(trusted = is.null(why), verdict = if (is.null(why)) "can be trusted"
-                                         else paste(why, collapse = "; "))
+  list(trusted = is.null(why),
+       verdict = if (is.null(why)) "can be trusted" else paste(why, collapse = "; "))
 }
 
 #' @export

@@ -355,8 +355,9 @@ check_enough_runs <- function(runs, parameters, given = runs, call = rlang::call
 }
 
 unit_to_values <- function(unit, parameters) {
-  values <- vapply(seq_along(
-    parameters), function(p) prior_quantile(parameters[[p]]$prior, unit[, p]), numeric(nrow(unit)))
+  values <- vapply(seq_along(parameters),
+                   function(p) prior_quantile(parameters[[p]]$prior, unit[, p]),
+                   numeric(nrow(unit)))
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
 }
 

@@ -20,25 +20,25 @@ figure_attribution <- function(attributions) {
   table$y <- as.integer(table$boundary) +
     if (length(attributions) > 1) ifelse(table$stage == "before", 0.18, -0.18) else 0
   axis <- signed_log_axis(table$log10_bf_dropped)
-  figure <-
-    ggplot2::ggplot(table, ggplot2::aes(.data$log10_bf_dropped, .data$y, colour = .data$stage)) +
-      ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
-      ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$log10_bf_dropped),
-                              linewidth = 1.1) +
-      ggplot2::geom_point(ggplot2::aes(shape = .data$significant), size = 4, fill = "white",
-                          stroke = 1.3) +
-      ggplot2::geom_text(ggplot2::aes(label = .data$label), hjust = 0, size = 4.6,
-                         colour = "grey20", show.legend = FALSE) +
-      ggplot2::scale_shape_manual(values = c("TRUE" = 19, "FALSE" = 21),
-                                  labels = c("TRUE" = "significant", "FALSE" = "may be chance"),
-                                  limits = c("TRUE", "FALSE")) +
-      ggplot2::scale_y_continuous(NULL, breaks = seq_along(levels(table$boundary)),
-                                  labels = levels(table$boundary)) + axis + stage_scales() +
-      figure_titles(attribution_title(attributions),
-                    paste("Each boundary condition, present and past: how much worse the remaining",
-                          "error is explained without it. Per cent: its part of that error."),
-                    x = "evidence lost when it is ignored (log10 Bayes factor)") +
-      figure_theme()
+  figure <- ggplot2::ggplot(table,
+                            ggplot2::aes(.data$log10_bf_dropped, .data$y, colour = .data$stage)) +
+    ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$log10_bf_dropped),
+                            linewidth = 1.1) +
+    ggplot2::geom_point(ggplot2::aes(shape = .data$significant), size = 4, fill = "white",
+                        stroke = 1.3) +
+    ggplot2::geom_text(ggplot2::aes(label = .data$label), hjust = 0, size = 4.6, colour = "grey20",
+                       show.legend = FALSE) +
+    ggplot2::scale_shape_manual(values = c("TRUE" = 19, "FALSE" = 21),
+                                labels = c("TRUE" = "significant", "FALSE" = "may be chance"),
+                                limits = c("TRUE", "FALSE")) +
+    ggplot2::scale_y_continuous(NULL, breaks = seq_along(levels(table$boundary)),
+                                labels = levels(table$boundary)) + axis + stage_scales() +
+    figure_titles(attribution_title(attributions),
+                  paste("Each boundary condition, present and past: how much worse the remaining",
+                        "error is explained without it. Per cent: its part of that error."),
+                  x = "evidence lost when it is ignored (log10 Bayes factor)") +
+    figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), table$label)
   with_height(figure, 2.4 + 0.48 * nlevels(table$boundary))
 }

@@ -13,8 +13,8 @@ check_words <- function(fits) {
   ratio <- vapply(checks, `[[`, 0, "ratio")
   if (!length(ratio)) return("The emulator was not checked by runs")
   sprintf("Where the posterior lies, the emulator's error is %s of the noise: %s",
-          listed(unique(short(ratio))), if (all(ratio <= rules$error_ratio)) "good enough"
-                                        else "too much, more runs are needed")
+          listed(unique(short(ratio))),
+          if (all(ratio <= rules$error_ratio)) "good enough" else "too much, more runs are needed")
 }
 
 figure_emulator <- function(fits) {

@@ -150,9 +150,9 @@ figure_dropped <- function(comparison) {
 # Measured and simulated rows of one use, a panel for each model.
 figure_models_in_time <- function(comparison, use) {
   m <- comparison$measurements
-  table <- mark_models(bind_models(
-    comparison$models, function(model) prediction_rows(model)[model$prediction$use == use, ]),
-                       comparison)
+  table <- mark_models(
+    bind_models(comparison$models,
+                function(model) prediction_rows(model)[model$prediction$use == use, ]), comparison)
   score <- if (use == "calibrate") "rmse_calibration" else "rmse_validation"
   criteria <- comparison$tables$criteria
   labels <- stats::setNames(paste0(criteria$model, "\n",
@@ -174,9 +174,10 @@ figure_models_in_time <- function(comparison, use) {
     figure_titles(title,
                   paste("Black: measured. Coloured: simulated, with the band that should hold 95 %",
                         "of the measurements. At the right: root mean squared error."),
-                  x = time_label(table$time), y = axis_label(
-                    m$target, level_unit(m$unit, table$observed))) + time_axis(table$time) +
-    figure_theme() + ggplot2::theme(strip.text.y = ggplot2::element_text(angle = 0))
+                  x = time_label(table$time),
+                  y = axis_label(m$target, level_unit(m$unit, table$observed))) +
+    time_axis(table$time) + figure_theme() +
+    ggplot2::theme(strip.text.y = ggplot2::element_text(angle = 0))
   with_height(figure, 2 + 1.15 * length(comparison$models))
 }
 

@@ -34,12 +34,13 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
     leading_layer(leading, table, panels) +
     ggplot2::facet_grid(panel ~ ., scales = "free_y", switch = "y",
                         labeller = wrap_turned(length(panels))) + stage_scales() +
-    figure_titles(discrepancy_title(table), paste0(
-      "Grey: measured - simulated. Coloured: the discrepancy, which answers to boundary ",
-      "conditions, with 95 % band.", if (!is.null(leading))
-                                       paste0(" Below: ", leading$name, ", which leads.")),
-                  x = time_label(table$time)) + time_axis(table$time) + figure_theme() +
-    ggplot2::theme(legend.position = "none")
+    figure_titles(discrepancy_title(table),
+                  paste0("Grey: measured - simulated. Coloured: the discrepancy, which answers to ",
+                         "boundary conditions, with 95 % band.",
+                         if (!is.null(leading))
+                           paste0(" Below: ", leading$name, ", which leads.")),
+                  x = time_label(table$time)) +
+    time_axis(table$time) + figure_theme() + ggplot2::theme(legend.position = "none")
   with_height(figure, 1.8 + 1.9 * length(panels))
 }
 
@@ -74,17 +75,18 @@ figure_response <- function(upgrade, classes = 10) {
   table$class <- cut(table$value, classes)
   binned <- stats::aggregate(cbind(residual, value) ~ class + stage, table, mean)
   binned <- binned[stats::aggregate(residual ~ class + stage, table, length)$residual >= 5, ]
-  figure <-
-    ggplot2::ggplot(binned, ggplot2::aes(.data$value, .data$residual, colour = .data$stage)) +
-      ggplot2::geom_point(data = table, alpha = 0.18, size = 1.4, shape = 16) +
-      ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
-      ggplot2::geom_line(linewidth = 1.2) +
-      ggplot2::geom_point(size = 3.6) +
-      stage_scales() +
-      figure_titles(response_title(binned, leading$name, m$noise_sd), paste0(
-        "Small points: every time step. Large points: means over classes of ", leading$name, "."),
-                    x = leading$name, y = axis_label("measured - simulated", m$unit)) +
-      figure_theme()
+  figure <- ggplot2::ggplot(binned,
+                            ggplot2::aes(.data$value, .data$residual, colour = .data$stage)) +
+    ggplot2::geom_point(data = table, alpha = 0.18, size = 1.4, shape = 16) +
+    ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
+    ggplot2::geom_line(linewidth = 1.2) +
+    ggplot2::geom_point(size = 3.6) +
+    stage_scales() +
+    figure_titles(response_title(binned, leading$name, m$noise_sd),
+                  paste0("Small points: every time step. Large points: means over classes ",
+                         "of ", leading$name, "."),
+                  x = leading$name, y = axis_label("measured - simulated", m$unit)) +
+    figure_theme()
   with_height(figure, 5)
 }
 

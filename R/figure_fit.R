@@ -71,8 +71,9 @@ figure_gain <- function(upgrade) {
       colour = ifelse(.data$score == "coverage95" & .data$stage != "before", "white", "black")),
                        position = dodge, size = 3.9) + ggplot2::scale_colour_identity() +
     ggplot2::geom_hline(ggplot2::aes(yintercept = .data$value), target, linetype = "dashed",
-                        colour = "grey20") + ggplot2::facet_wrap(ggplot2::vars(
-                          .data$panel), scales = "free_y", ncol = 3, labeller = wrap_strips(3)) +
+                        colour = "grey20") +
+    ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 3,
+                        labeller = wrap_strips(3)) +
     ggplot2::scale_x_discrete(expand = ggplot2::expansion(add = 0.5)) +
     ggplot2::scale_y_continuous(expand = ggplot2::expansion(mult = c(0, 0.14))) +
     ggplot2::scale_fill_manual(values = stage_colours) +
@@ -132,15 +133,15 @@ figure_measurements <- function(measurements) {
   count <- function(use) sum(m$use == use & !is.na(m$y))
   title <- sprintf("%s: %d steps of %s h to calibrate, %d held out", m$name, count("calibrate"),
                    format(m$step_h), count("validate"))
-  figure <-
-    ggplot2::ggplot(table[!is.na(table$value), ],
-                    ggplot2::aes(.data$time, .data$value, colour = .data$use, group = .data$part)) +
-      ggplot2::geom_line(linewidth = 0.6) +
-      ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y",
-                          labeller = wrap_strips()) +
-      ggplot2::scale_colour_manual(
-        values = stats::setNames(c("#999999", "#0072B2", "#009E73", "#CCCCCC"), uses)) +
-      figure_titles(title, "The target above, the boundary conditions below it.",
-                    x = time_label(table$time)) + time_axis(table$time) + figure_theme()
+  figure <- ggplot2::ggplot(table[!is.na(table$value), ],
+                            ggplot2::aes(.data$time, .data$value, colour = .data$use,
+                                         group = .data$part)) +
+    ggplot2::geom_line(linewidth = 0.6) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y",
+                        labeller = wrap_strips()) +
+    ggplot2::scale_colour_manual(
+      values = stats::setNames(c("#999999", "#0072B2", "#009E73", "#CCCCCC"), uses)) +
+    figure_titles(title, "The target above, the boundary conditions below it.",
+                  x = time_label(table$time)) + time_axis(table$time) + figure_theme()
   with_height(figure, 1.6 + 1.15 * length(panels))
 }

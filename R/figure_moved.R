@@ -89,17 +89,19 @@ figure_moved <- function(upgrade) {
   figure <- ggplot2::ggplot(long[!is.na(long$value), ],
                             ggplot2::aes(.data$value, .data$label, shape = .data$state)) +
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
-    ggplot2::geom_linerange(
-      ggplot2::aes(xmin = 0, xmax = .data$value), colour = stage_colours[["after"]],
-      linewidth = 1.1, show.legend = FALSE) + ggplot2::geom_point(
-        colour = stage_colours[["after"]], fill = "white", size = 3.6, stroke = 1.2) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$value),
+                            colour = stage_colours[["after"]], linewidth = 1.1,
+                            show.legend = FALSE) +
+    ggplot2::geom_point(colour = stage_colours[["after"]], fill = "white", size = 3.6,
+                        stroke = 1.2) +
     ggplot2::scale_shape_manual(values = c(19, 21), drop = FALSE) +
     ggplot2::scale_x_continuous(n.breaks = 4, guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.28)) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free_x",
-                        labeller = wrap_strips(2.6)) + figure_titles(title, paste(
-                          "A parameter that moved far had made up for what was missing. One that",
-                          "is strongly correlated with a new parameter trades off against it: data",
-                          "that tell the two apart come next.")) + figure_theme()
+                        labeller = wrap_strips(2.6)) +
+    figure_titles(title, paste("A parameter that moved far had made up for what was missing. One",
+                               "that is strongly correlated with a new parameter trades off",
+                               "against it: data that tell the two apart come next.")) +
+    figure_theme()
   with_height(figure, 2.4 + 0.5 * nrow(table))
 }

@@ -204,8 +204,8 @@ with_aliases <- function(variables, nodes, version) {
 
 # Data frame of unit, min and max of declared types, by their names.
 declared_types <- function(root, version) {
-  nodes <- xml2::xml_find_all(root, if (version == 2) "./TypeDefinitions/SimpleType[*]"
-                                    else "./TypeDefinitions/*")
+  nodes <- xml2::xml_find_all(
+    root, if (version == 2) "./TypeDefinitions/SimpleType[*]" else "./TypeDefinitions/*")
   details <- if (version == 2) xml2::xml_find_first(nodes, "./*") else nodes
   types <- data.frame(unit = xml2::xml_attr(details, "unit"), min = xml2::xml_attr(details, "min"),
                       max = xml2::xml_attr(details, "max"))

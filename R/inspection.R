@@ -42,8 +42,8 @@ comparison_inspections <- function(comparison) {
   attribution <- comparison$tables$attribution
   answers <- attribution$boundary[attribution$model == best$name & attribution$significant]
   c(read_findings(unname(comparison$models), comparison$measurements),
-    unlist(
-      lapply(comparison$models, function(m) trust_inspections(m$fit, m$name)), use.names = FALSE),
+    unlist(lapply(comparison$models, function(m) trust_inspections(m$fit, m$name)),
+           use.names = FALSE),
     separation_inspection(comparison),
     held_out_inspection(best, comparison$measurements),
     edge_inspections(best$fit),

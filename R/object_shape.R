@@ -9,8 +9,8 @@
 # The name `*` stands for the object itself.
 
 object_shapes <- list(
-  amiss_prior = c(
-    family = "text[1]", parameters = "numbers", lower = "number[1]", upper = "number[1]"),
+  amiss_prior = c(family = "text[1]",
+                  parameters = "numbers", lower = "number[1]", upper = "number[1]"),
   amiss_free = c(name = "text[1]", prior = "amiss_prior", unit = "text[1]", label = "text[1]"),
   amiss_component = c(type = "text[1]", name = "text[1]"),
   amiss_zone = c(components = "each:amiss_component"),

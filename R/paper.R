@@ -98,8 +98,8 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
 paper_trust <- function(outside, inside) {
   why <- c(if (!outside$trusted) paste("discrepancy:", outside$verdict),
            if (!inside$trusted) paste("parameters:", inside$verdict))
-  list(trusted = is.null(why), verdict = if (is.null(why)) inside$verdict
-                                         else paste(why, collapse = "; "))
+  list(trusted = is.null(why),
+       verdict = if (is.null(why)) inside$verdict else paste(why, collapse = "; "))
 }
 
 fill_paper_control <- function(control, n, what = "control", call = rlang::caller_env()) {

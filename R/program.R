@@ -288,8 +288,8 @@ simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, st
   check_run_dots(...)
   check_row_times(time, nrow(drivers))
   plan <- plan_runs(simulator, values, drivers, step_h, time)
-  if (!dir.exists(simulator$cache) && !dir.create(simulator$cache, recursive = TRUE,
-                                                  showWarnings = FALSE)) {
+  if (!dir.exists(simulator$cache) &&
+      !dir.create(simulator$cache, recursive = TRUE, showWarnings = FALSE)) {
     abort_input("The folder {.file {simulator$cache}} for {.arg cache} cannot be made.")
   }
   remove_abandoned(simulator$cache)

@@ -32,10 +32,10 @@ summary.amiss_comparison <- function(object, ...) {
   structure(list(title = object$title %||% object$study %||% object$measurements$name,
                  headline = comparison_headline(object),
                  evidence = c(evidence_sentences(object), probability_sentences(object)),
-                 remains = remains_sentences(object),
-                 practice = practice_sentences(object), doubts = doubt_sentences(
-                   object) %||% no_doubt, inspect = comparison_inspections(object),
-                 models = models_words(object), attribution = attribution_table_words(object),
+                 remains = remains_sentences(object), practice = practice_sentences(object),
+                 doubts = doubt_sentences(object) %||% no_doubt,
+                 inspect = comparison_inspections(object), models = models_words(object),
+                 attribution = attribution_table_words(object),
                  parameters = compared_parameters_words(object), criteria = criteria_words(object),
                  errors = errors_words(object), heat_loss = heat_loss_words(object),
                  method = comparison_method_table(object), seed = object$seed),
@@ -111,8 +111,9 @@ models_words <- function(comparison) {
   evidence <- comparison$tables$evidence
   factor <- sprintf("%s [%s, %s] against %s", signed(evidence$log10_bf),
                     signed(evidence$bf_lower95), signed(evidence$bf_upper95), evidence$against)
-  data.frame(model = evidence$model, "log10 L [95 %]" = sprintf(
-    "%.1f [%.1f, %.1f]", evidence$log10_evidence, evidence$lower95, evidence$upper95),
+  data.frame(model = evidence$model,
+             "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence,
+                                        evidence$lower95, evidence$upper95),
              estimate = ifelse(evidence$trusted, "sound", "rough"),
              "log10 Bayes factor" = ifelse(is.na(evidence$log10_bf), "", factor),
              evidence = ifelse(is.na(evidence$word), "", evidence$word),
@@ -231,8 +232,9 @@ result_list.amiss_comparison <- function(x) {
          verdict = fit$trust$verdict, rank = row$rank,
          probability = row$probability, log10_bf = row$log10_bf,
          log10_bf_interval = c(row$bf_lower95, row$bf_upper95), against = row$against,
-         word = row$word, log10_bf_first = row$log10_bf_first, criteria = rows_of(
-           x$tables$criteria)[[1]], coverage95_validation = model$scores$validate[["coverage95"]],
+         word = row$word, log10_bf_first = row$log10_bf_first,
+         criteria = rows_of(x$tables$criteria)[[1]],
+         coverage95_validation = model$scores$validate[["coverage95"]],
          parameters = rows_of(x$tables$parameters), attribution = rows_of(x$tables$attribution),
          heat_loss = if (length(loss))
                        list(mean = mean(loss),

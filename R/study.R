@@ -214,14 +214,15 @@ study_measurements <- function(study, files) {
     if (!is.null(study[[field]]))
       structure(list(text = study[[field]]), class = "amiss_row_condition")
   }
-  measurements(data, time = study$time, target = study$target, boundary = as.character(
-    unlist(study$boundary)), noise_sd = study$noise_sd, average = study$average_h,
-               calibrate = rows("calibrate"), validate = rows("validate"),
-               warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
-               time_format = study$time_format, time_zone = study$time_zone,
-               fill_gaps = study$fill_gaps_h %||% 0,
-               missing = if (identical(study$missing, "none")) NA else unlist(study$missing),
-               range = unlist(study$range))
+  measurements(
+    data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
+    noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
+    validate = rows("validate"),
+    warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
+    time_format = study$time_format, time_zone = study$time_zone,
+    fill_gaps = study$fill_gaps_h %||% 0,
+    missing = if (identical(study$missing, "none")) NA else unlist(study$missing),
+    range = unlist(study$range))
 }
 
 # The options that can be checked before anything is computed.
@@ -239,13 +240,14 @@ check_study_fields <- function(study, path, of = "", call = rlang::caller_env())
   }
   unknown <- setdiff(names(study), unlist(study_fields))
   if (length(unknown)) {
-    abort_input(c(
-      "The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",
-      i = "Known fields: {.field {unlist(study_fields, use.names = FALSE)}}."), call = call)
+    abort_input(c(paste("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s}",
+                        "{.field {unknown}}."),
+                  i = "Known fields: {.field {unlist(study_fields, use.names = FALSE)}}."),
+                call = call)
   }
   compares <- "models" %in% names(study)
-  foreign <- intersect(names(study), if (compares) study_fields$upgrade
-                                     else study_fields$comparison)
+  foreign <- intersect(names(study),
+                       if (compares) study_fields$upgrade else study_fields$comparison)
   if (length(foreign)) {
     partner <- if (compares) "catalogue" else "models"
     abort_input(c(paste("The study file {.file {path}} has {cli::qty(foreign)}field{?s}",

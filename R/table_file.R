@@ -15,8 +15,8 @@ read_table_file <- function(path, names, separator = NULL, decimal = NULL,
     abort_input(c("The data file {.file {path}} cannot be read.", x = "{why}"), call = call)
   }
   if (!any(nzchar(trimws(lines)))) refuse("It holds no lines.")
-  header <- find_header(lines, names, if (is.null(separator)) separators
-                                      else known_separator(separator))
+  header <- find_header(lines, names,
+                        if (is.null(separator)) separators else known_separator(separator))
   body <- body_lines(lines, header$line)
   columns <- body_fields(body, header, refuse)
   columns <- without_units(columns, names, path)

@@ -160,9 +160,10 @@ upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
   }
   given <- vapply(simulator, inherits, NA, "amiss_ensemble")
   if (any(given) && !all(given)) {
-    abort_input(c(
-      "Of the records {.val {names[given]}} runs are given, of {.val {names[!given]}} simulators.",
-      i = "Give simulators of all records, or an {.fun ensemble} of each."), call = call)
+    abort_input(c(paste("Of the records {.val {names[given]}} runs are given, of",
+                        "{.val {names[!given]}} simulators."),
+                  i = "Give simulators of all records, or an {.fun ensemble} of each."),
+                call = call)
   }
   check_one_prior(lapply(simulator, free_parameters), call)
   list(simulator = simulator, measurements = new_records(measurements[names]), record = names)

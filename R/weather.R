@@ -67,8 +67,9 @@ synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude =
       stats::filter(c(rep(cover[1], round(24 / step_h)), cover),
                     rep(step_h / 24, round(24 / step_h)), sides = 1)
     clear <- as.numeric(utils::tail(clear, n))
-    outdoor <- temperature + daily_range / 2 * (0.4 + 0.8 * clear) * cos(
-      2 * pi * (middle - 15) / 24) + 2 * red_noise(n, 48, step_h) + 0.35 * red_noise(n, 1.5, step_h)
+    outdoor <- temperature +
+      daily_range / 2 * (0.4 + 0.8 * clear) * cos(2 * pi * (middle - 15) / 24) +
+      2 * red_noise(n, 48, step_h) + 0.35 * red_noise(n, 1.5, step_h)
     breeze <- 1 + 0.35 * cos(2 * pi * (middle - 16) / 24)
     speed <- wind * breeze * exp(
       0.45 * red_noise(n, 8, step_h) + 0.25 * red_noise(n, 0.5, step_h) - 0.13)
