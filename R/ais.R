@@ -1,45 +1,51 @@
 #' Annealed importance sampling of any posterior
 #'
-#' The sampler behind [calibrate()], for a likelihood written in R: draws from the posterior and its normalising
-#' constant (the evidence), with an interval, a second estimator and a verdict.
+#' The sampler behind [calibrate()], for a likelihood written in R: draws from the posterior and its
+#' normalising constant (the evidence), with an interval, a second estimator and a verdict.
 #'
-#' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for each, how the chains
-#' move and how often. Then all is frozen and fresh, independent groups of chains give the estimate: unbiased, with an
-#' interval by bootstrap over the groups. A second estimator (an importance sample from a Student-t mixture fitted to
-#' the draws or, where none comes close, annealing from that mixture) must not lie above the one reported. Groups or
-#' draws are added until the standard error is at most `precision`.
+#' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for
+#' each, how the chains move and how often. Then all is frozen and fresh, independent groups of
+#' chains give the estimate: unbiased, with an interval by bootstrap over the groups. A second
+#' estimator (an importance sample from a Student-t mixture fitted to the draws or, where none comes
+#' close, annealing from that mixture) must not lie above the one reported. Groups or draws are
+#' added until the standard error is at most `precision`.
 #'
-#' *Modes.* Chains lose a mode that is much narrower than another, because it has little mass while they are warm. So
-#' climbs follow from points of the prior that do not lead to the draws. If they reach a peak without draws that holds
-#' two hundredths of the posterior or more, an importance sample of it joins the draws, and the verdict says so. A mode
-#' to which less than a thousandth of the prior leads is not seen (`bench/trusted.R`).
+#' *Modes.* Chains lose a mode that is much narrower than another, because it has little mass while
+#' they are warm. So climbs follow from points of the prior that do not lead to the draws. If they
+#' reach a peak without draws that holds two hundredths of the posterior or more, an importance
+#' sample of it joins the draws, and the verdict says so. A mode to which less than a thousandth of
+#' the prior leads is not seen (`bench/trusted.R`).
 #'
-#' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`) that returns the
-#'   log-likelihood of each point; `-Inf` where it is zero.
+#' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`)
+#'   that returns the log-likelihood of each point; `-Inf` where it is zero.
 #' @param priors Named list of [prior]s.
 #' @param seed Seed; if `NULL`, R's generator gives one.
-#' @param gradient Function of the same matrix that returns the gradient of the log-likelihood with respect to the
-#'   parameters, a matrix of the same shape; the chains then make Hamiltonian moves too.
+#' @param gradient Function of the same matrix that returns the gradient of the log-likelihood with
+#'   respect to the parameters, a matrix of the same shape; the chains then make Hamiltonian moves
+#'   too.
 #' @param control List of options:
-#'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at least 32);
-#'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below `precision` (0.1);
-#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in the thinned
-#'     records of [calibrate_paper()] 1; 30);
+#'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at
+#'     least 32);
+#'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below
+#'     `precision` (0.1);
+#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3,
+#'     in the thinned records of [calibrate_paper()] 1; 30);
 #'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
-#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()] along the
-#'     parameters: they follow a curved posterior, at up to twice the cost). [ais()] makes them if it is given one;
+#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()]
+#'     along the parameters: they follow a curved posterior, at up to twice the cost). [ais()] makes
+#'     them if it is given one;
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
-#'   * `importance_draws` (1000; 0 leaves the second estimator and the search for modes out) and `max_components` (3) of
-#'     the mixture.
-#' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`, `standard_error`, `interval` (95
-#'   %), `annealed` and `second` (estimate and standard error of each estimator), `ladder`, `evaluations`, `trusted`,
-#'   `verdict`.
-#' @source Neal (2001), Annealed importance sampling, Statistics and Computing 11, 125-139. Del Moral, Doucet and Jasra
-#'   (2006), Sequential Monte Carlo samplers, Journal of the Royal Statistical Society B 68, 411-436 (the pilot).
-#'   Rodriguez and Laio (2014), Clustering by fast search and find of density peaks, Science 344, 1492-1496 (where
-#'   climbs begin).
-#'   Hesterberg (1995), Weighted average importance sampling and defensive mixture distributions, Technometrics 37,
-#'   185-194. In full: `vignette("algorithm", "amiss")`, *Annealed importance sampling*.
+#'   * `importance_draws` (1000; 0 leaves the second estimator and the search for modes out) and
+#'     `max_components` (3) of the mixture.
+#' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`,
+#'   `standard_error`, `interval` (95 %), `annealed` and `second` (estimate and standard error of
+#'   each estimator), `ladder`, `evaluations`, `trusted`, `verdict`.
+#' @source Neal (2001), Annealed importance sampling, Statistics and Computing 11, 125-139. Del
+#'   Moral, Doucet and Jasra (2006), Sequential Monte Carlo samplers, Journal of the Royal
+#'   Statistical Society B 68, 411-436 (the pilot). Rodriguez and Laio (2014), Clustering by fast
+#'   search and find of density peaks, Science 344, 1492-1496 (where climbs begin). Hesterberg
+#'   (1995), Weighted average importance sampling and defensive mixture distributions, Technometrics
+#'   37, 185-194. In full: `vignette("algorithm", "amiss")`, *Annealed importance sampling*.
 #' @examples
 #' y <- c(1.2, 0.7, 1.9)
 #' ais(function(z) vapply(z[, "mean"], function(m) sum(dnorm(y, m, 1, log = TRUE)), 0),
@@ -47,21 +53,23 @@
 #' @export
 ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = NULL) {
   check_input(checkmate::check_function(log_likelihood), "log_likelihood")
-  check_input(checkmate::check_list(priors, types = "amiss_prior", min.len = 1, names = "unique"), "priors",
-              "For example {.code list(a = uniform(0, 1))}.")
+  check_input(checkmate::check_list(priors, types = "amiss_prior", min.len = 1, names = "unique"),
+              "priors", "For example {.code list(a = uniform(0, 1))}.")
   for (one in priors) check_whole(one, "priors")
   check_input(checkmate::check_function(gradient, null.ok = TRUE), "gradient")
   control <- fill_ais_control(control)
   control$gradient <- !is.null(gradient)
   seed <- pick_seed(seed)
   to_values <- function(unit) {
-    values <- vapply(seq_along(priors), function(p) prior_quantile(priors[[p]], unit[, p]), numeric(nrow(unit)))
+    values <- vapply(seq_along(priors), function(p) prior_quantile(priors[[p]], unit[, p]),
+                     numeric(nrow(unit)))
     matrix(values, nrow(unit), dimnames = list(NULL, names(priors)))
   }
   call <- rlang::current_env()
   attempt <- function(f, name, values) {
     tryCatch(f(values), error = function(e) {
-      abort_input(c("{.arg {name}} stopped with an error.", x = "{conditionMessage(e)}"), call = call)
+      abort_input(c("{.arg {name}} stopped with an error.", x = "{conditionMessage(e)}"),
+                  call = call)
     })
   }
   tally <- list2env(list(points = 0, undefined = 0))
@@ -74,14 +82,17 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
     values <- to_values(unit)
     slope <- attempt(gradient, "gradient", values)
     if (!is.numeric(slope) || !identical(dim(slope), dim(values))) {
-      abort_input(c("{.arg gradient} must return a matrix like the one it is given, {nrow(values)} x {ncol(values)}.",
-                    x = "It returned {.cls {class(slope)}} of length {length(slope)}."), call = call)
+      abort_input(c(paste("{.arg gradient} must return a matrix like the one it is given,",
+                          "{nrow(values)} x {ncol(values)}."),
+                    x = "It returned {.cls {class(slope)}} of length {length(slope)}."),
+                  call = call)
     }
-    density <- vapply(seq_along(priors), function(p) prior_density(priors[[p]], values[, p]), numeric(nrow(unit)))
+    density <- vapply(seq_along(priors), function(p) prior_density(priors[[p]], values[, p]),
+                      numeric(nrow(unit)))
     unname(slope / matrix(density, nrow(unit)))
   }
-  result <- call_engine(ais_(at_unit, if (!is.null(gradient)) slope_at_unit, length(priors), control,
-                             engine_context(seed, 1)))
+  result <- call_engine(ais_(at_unit, if (!is.null(gradient)) slope_at_unit, length(priors),
+                             control, engine_context(seed, 1)))
   tell_undefined(tally)
   if (control$importance_draws != 0) {
     result <- with_lost_modes(result, function(x) {
@@ -94,64 +105,71 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
   structure(c(list(format_version = format_version, seed = seed), result), class = "amiss_ais")
 }
 
-# Log-likelihoods as numbers. Where there is none (NaN), the point counts as impossible and is told of; where that is a
-# good part of the priors, the result would be of another model.
+# Log-likelihoods as numbers. Where there is none (NaN), the point counts as impossible and is told
+# of; where that is a good part of the priors, the result would be of another model.
 usable_likelihood <- function(x, values, tally, call) {
   if (!is.numeric(x) && !is.logical(x)) {
-    abort_input("{.arg log_likelihood} must return numbers; it returned {.cls {class(x)}}.", call = call)
+    abort_input("{.arg log_likelihood} must return numbers; it returned {.cls {class(x)}}.",
+                call = call)
   }
   if (length(x) != nrow(values)) {
-    abort_input(
-      c("{.arg log_likelihood} returned another number of values than it got points: {length(x)} for {nrow(values)}.",
+    abort_input(c(paste("{.arg log_likelihood} returned another number of values than it got",
+                        "points: {length(x)} for {nrow(values)}."),
                   i = "It gets a matrix, one point a row."), call = call)
   }
   at <- function(i) point_words(values[i, , drop = FALSE])
   endless <- which(x == Inf)
-  if (length(endless)) abort_input("{.arg log_likelihood} is Inf at {at(endless[1])}: no likelihood is.", call = call)
+  if (length(endless))
+    abort_input("{.arg log_likelihood} is Inf at {at(endless[1])}: no likelihood is.", call = call)
   undefined <- which(is.na(x))
   tally$points <- tally$points + length(x)
   tally$undefined <- tally$undefined + length(undefined)
   if (length(undefined) && is.null(tally$where)) tally$where <- at(undefined[1])
   if (tally$undefined > largest_failed_share * tally$points) {
-    abort_numerical(c("{.arg log_likelihood} is not a number at {tally$undefined} of the first {tally$points} points.",
+    abort_numerical(c(paste("{.arg log_likelihood} is not a number at {tally$undefined} of the",
+                            "first {tally$points} points."),
                       x = "The first is at {tally$where}.",
-                      i = "Narrow the priors to where it is defined, or return -Inf where the data are impossible."),
-                      call = call)
+                      i = paste("Narrow the priors to where it is defined, or return -Inf where",
+                                "the data are impossible.")), call = call)
   }
   as.numeric(x)
 }
 
 tell_undefined <- function(tally) {
   if (tally$undefined == 0) return(invisible())
-  warn_result(c(
-    "{.arg log_likelihood} was not a number at {tally$undefined} of {tally$points} points, which count as impossible.",
+  warn_result(c(paste("{.arg log_likelihood} was not a number at {tally$undefined} of",
+                      "{tally$points} points, which count as impossible."),
                 x = "The first is at {tally$where}."))
 }
 
-# The numbers of chains and moves stay 0 where they follow from the target, which the engine knows. Limits that were not
-# given follow those that were: more groups than `max_groups` raise it.
+# The numbers of chains and moves stay 0 where they follow from the target, which the engine knows.
+# Limits that were not given follow those that were: more groups than `max_groups` raise it.
 fill_ais_control <- function(control, what = "control", call = rlang::caller_env()) {
   filled <- merge_control(ais_defaults_(), control, what, call = call)
   for (name in c("pilot_chains", "chains", "sweeps")) filled[[name]] <- filled[[name]] %||% 0
   check <- function(name, value, lower, hint = NULL) {
-    check_input(checkmate::check_int(value, lower = lower, upper = 1e7), paste0(what, "$", name), hint, call = call)
+    check_input(checkmate::check_int(value, lower = lower, upper = 1e7), paste0(what, "$", name),
+                hint, call = call)
   }
   follows <- c("pilot_chains", "chains", "sweeps", "importance_draws")
-  least <- c(groups = 2, sweeps = 1, pilot_chains = 8, chains = 4, importance_draws = 50, max_components = 1)
+  least <- c(groups = 2, sweeps = 1, pilot_chains = 8, chains = 4, importance_draws = 50,
+             max_components = 1)
   for (name in names(least)) {
     value <- filled[[name]]
-    if (!(name %in% follows && checkmate::test_number(value) && value == 0)) check(name, value, least[[name]])
+    if (!(name %in% follows && checkmate::test_number(value) && value == 0))
+      check(name, value, least[[name]])
   }
   for (limit in c("groups", "sweeps")) {
     upper <- paste0("max_", limit)
     if (is.null(control[[upper]])) filled[[upper]] <- max(filled[[upper]], filled[[limit]])
   }
   check("max_groups", filled$max_groups, filled$groups, "It may not lie below {.code groups}.")
-  check("max_sweeps", filled$max_sweeps, max(1, filled$sweeps), "It may not lie below {.code sweeps}.")
-  check_input(checkmate::check_number(filled$precision, lower = 1e-6, finite = TRUE), paste0(what, "$precision"),
-              "It is a standard error in nats.", call = call)
-  check_input(checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999), paste0(what, "$ess_drop"),
-              call = call)
+  check("max_sweeps", filled$max_sweeps, max(1, filled$sweeps),
+        "It may not lie below {.code sweeps}.")
+  check_input(checkmate::check_number(filled$precision, lower = 1e-6, finite = TRUE),
+              paste0(what, "$precision"), "It is a standard error in nats.", call = call)
+  check_input(checkmate::check_number(filled$ess_drop, lower = 0.01, upper = 0.999),
+              paste0(what, "$ess_drop"), call = call)
   for (flag in c("gradient", "resample")) {
     check_input(checkmate::check_flag(filled[[flag]]), paste0(what, "$", flag), call = call)
   }
@@ -161,8 +179,9 @@ fill_ais_control <- function(control, what = "control", call = rlang::caller_env
 
 #' @export
 print.amiss_ais <- function(x, ...) on_stdout(x, {
-  cli::cli_text(paste("{.strong Posterior} of {ncol(x$draws)} parameter{?s}: log evidence {round(x$log_evidence, 2)}",
-                      "[{round(x$interval[1], 2)}, {round(x$interval[2], 2)}] ({x$estimator})"))
+  cli::cli_text(paste("{.strong Posterior} of {ncol(x$draws)} parameter{?s}: log evidence",
+                      "{round(x$log_evidence, 2)} [{round(x$interval[1], 2)},",
+                      "{round(x$interval[2], 2)}] ({x$estimator})"))
   cli::cli_bullets(c("*" = "{x$evaluations} likelihood values, {round(x$ess)} effective draws",
                      "*" = as_said(x$verdict), ">" = "next: {.code $draws} with {.code $weights}"))
 })

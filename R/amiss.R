@@ -1,23 +1,26 @@
 #' Calibrate with runs made elsewhere, in one call
 #'
-#' What was measured, the values that a simulator was run with and its runs: [measurements()], [ensemble()],
-#' [train_emulator()] and [calibrate()] one after the other, each with its defaults. [report()] writes down what was
-#' found.
+#' What was measured, the values that a simulator was run with and its runs: [measurements()],
+#' [ensemble()], [train_emulator()] and [calibrate()] one after the other, each with its defaults.
+#' [report()] writes down what was found.
 #'
-#' @param data The [measurements()], or a data frame of one regular record, all of which calibrates: its first column is
-#'   the time, its second the measured target, and the others are boundary conditions (as [read_calibro()] gives them).
-#' @param design,runs Values of the parameters, one run a row, and the runs, one a column: `design` and `outputs` of
-#'   [ensemble()].
-#' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not given, each gets a
-#'   uniform prior over the range of its column.
-#' @param noise_sd Of a data frame: standard deviation of the target's measurement error. If not given, it is taken from
-#'   second differences of the record (Gasser, Sroka and Jennen-Steinmetz 1986), which a smooth course does not enter;
-#'   that is a scale, which the calibration hardly believes (`confidence` of [calibrate()]).
-#' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and [calibrate()] take them.
+#' @param data The [measurements()], or a data frame of one regular record, all of which calibrates:
+#'   its first column is the time, its second the measured target, and the others are boundary
+#'   conditions (as [read_calibro()] gives them).
+#' @param design,runs Values of the parameters, one run a row, and the runs, one a column: `design`
+#'   and `outputs` of [ensemble()].
+#' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not
+#'   given, each gets a uniform prior over the range of its column.
+#' @param noise_sd Of a data frame: standard deviation of the target's measurement error. If not
+#'   given, it is taken from second differences of the record (Gasser, Sroka and Jennen-Steinmetz
+#'   1986), which a smooth course does not enter; that is a scale, which the calibration hardly
+#'   believes (`confidence` of [calibrate()]).
+#' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and
+#'   [calibrate()] take them.
 #' @inheritParams calibrate
 #' @return A calibration, as of [calibrate()].
-#' @source Gasser, Sroka and Jennen-Steinmetz (1986), Residual variance and residual pattern in nonlinear regression,
-#'   Biometrika 73, 625-633.
+#' @source Gasser, Sroka and Jennen-Steinmetz (1986), Residual variance and residual pattern in
+#'   nonlinear regression, Biometrika 73, 625-633.
 #' @examples
 #' record <- data.frame(hour = 1:48, Ti = 0, Te = 5 + 3 * sin(1:48 / 4))
 #' record$Ti <- 20 + 0.4 * record$Te + 0.1 * sin(61 * (1:48)^2)
@@ -26,10 +29,12 @@
 #'              control = list(calibration = list(ais = list(pilot_chains = 48, groups = 4))))
 #' tidy(fit)
 #' @export
-amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, control = NULL, seed = NULL, threads = 1) {
+amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, control = NULL,
+                  seed = NULL, threads = 1) {
   check_present(data, design, runs)
   m <- if (inherits(data, "amiss_measurements")) {
-    if (!is.null(noise_sd)) abort_input("{.arg noise_sd} is part of the {.cls amiss_measurements} given.")
+    if (!is.null(noise_sd))
+      abort_input("{.arg noise_sd} is part of the {.cls amiss_measurements} given.")
     data
   } else {
     record_measurements(data, noise_sd)
@@ -42,18 +47,22 @@ amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, contro
 
 record_measurements <- function(data, noise_sd, call = rlang::caller_env()) {
   check_input(checkmate::check_data_frame(data, min.rows = 10, min.cols = 3), "data",
-              "Its columns are time, target and boundary conditions; or give {.fun measurements}.", call = call)
+              "Its columns are time, target and boundary conditions; or give {.fun measurements}.",
+              call = call)
   data <- plain_table(as.list(data), nrow(data))
   names <- names(data)
   if (is.null(noise_sd)) {
     require_numeric(data, names[2], call)
-    time <- suppressMessages(read_time(data[[1]], names[1], call = call), classes = "amiss_message_time")
+    time <- suppressMessages(read_time(data[[1]], names[1], call = call),
+                             classes = "amiss_message_time")
     noise_sd <- difference_sd(time_hours(time), data[[2]])
-    cli::cli_inform(c("The noise of {.val {names[2]}} is taken as {signif(noise_sd, 3)}, from second differences.",
+    cli::cli_inform(c(paste("The noise of {.val {names[2]}} is taken as {signif(noise_sd, 3)},",
+                            "from second differences."),
                       i = "Give {.arg noise_sd} where it is known."),
                     class = "amiss_message_noise")
   }
-  measurements(data, time = names[1], target = names[2], boundary = names[-(1:2)], noise_sd = noise_sd)
+  measurements(data, time = names[1], target = names[2], boundary = names[-(1:2)],
+               noise_sd = noise_sd)
 }
 
 # Of independent errors, y[i - 1] - 2 y[i] + y[i + 1] has six times their variance.

@@ -1,50 +1,59 @@
-attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05, least_log10_bf = 0.5,
-                            ais = list(pilot_chains = 128, groups = 4, max_groups = 16, max_sweeps = 12,
-                                       precision = 0.3, importance_draws = 500))
+attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05,
+                            least_log10_bf = 0.5,
+                            ais = list(pilot_chains = 128, groups = 4, max_groups = 16,
+                                       max_sweeps = 12, precision = 0.3, importance_draws = 500))
 
 #' Which boundary conditions drive the discrepancy
 #'
-#' For each condition: the evidence that the model loses when its discrepancy may not answer to the condition, its
-#' share, and a p-value from surrogates (all conditions shifted in time together, which keeps their autocorrelation and
-#' their correlation with one another), for all conditions together by the step-down method of Westfall and Young
-#' (1993), whose least p-value does not grow with the number of conditions.
+#' For each condition: the evidence that the model loses when its discrepancy may not answer to the
+#' condition, its share, and a p-value from surrogates (all conditions shifted in time together,
+#' which keeps their autocorrelation and their correlation with one another), for all conditions
+#' together by the step-down method of Westfall and Young (1993), whose least p-value does not grow
+#' with the number of conditions.
 #'
-#' *What the p-value assumes.* A shifted record stands for another one of the same weather, so the conditions are taken
-#' as stationary over the record, in mean, variance and autocorrelation. Of a condition that only rises or falls no
-#' shift is alike; nothing checks that.
+#' *What the p-value assumes.* A shifted record stands for another one of the same weather, so the
+#' conditions are taken as stationary over the record, in mean, variance and autocorrelation. Of a
+#' condition that only rises or falls no shift is alike; nothing checks that.
 #'
-#' *What it does not see.* Responses are linear in each condition's history: an effect that is a product of two
-#' conditions shows only as far as one of them tells of it. A mechanism that holds such a product is judged by its own
-#' runs ([upgrade_model()]), and can be found where no condition is significant.
+#' *What it does not see.* Responses are linear in each condition's history: an effect that is a
+#' product of two conditions shows only as far as one of them tells of it. A mechanism that holds
+#' such a product is judged by its own runs ([upgrade_model()]), and can be found where no condition
+#' is significant.
 #'
-#' *A condition is not yet a cause.* What changes how much a system loses or stores changes its answer to everything.
-#' The error may then be a response to what moves the output most (in a heated room the heating), not to the condition
-#' that the mechanism is called after. Conditions say where to look; trials of mechanisms say what it is.
+#' *A condition is not yet a cause.* What changes how much a system loses or stores changes its
+#' answer to everything. The error may then be a response to what moves the output most (in a heated
+#' room the heating), not to the condition that the mechanism is called after. Conditions say where
+#' to look; trials of mechanisms say what it is.
 #'
-#' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but not both. Among those
-#' that can be dropped alone a set is sought that cannot be dropped together, nor be made smaller. Such a group is
-#' tested like a condition, and its members are named together: what they say cannot be told apart in this record. Of
-#' several records a group of one of them is dropped from all: another record may tell its members apart.
+#' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but
+#' not both. Among those that can be dropped alone a set is sought that cannot be dropped together,
+#' nor be made smaller. Such a group is tested like a condition, and its members are named together:
+#' what they say cannot be told apart in this record. Of several records a group of one of them is
+#' dropped from all: another record may tell its members apart.
 #'
-#' *Share.* A set of conditions takes a part of the misfit away, its sum of squares weighed by the covariance of error
-#' and simulator. The share of a condition is its Shapley value: what it adds to those before it, averaged over all
-#' orders of the conditions and over the posterior. So shares are not negative and add up to what all conditions explain
-#' together, also where conditions are correlated; two conditions that say the same share evenly. Beyond 10 conditions
-#' that act, 400 random orders stand for all.
+#' *Share.* A set of conditions takes a part of the misfit away, its sum of squares weighed by the
+#' covariance of error and simulator. The share of a condition is its Shapley value: what it adds to
+#' those before it, averaged over all orders of the conditions and over the posterior. So shares are
+#' not negative and add up to what all conditions explain together, also where conditions are
+#' correlated; two conditions that say the same share evenly. Beyond 10 conditions that act, 400
+#' random orders stand for all.
 #'
-#' @param fit A calibration ([calibrate()], [calibrate_refined()]), or that of several records ([calibrate_jointly()]).
-#' @param control List of options: `surrogates` (99; 39 where no condition earns enough evidence to matter),
-#'   `smallest_shift` (0.05 of the record), `level` (0.05), `least_log10_bf` (0.5: what a condition must earn besides
-#'   its p-value), and `ais` for the sampler.
+#' @param fit A calibration ([calibrate()], [calibrate_refined()]), or that of several records
+#'   ([calibrate_jointly()]).
+#' @param control List of options: `surrogates` (99; 39 where no condition earns enough evidence to
+#'   matter), `smallest_shift` (0.05 of the record), `level` (0.05), `least_log10_bf` (0.5: what a
+#'   condition must earn besides its p-value), and `ais` for the sampler.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition (`boundary`): the
-#'   evidence lost without it (`log10_bf_dropped`, with its `standard_error`), its `share`, its p-value among all
-#'   conditions and by itself (`p_value`, `p_value_single`), whether it is `significant` (a p-value of at most `level`
-#'   and a loss of at least `least_log10_bf`) and whether the sampler is `trusted`; `group` names the conditions that it
-#'   cannot be told apart from (`NA` for none), and `significant` of a member is that of the group.
-#'   `groups` is a list, one element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and
-#'   `correlation`, the largest between two members. Of several records: an object of class `amiss_joint_attribution`
-#'   with `records`, one such object each, and `table` and `groups` of all together.
+#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition
+#'   (`boundary`): the evidence lost without it (`log10_bf_dropped`, with its `standard_error`), its
+#'   `share`, its p-value among all conditions and by itself (`p_value`, `p_value_single`), whether
+#'   it is `significant` (a p-value of at most `level` and a loss of at least `least_log10_bf`) and
+#'   whether the sampler is `trusted`; `group` names the conditions that it cannot be told apart
+#'   from (`NA` for none), and `significant` of a member is that of the group. `groups` is a list,
+#'   one element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and
+#'   `correlation`, the largest between two members. Of several records: an object of class
+#'   `amiss_joint_attribution` with `records`, one such object each, and `table` and `groups` of all
+#'   together.
 #' @source Westfall and Young (1993), Resampling-based multiple testing, Wiley.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -58,7 +67,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' attribute_discrepancy(fit, list(surrogates = 19), seed = 1)
 #' @export
-attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) UseMethod("attribute_discrepancy")
+attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
+  UseMethod("attribute_discrepancy")
 
 #' @export
 attribute_discrepancy.default <- function(fit, control = NULL, seed = NULL, threads = 1) {
@@ -89,11 +99,12 @@ attribute_record <- function(fits, which, control, seed, threads) {
                       standard_error = result$sets$standard_error[alone] / log(10),
                       share = colMeans(result$shares), p_value = result$adjusted[alone],
                       p_value_single = result$p_value[alone],
-                      significant = significant[alone], trusted = result$sets$trusted[alone], group = NA_character_)
+                      significant = significant[alone], trusted = result$sets$trusted[alone],
+                      group = NA_character_)
   groups <- lapply(setdiff(seq_along(log10_bf), alone), function(k) {
     members <- result$sets$conditions[[k]] + 1L
-    list(conditions = conditions[members], log10_bf_dropped = log10_bf[k], p_value = result$adjusted[k],
-         significant = significant[k],
+    list(conditions = conditions[members], log10_bf_dropped = log10_bf[k],
+         p_value = result$adjusted[k], significant = significant[k],
          correlation = largest_correlation(fit, members))
   })
   table <- with_groups(table, groups)
@@ -119,12 +130,14 @@ with_groups <- function(table, groups) {
 
 # A posterior of calibrate_sets() as the engine takes it.
 engine_draws <- function(fits) {
-  list(posterior = fits[[1]]$posterior, kept = fits[[1]]$kept, records = lapply(unname(fits), function(fit) {
-    c(fit$posterior[c("setting", "variance", "t")], list(tangent = fit$tangent))
-  }))
+  list(posterior = fits[[1]]$posterior, kept = fits[[1]]$kept,
+       records = lapply(unname(fits), function(fit) {
+         c(fit$posterior[c("setting", "variance", "t")], list(tangent = fit$tangent))
+       }))
 }
 
-# The largest correlation between columns of two different conditions of a group, over the calibration rows.
+# The largest correlation between columns of two different conditions of a group, over the
+# calibration rows.
 largest_correlation <- function(fit, members) {
   m <- fit$measurements
   columns <- which(m$condition %in% members)
@@ -133,17 +146,21 @@ largest_correlation <- function(fit, members) {
 }
 
 # The sampler of the calibration, `ais`, with what the attribution's options change.
-fill_attribution_control <- function(control, ais, conditions, what = "control", call = rlang::caller_env()) {
+fill_attribution_control <- function(control, ais, conditions, what = "control",
+                                     call = rlang::caller_env()) {
   control <- merge_control(attribution_control, control, what, call = call)
   named <- function(option) paste0(what, "$", option)
-  check_input(checkmate::check_count(control$surrogates, positive = TRUE), named("surrogates"), call = call)
+  check_input(checkmate::check_count(control$surrogates, positive = TRUE), named("surrogates"),
+              call = call)
   # A surrogate takes a millisecond at least.
   check_size(named("surrogates"), control$surrogates, matrix_gb(control$surrogates, conditions),
              hours = 1e-3 * control$surrogates / 3600, call = call)
-  check_input(checkmate::check_number(control$smallest_shift, lower = 0, upper = 0.49), named("smallest_shift"),
+  check_input(checkmate::check_number(control$smallest_shift, lower = 0, upper = 0.49),
+              named("smallest_shift"), call = call)
+  check_input(checkmate::check_number(control$level, lower = 0, upper = 1), named("level"),
               call = call)
-  check_input(checkmate::check_number(control$level, lower = 0, upper = 1), named("level"), call = call)
-  check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE), named("least_log10_bf"), call = call)
+  check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE),
+              named("least_log10_bf"), call = call)
   ais <- merge_control(ais, control$ais, named("ais"), names(ais_defaults_()), call)
   control$ais <- fill_ais_control(ais, named("ais"), call)
   control
@@ -160,7 +177,8 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Attribution} of the discrepancy ({x$surrogates} surrogates)")
   say_table(x$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")])
   named <- significant_conditions(x$table)
-  cli::cli_bullets(c("*" = if (length(named)) "driven by {.field {named}}" else "no boundary condition is significant",
+  cli::cli_bullets(c("*" = if (length(named)) "driven by {.field {named}}"
+                           else "no boundary condition is significant",
                      stats::setNames(as_said(group_words(x)), rep("!", length(group_words(x)))),
                      ">" = "next: {.fun upgrade_model} with a {.fun catalogue}"))
 })
@@ -168,8 +186,8 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
 # Which conditions cannot be told apart, and what would.
 group_words <- function(attribution) {
   vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
-    sprintf("%s cannot be told apart in this record (correlation %.3f): measure while %s differ", listed(g$conditions),
-            g$correlation,
+    sprintf("%s cannot be told apart in this record (correlation %.3f): measure while %s differ",
+            listed(g$conditions), g$correlation,
             if (length(g$conditions) == 2) "the two" else "they")
   }, "")
 }
@@ -183,5 +201,6 @@ tidy.amiss_attribution <- function(x, ...) {
 
 #' @export
 condition_table.amiss_calibration <- function(fit, settings) {
-  attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed, threads = settings$threads)$table
+  attribute_discrepancy(fit, settings$control$attribution, seed = settings$seed,
+                        threads = settings$threads)$table
 }

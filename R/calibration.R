@@ -1,56 +1,63 @@
-calibration_control <- list(confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf),
-                            time_constants = NULL,
-                            error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32,
-                            check = 40,
-                            exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12,
-                                                     precision = 0.2, gradient = TRUE))
+calibration_control <- list(
+  confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf),
+  time_constants = NULL,
+  error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, check = 40,
+  exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12,
+                           precision = 0.2, gradient = TRUE))
 
 #' Calibrate a simulator on measurements
 #'
-#' The joint posterior of the parameters, the error and the discrepancy, given the whole record, sampled by annealed
-#' importance sampling. Its normalising constant is the evidence of the model, as a density of the calibration record.
+#' The joint posterior of the parameters, the error and the discrepancy, given the whole record,
+#' sampled by annealed importance sampling. Its normalising constant is the evidence of the model,
+#' as a density of the calibration record.
 #'
-#' *Model.* The record is the simulation, plus a discrepancy that answers to the history of the boundary conditions,
-#' plus an autocorrelated error, in one covariance: nothing is split off, so that the evidence does not hang on the
-#' basis of the emulator. How far the discrepancy reaches into what the parameters can do is learned: `reach` is a grid
-#' of numbers kappa, equally probable beforehand; with a small one the discrepancy keeps out of the directions in which
-#' the runs differ by much more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a free
-#' discrepancy says that the model is wrong where its parameters could hide it.
+#' *Model.* The record is the simulation, plus a discrepancy that answers to the history of the
+#' boundary conditions, plus an autocorrelated error, in one covariance: nothing is split off, so
+#' that the evidence does not hang on the basis of the emulator. How far the discrepancy reaches
+#' into what the parameters can do is learned: `reach` is a grid of numbers kappa, equally probable
+#' beforehand; with a small one the discrepancy keeps out of the directions in which the runs differ
+#' by much more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a
+#' free discrepancy says that the model is wrong where its parameters could hide it.
 #'
-#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check` draws of the posterior,
-#' or at `exact` if these are more. The emulator's error there, over the measurement error as the likelihood weighs it
-#' (autocorrelated as it was seen; if more was seen than stated, over the noise stated), is the check that counts: above
-#' a third, neither the posterior nor the evidence is trusted ([calibrate_refined()] then makes an emulator for the
-#' region and tries again). The likelihoods of `exact` such runs correct the evidence, so that it is the simulator's
-#' own; fewer than a tenth effective among them fail the check too, and so does more than a twentieth of the posterior
-#' in the outer tenth of the emulator's region. For an ensemble made elsewhere the check uses runs left out one by one,
-#' the fifth (at least 20) that lie nearest to the posterior.
+#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check`
+#' draws of the posterior, or at `exact` if these are more. The emulator's error there, over the
+#' measurement error as the likelihood weighs it (autocorrelated as it was seen; if more was seen
+#' than stated, over the noise stated), is the check that counts: above a third, neither the
+#' posterior nor the evidence is trusted ([calibrate_refined()] then makes an emulator for the
+#' region and tries again). The likelihoods of `exact` such runs correct the evidence, so that it is
+#' the simulator's own; fewer than a tenth effective among them fail the check too, and so does more
+#' than a twentieth of the posterior in the outer tenth of the emulator's region. For an ensemble
+#' made elsewhere the check uses runs left out one by one, the fifth (at least 20) that lie nearest
+#' to the posterior.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].
-#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
-#'   `inclusion` (prior probability that a condition drives the discrepancy at all, 0.2), `amplitude` (scale of the
-#'   half-Cauchy prior of the discrepancy's standard deviation if it does, in the target's unit; default the noise),
-#'   `reach` (see *Model*; `c(13, 300, Inf)`, in the region of a mode 13), `time_constants` (hours) of the filter bank,
-#'   `error_times` (hours) and `error_ratios` (variance beside the white noise) of the autocorrelated error,
-#'   `error_draws` (posterior draws kept for the discrepancy over time), `check` (runs of the simulator at posterior
-#'   draws, 40; 0 for none), `exact` (runs that correct the evidence; default those of the check; 0 for none), and
-#'   `ais`, options of [ais()] (here `pilot_chains` 400, `groups` 8, `max_groups` 16, `max_sweeps` 12, `precision` 0.2,
-#'   with gradients). Defaults of the times: `time_constants` of 0, 2, 4, 8, ... 64 steps of the record, up to a sixth
-#'   of the calibration rows: give longer ones where the system is slower; `error_times` of 2 and 8 steps.
+#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed;
+#'   default 2/N), `inclusion` (prior probability that a condition drives the discrepancy at all,
+#'   0.2), `amplitude` (scale of the half-Cauchy prior of the discrepancy's standard deviation if it
+#'   does, in the target's unit; default the noise), `reach` (see *Model*; `c(13, 300, Inf)`, in the
+#'   region of a mode 13), `time_constants` (hours) of the filter bank, `error_times` (hours) and
+#'   `error_ratios` (variance beside the white noise) of the autocorrelated error, `error_draws`
+#'   (posterior draws kept for the discrepancy over time), `check` (runs of the simulator at
+#'   posterior draws, 40; 0 for none), `exact` (runs that correct the evidence; default those of the
+#'   check; 0 for none), and `ais`, options of [ais()] (here `pilot_chains` 400, `groups` 8,
+#'   `max_groups` 16, `max_sweeps` 12, `precision` 0.2, with gradients). Defaults of the times:
+#'   `time_constants` of 0, 2, 4, 8, ... 64 steps of the record, up to a sixth of the calibration
+#'   rows: give longer ones where the system is slower; `error_times` of 2 and 8 steps.
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
-#' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the parameters;
-#'   `log_evidence`, `standard_error` and `interval` its evidence (natural logarithms; what is printed has those to the
-#'   base of 10); `trust`, whether the numbers can be believed (`trusted`) and why not (`verdict`); `reach` the
-#'   posterior probability of each reach; `check` what the runs said of the emulator: `error` (RMS at the record's
-#'   rows), `ratio` (over the noise), `border` (share of the posterior in the outer tenth of the emulator's region),
-#'   `z2` (mean square in units of the emulator's own standard deviations), `effective` (effective share of the draws
-#'   under the exact weights), `passed` and `verdict`.
-#' @source Kennedy and O'Hagan (2001), Bayesian calibration of computer models, Journal of the Royal Statistical Society
-#'   B 63, 425-464, for simulation plus discrepancy plus error. The covariance, its priors and the check are in
-#'   `vignette("algorithm", "amiss")`, *One covariance*, *The simulator has the last word* and *History of the boundary
-#'   conditions*.
+#' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the
+#'   parameters; `log_evidence`, `standard_error` and `interval` its evidence (natural logarithms;
+#'   what is printed has those to the base of 10); `trust`, whether the numbers can be believed
+#'   (`trusted`) and why not (`verdict`); `reach` the posterior probability of each reach; `check`
+#'   what the runs said of the emulator: `error` (RMS at the record's rows), `ratio` (over the
+#'   noise), `border` (share of the posterior in the outer tenth of the emulator's region), `z2`
+#'   (mean square in units of the emulator's own standard deviations), `effective` (effective share
+#'   of the draws under the exact weights), `passed` and `verdict`.
+#' @source Kennedy and O'Hagan (2001), Bayesian calibration of computer models, Journal of the Royal
+#'   Statistical Society B 63, 425-464, for simulation plus discrepancy plus error. The covariance,
+#'   its priors and the check are in `vignette("algorithm", "amiss")`, *One covariance*, *The
+#'   simulator has the last word* and *History of the boundary conditions*.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -70,14 +77,17 @@ calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threa
 }
 
 # The calibration, and the runs of the simulator at its draws.
-calibrate_with_runs <- function(emulator, measurements, control, seed, threads, call = rlang::caller_env()) {
+calibrate_with_runs <- function(emulator, measurements, control, seed, threads,
+                                call = rlang::caller_env()) {
   threads <- check_threads(threads)
-  found <- calibrate_sets(list(calibration_setting(emulator, measurements, control, seed, call)), threads, call)
+  found <- calibrate_sets(list(calibration_setting(emulator, measurements, control, seed, call)),
+                          threads, call)
   list(fit = found$fits[[1]], made = found$made[[1]])
 }
 
-# list(fits, made): calibrations of records that share the parameters of the same name, one for each set
-# (calibration_setting()), and the runs of each at its draws. All have the same draws and the evidence of all records.
+# list(fits, made): calibrations of records that share the parameters of the same name, one for each
+# set (calibration_setting()), and the runs of each at its draws. All have the same draws and the
+# evidence of all records.
 calibrate_sets <- function(sets, threads, call = rlang::caller_env()) {
   records <- engine_records(sets)
   result <- tryCatch(
@@ -99,39 +109,45 @@ calibrate_sets <- function(sets, threads, call = rlang::caller_env()) {
 fit_of_record <- function(set, record, own, result) {
   posterior <- c(result$posterior, own[c("setting", "variance", "t")])
   posterior$unit <- posterior$unit[, record$parameters, drop = FALSE]
-  new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept, coefficients = own$coefficients,
-          withheld = own$withheld, tangent = own$tangent, centre = own$centre, scale = own$scale,
+  new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept,
+          coefficients = own$coefficients, withheld = own$withheld, tangent = own$tangent,
+          centre = own$centre, scale = own$scale,
           reach = stats::setNames(own$reach, format(set$control$reach, trim = TRUE)))
 }
 
-# Records as the engine takes them, their parameters numbered over all. `fits`: calibrations, or what they are made of.
+# Records as the engine takes them, their parameters numbered over all. `fits`: calibrations, or
+# what they are made of.
 engine_records <- function(fits) {
   numbered <- unique(unlist(lapply(fits, function(fit) names(fit$emulator$parameters))))
   lapply(unname(fits), function(fit) {
-    list(data = history_data(fit$emulator, fit$measurements, fit$rows, fit$control), priors = fit$priors,
-         emulator = fit$emulator$processes, parameters = match(names(fit$emulator$parameters), numbered))
+    list(data = history_data(fit$emulator, fit$measurements, fit$rows, fit$control),
+         priors = fit$priors, emulator = fit$emulator$processes,
+         parameters = match(names(fit$emulator$parameters), numbered))
   })
 }
 
-# A noise that is lost in the rounding of what the simulator moves is told as the reason of a failure.
+# A noise that is lost in the rounding of what the simulator moves is told as the reason of a
+# failure.
 check_noise_visible <- function(emulator, noise_sd, parent, call) {
   spread <- sqrt(mean(rowSums(simulator_moves(emulator)^2)))
   if (noise_sd > 1e-5 * spread) return(invisible())
-  abort_numerical(c("The noise of {signif(noise_sd, 3)} is lost beside the runs, which spread by {signif(spread, 3)}.",
+  abort_numerical(c(paste("The noise of {signif(noise_sd, 3)} is lost beside the runs, which",
+                          "spread by {signif(spread, 3)}."),
                     x = "{conditionMessage(parent)}",
-                    i = paste("Double precision holds a noise of a hundred-thousandth of the spread: narrow the",
-                              "priors, or give {.arg noise_sd} of {.fun measurements} the instrument's error.")),
-                  call = call)
+                    i = paste("Double precision holds a noise of a hundred-thousandth of the",
+                              "spread: narrow the priors, or give {.arg noise_sd} of",
+                              "{.fun measurements} the instrument's error.")), call = call)
 }
 
-# What a calibration is made of before it is made: list(emulator, measurements, rows, control, priors, seed).
+# What a calibration is made of before it is made: list(emulator, measurements, rows, control,
+# priors, seed).
 calibration_setting <- function(emulator, measurements, control, seed, call = rlang::caller_env()) {
   rows <- emulated_rows(emulator, measurements, call)
   check_target_varies(measurements, rows, call)
   control <- fill_calibration_control(control, measurements, length(rows), call = call)
   priors <- history_priors(measurements, control, length(rows), mean(emulator$basis$discarded_sd^2))
-  list(emulator = emulator, measurements = measurements, rows = rows, control = control, priors = priors,
-       seed = pick_seed(seed))
+  list(emulator = emulator, measurements = measurements, rows = rows, control = control,
+       priors = priors, seed = pick_seed(seed))
 }
 
 # The calibration rows, which must be those that the emulator was trained on.
@@ -140,18 +156,20 @@ emulated_rows <- function(emulator, measurements, call = rlang::caller_env()) {
   check_object(measurements, "amiss_measurements", "measurements", call = call)
   rows <- used_rows(measurements, "calibrate")
   if (nrow(emulator$basis$vectors) != length(rows)) {
-    abort_input(c(paste("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the measurements have",
-                        "{length(rows)} calibration rows."),
+    abort_input(c(paste("The emulator was trained on {nrow(emulator$basis$vectors)} steps and the",
+                        "measurements have {length(rows)} calibration rows."),
                   i = "Train it on runs at exactly these rows."), call = call)
   }
   check_same_rows(emulator$hours, measurements, call = call)
   rows
 }
 
-fill_calibration_control <- function(control, measurements, n, what = "control", call = rlang::caller_env()) {
+fill_calibration_control <- function(control, measurements, n, what = "control",
+                                     call = rlang::caller_env()) {
   control <- merge_control(calibration_control, control, what, call = call)
   named <- function(option) paste0(what, "$", option)
-  ais <- merge_control(calibration_control$ais, control$ais, named("ais"), names(ais_defaults_()), call)
+  ais <- merge_control(calibration_control$ais, control$ais, named("ais"),
+                       names(ais_defaults_()), call)
   control$ais <- fill_ais_control(ais, named("ais"), call = call)
   step <- measurements$step_h
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
@@ -161,22 +179,28 @@ fill_calibration_control <- function(control, measurements, n, what = "control",
     control[["time_constants"]] <- c(0, taus[taus <= n * step / 6])
   }
   if (is.null(control$error_times)) control[["error_times"]] <- c(2, 8) * step
-  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), named("confidence"),
+  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1),
+              named("confidence"),
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
-  check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1), named("inclusion"), call = call)
-  check_input(checkmate::check_number(control$amplitude, lower = .Machine$double.xmin, finite = TRUE),
-              named("amplitude"), call = call)
-  check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE, min.len = 1,
-                                       any.missing = FALSE), named("time_constants"), call = call)
-  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE, any.missing = FALSE,
-                                       max.len = 3), named("error_times"), call = call)
+  check_input(checkmate::check_number(control$inclusion, lower = 1e-6, upper = 1),
+              named("inclusion"), call = call)
+  check_input(checkmate::check_number(control$amplitude, lower = .Machine$double.xmin,
+                                      finite = TRUE), named("amplitude"), call = call)
+  check_input(checkmate::check_numeric(control$time_constants, lower = 0, finite = TRUE,
+                                       min.len = 1, any.missing = FALSE),
+              named("time_constants"), call = call)
+  check_input(checkmate::check_numeric(control$error_times, lower = 1e-12, finite = TRUE,
+                                       any.missing = FALSE, max.len = 3),
+              named("error_times"), call = call)
   check_input(checkmate::check_numeric(control$error_ratios, lower = 0, finite = TRUE, min.len = 1,
                                        any.missing = FALSE), named("error_ratios"), call = call)
-  check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1, any.missing = FALSE, unique = TRUE),
-              named("reach"),
+  check_input(checkmate::check_numeric(control$reach, lower = 1e-6, min.len = 1,
+                                       any.missing = FALSE, unique = TRUE), named("reach"),
               "Give numbers above 0; {.code Inf} is a free discrepancy.", call = call)
-  check_input(checkmate::check_count(control$error_draws, positive = TRUE), named("error_draws"), call = call)
-  check_size(named("error_draws"), control$error_draws, matrix_gb(n, control$error_draws, copies = 4), call = call)
+  check_input(checkmate::check_count(control$error_draws, positive = TRUE), named("error_draws"),
+              call = call)
+  check_size(named("error_draws"), control$error_draws,
+             matrix_gb(n, control$error_draws, copies = 4), call = call)
   check_input(checkmate::check_count(control$check), named("check"), call = call)
   check_input(checkmate::check_count(control$exact, null.ok = TRUE), named("exact"), call = call)
   for (name in c("check", "exact"))
@@ -190,8 +214,10 @@ fit_trust <- function(fit) {
   why <- c(if (!fit$posterior$trusted) fit$posterior$verdict,
            if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
            if (fit$posterior$trusted && fit$standard_error > rules$evidence_error)
-             "not trusted: corrected by the runs, the evidence has a standard error of more than one nat")
-  list(trusted = is.null(why), verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
+             paste("not trusted: corrected by the runs, the evidence has a standard error of more",
+                   "than one nat"))
+  list(trusted = is.null(why),
+       verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }
 
 #' @export
@@ -200,13 +226,15 @@ print.amiss_calibration <- function(x, ...) on_stdout(x, {
   if (isTRUE(x$part)) {
     cli::cli_text("one of several records that were calibrated together, {x$trust$verdict}")
   } else {
-    cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)},",
+    cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)}",
+                        "[{round(x$interval[1] / log(10), 2)},",
                         "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
   }
   say_parameters(x, 6)
   cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
-  cli::cli_bullets(c(">" = if (isTRUE(x$part)) "next: {.fun discrepancy} or {.fun predict}"
-                           else "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
+  cli::cli_bullets(
+    c(">" = if (isTRUE(x$part)) "next: {.fun discrepancy} or {.fun predict}"
+            else "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
 })
 
 free_probability <- function(fit) sum(fit$reach[is.infinite(fit$control$reach)])
@@ -216,23 +244,27 @@ reach_words <- function(fit) {
   free <- free_probability(fit)
   if (length(fit$reach) < 2) {
     return(if (free > 0) "the discrepancy is free"
-           else sprintf("the discrepancy keeps out of what the parameters do (reach %s)", names(fit$reach)))
+           else sprintf("the discrepancy keeps out of what the parameters do (reach %s)",
+                        names(fit$reach)))
   }
   if (free >= 0.9)
-    return(sprintf(paste("the discrepancy reaches into what the parameters can do (probability %.2f): the model is",
-                         "wrong where its parameters could hide it"),
+    return(sprintf(paste("the discrepancy reaches into what the parameters can do (probability",
+                         "%.2f): the model is wrong where its parameters could hide it"),
                    free))
   if (free <= 0.1)
-    return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)", 1 - free))
-  sprintf("whether the discrepancy reaches into what the parameters can do stays open (probability %.2f)", free)
+    return(sprintf("the discrepancy keeps out of what the parameters can do (probability %.2f)",
+                   1 - free))
+  sprintf(paste("whether the discrepancy reaches into what the parameters can do stays open",
+                "(probability %.2f)"), free)
 }
 
-# What a discrepancy that reaches that far, in one record at least, says of the parameters; NULL where it does not.
+# What a discrepancy that reaches that far, in one record at least, says of the parameters; NULL
+# where it does not.
 reach_sentence <- function(fit) {
   hides <- function(fit) length(fit$reach) > 1 && free_probability(fit) > 0.9
   if (any(vapply(record_fits(fit), hides, NA)))
-    paste("What remains reaches into what the parameters can do: they may hide a part of it, so do not read their",
-          "values as physical.")
+    paste("What remains reaches into what the parameters can do: they may hide a part of it, so do",
+          "not read their values as physical.")
 }
 
 #' @export

@@ -1,47 +1,52 @@
-# The simulator has the last word: the emulator's error where the posterior lies, seen by runs of the simulator at draws
-# of it or, for runs made elsewhere, by runs left out.
+# The simulator has the last word: the emulator's error where the posterior lies, seen by runs of
+# the simulator at draws of it or, for runs made elsewhere, by runs left out.
 
-# list(fits, made): calibrations that have the same draws with their checks, and the runs of each (NULL where none were
-# made).
+# list(fits, made): calibrations that have the same draws with their checks, and the runs of each
+# (NULL where none were made).
 checked_by_runs <- function(fits, threads) {
   if (all(vapply(fits, function(fit) fit$control$check, 0) == 0))
     return(list(fits = fits, made = vector("list", length(fits))))
   exact <- max(vapply(fits, function(fit) fit$control$exact %||% default_exact(fit), 0))
   drawn <- even_draws(fits[[1]], max(exact, vapply(fits, function(fit) fit$control$check, 0)))
-  made <- lapply(fits, function(fit) if (!is.null(fit$emulator$simulator)) posterior_runs(fit, drawn, threads))
+  made <- lapply(
+    fits, function(fit) if (!is.null(fit$emulator$simulator)) posterior_runs(fit, drawn, threads))
   checked <- Map(function(fit, runs) {
     fit$check <- if (is.null(runs)) check_by_left_out(fit) else emulation_check(fit, runs)
     fit
   }, fits, made)
-  if (exact > 0 && !any(vapply(made, is.null, NA))) checked <- exact_evidence(checked, made, threads)
+  if (exact > 0 && !any(vapply(made, is.null, NA)))
+    checked <- exact_evidence(checked, made, threads)
   list(fits = checked, made = made)
 }
 
 # The runs of the check serve the exact evidence.
 default_exact <- function(fit) if (is.null(fit$emulator$simulator)) 0 else fit$control$check
 
-# Runs of the simulator at draws spread evenly over the posterior (even_draws()): list(draws, times, runs, failed),
-# failed ones left out. A draw of more weight than one of them is run once, and counts as often as it was drawn.
+# Runs of the simulator at draws spread evenly over the posterior (even_draws()): list(draws, times,
+# runs, failed), failed ones left out. A draw of more weight than one of them is run once, and
+# counts as often as it was drawn.
 posterior_runs <- function(fit, drawn, threads) {
   draws <- unique(drawn)
   times <- tabulate(match(drawn, draws))
   runs <- staged("check", suppress_run_warnings(simulate_measured(
-    fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate", threads)))
+    fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate",
+    threads)))
   failed <- colSums(!is.finite(runs)) > 0
   if (mean(failed) > largest_failed_share) {
     worst <- fit$values[draws[failed][1], ]
     point <- paste(colnames(fit$values), signif(worst, 4), sep = " = ", collapse = ", ")
-    abort_numerical(c(paste("The simulator failed at {sum(failed)} of {length(draws)} draws of the posterior, more",
-                            "than {100 * largest_failed_share} %."),
+    abort_numerical(c(paste("The simulator failed at {sum(failed)} of {length(draws)} draws of the",
+                            "posterior, more than {100 * largest_failed_share} %."),
                       x = "The first is run {which(failed)[1]} at {point}.",
                       i = "Find out why it fails there, or narrow the priors."))
   }
-  list(draws = draws[!failed], times = times[!failed], runs = runs[, !failed, drop = FALSE], failed = sum(failed))
+  list(draws = draws[!failed], times = times[!failed], runs = runs[, !failed, drop = FALSE],
+       failed = sum(failed))
 }
 
 # The check tells of failed runs itself.
-suppress_run_warnings <- function(code) withCallingHandlers(code,
-                                                            amiss_warning_input = function(w) rlang::cnd_muffle(w))
+suppress_run_warnings <- function(code)
+  withCallingHandlers(code, amiss_warning_input = function(w) rlang::cnd_muffle(w))
 
 emulation_check <- function(fit, made) {
   emulator <- fit$emulator
@@ -58,7 +63,8 @@ check_by_left_out <- function(fit) {
   if (is.null(loo)) return(NULL)
   inputs <- fit$emulator$unit
   centre <- colSums(fit$weights * posterior_unit(fit))
-  near <- order(rowSums(sweep(inputs, 2, centre)^2))[seq_len(min(nrow(inputs), max(20, ceiling(nrow(inputs) / 5))))]
+  near <- order(rowSums(sweep(inputs, 2, centre)^2))[seq_len(
+    min(nrow(inputs), max(20, ceiling(nrow(inputs) / 5))))]
   error <- tcrossprod(fit$emulator$basis$vectors, loo$error[near, , drop = FALSE])
   error <- sqrt(error^2 + fit$emulator$basis$discarded_sd^2)
   new_check(fit, error, series_variance(fit$emulator$basis, loo$variance[near, , drop = FALSE]), 0,
@@ -69,22 +75,26 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
   rms <- sqrt(mean(error^2))
   ratio <- error_over_noise(fit, error)
   noise <- if (ratio > 0) rms / ratio else fit$measurements$noise_sd
-  border <- sum(fit$weights[region_distance(fit$emulator$processes$region, posterior_unit(fit)) > 0.9])
+  border <- sum(
+    fit$weights[region_distance(fit$emulator$processes$region, posterior_unit(fit)) > 0.9])
   passed <- ratio <= rules$error_ratio && border <= rules$border
-  told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by, format(signif(ratio, 2)),
+  told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by,
+                  format(signif(ratio, 2)),
                   if (failed) sprintf(" (%d more failed)", failed) else "")
-  verdict <- if (ratio > rules$error_ratio) paste0(told, ", more than a third: it is not good enough")
-             else if (!passed) sprintf("%s, but the posterior reaches the end of the region where it holds (%.0f %%)",
-                                       told, 100 * border)
+  verdict <- if (ratio > rules$error_ratio)
+               paste0(told, ", more than a third: it is not good enough")
+             else if (!passed) sprintf(paste("%s, but the posterior reaches the end of the region",
+                                             "where it holds (%.0f %%)"), told, 100 * border)
              else told
-  list(runs = ncol(error), failed = failed, error = rms, noise = noise, ratio = ratio, z2 = mean(error^2 / variance),
-       effective = NA_real_,
+  list(runs = ncol(error), failed = failed, error = rms, noise = noise, ratio = ratio,
+       z2 = mean(error^2 / variance), effective = NA_real_,
        border = border, passed = passed, verdict = verdict, mean = mean)
 }
 
-# RMS of errors (rows x n) in units of the measurement error as the likelihood weighs it, autocorrelated as it was seen:
-# with its covariance V, the root of e' V^-1 e / N, by which a smooth error counts less where the measurement error is
-# smooth. Where the error seen is larger than the noise stated (it then holds more than noise), in units of that.
+# RMS of errors (rows x n) in units of the measurement error as the likelihood weighs it,
+# autocorrelated as it was seen: with its covariance V, the root of e' V^-1 e / N, by which a smooth
+# error counts less where the measurement error is smooth. Where the error seen is larger than the
+# noise stated (it then holds more than noise), in units of that.
 error_over_noise <- function(fit, error) {
   posterior <- fit$posterior
   picked <- systematic_draws(fit$weights, 8)
@@ -95,7 +105,8 @@ error_over_noise <- function(fit, error) {
   runs <- cbind(0, error)
   log_l <- vapply(picked, function(draw) {
     points <- list(setting = rep(posterior$setting[draw], ncol(runs)),
-                   variance = rep(posterior$variance[draw], ncol(runs)), t = matrix(0, ncol(runs), ncol(posterior$t)))
+                   variance = rep(posterior$variance[draw], ncol(runs)),
+                   t = matrix(0, ncol(runs), ncol(posterior$t)))
     call_engine(run_likelihood_(data, priors, points, runs, engine_context(fit$seed, 1)))
   }, numeric(ncol(runs)))
   squares <- 2 * sweep(-log_l[-1, , drop = FALSE], 2, log_l[1, ], "+")
@@ -110,11 +121,14 @@ error_share <- function(fit) rowSums(error_ratios_of(fit, seq_along(fit$posterio
 error_ratios_of <- function(fit, draws) {
   ratios <- fit$control$error_ratios
   parts <- seq_along(fit$control$error_times)
-  digit <- function(part) fit$posterior$setting[draws] %/% length(ratios)^(part - 1) %% length(ratios)
-  matrix(vapply(parts, function(part) ratios[digit(part) + 1], numeric(length(draws))), length(draws))
+  digit <- function(part)
+    fit$posterior$setting[draws] %/% length(ratios)^(part - 1) %% length(ratios)
+  matrix(vapply(parts, function(part) ratios[digit(part) + 1], numeric(length(draws))),
+         length(draws))
 }
 
-# Log-likelihood of runs (one a column) of a record, each at its draw; with the simulator itself nothing is discarded.
+# Log-likelihood of runs (one a column) of a record, each at its draw; with the simulator itself
+# nothing is discarded.
 run_log_likelihood <- function(fit, draws, runs, threads) {
   points <- list(setting = fit$posterior$setting[draws],
                  variance = fit$posterior$variance[draws] - fit$priors$discarded_variance,
@@ -123,7 +137,8 @@ run_log_likelihood <- function(fit, draws, runs, threads) {
   call_engine(run_likelihood_(data, fit$priors, points, runs, engine_context(fit$seed, threads)))
 }
 
-# Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior, the likelihoods those of all records.
+# Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior, the likelihoods those
+# of all records.
 exact_evidence <- function(fits, made, threads) {
   drawn <- Reduce(intersect, lapply(made, `[[`, "draws"))
   exact <- Reduce(`+`, Map(function(fit, m) {
@@ -136,11 +151,13 @@ exact_evidence <- function(fits, made, threads) {
   n <- length(ratio)
   effective <- 1 / (n * sum(weights^2))
   correction <- max(log_ratio) + log(mean(ratio))
-  # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the upper half it is
-  # that of lognormal ratios; how far the two are apart is part of the error.
+  # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the
+  # upper half it is that of lognormal ratios; how far the two are apart is part of the error.
   above <- pmax(log_ratio - stats::median(log_ratio), 0)
-  lognormal <- stats::median(log_ratio) + mean(above^2)  # twice the mean square of one half, over two
-  error <- if (n > 1) sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2) else Inf
+  # twice the mean square of one half, over two
+  lognormal <- stats::median(log_ratio) + mean(above^2)
+  error <- if (n > 1) sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2)
+           else Inf
   lapply(fits, corrected, effective = effective, correction = correction, error = error)
 }
 
@@ -148,8 +165,8 @@ corrected <- function(fit, effective, correction, error) {
   fit$check$effective <- effective
   if (fit$check$passed && effective < rules$effective) {
     fit$check$passed <- FALSE
-    fit$check$verdict <- sprintf("%s, but few of these runs are as likely as it says (effective share %.2f)",
-                                 fit$check$verdict, effective)
+    fit$check$verdict <- sprintf(paste("%s, but few of these runs are as likely as it says",
+                                       "(effective share %.2f)"), fit$check$verdict, effective)
   }
   fit$check$correction <- correction
   fit$log_evidence <- fit$log_evidence + correction

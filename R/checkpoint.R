@@ -1,8 +1,8 @@
 # Finished work kept in files, so that an interrupted run goes on where it stopped.
 
-# A function that returns a value kept under a key, or evaluates and keeps it, with the runs that it took. What is kept
-# belongs to one set of arguments only: its hash is the file's name. What cannot be kept or read again costs time, never
-# the run.
+# A function that returns a value kept under a key, or evaluates and keeps it, with the runs that it
+# took. What is kept belongs to one set of arguments only: its hash is the file's name. What cannot
+# be kept or read again costs time, never the run.
 checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
   if (is.null(folder)) return(function(name, value) value)
   check_checkpoint(folder, call)
@@ -18,12 +18,14 @@ checkpoint_keeper <- function(folder, arguments, call = rlang::caller_env()) {
     before <- runs_so_far()
     force(value)
     keep_value(list(value = value, runs = runs_so_far() - before), file, id)
-    # As it will be read again: which environments are one and which are copies is part of later keys.
+    # As it will be read again: which environments are one and which are copies is part of later
+    # keys.
     unserialize(serialize(value, NULL))
   }
 }
 
-# The seed of work that is kept in a folder. One that was drawn is kept as well: with another, nothing would be found.
+# The seed of work that is kept in a folder. One that was drawn is kept as well: with another,
+# nothing would be found.
 kept_seed <- function(seed, folder, call = rlang::caller_env()) {
   if (!is.null(seed) || is.null(folder)) return(pick_seed(seed, call))
   check_checkpoint(folder, call)
@@ -54,11 +56,12 @@ check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
 # NULL if there is none, or none that is whole, of this key and valid.
 read_kept <- function(file, id, valid = function(value) TRUE) {
   if (!file.exists(file)) return(NULL)
-  kept <- tryCatch(suppressWarnings(if (is_regular_file(file)) unpack(readRDS(file), id)), error = function(e) NULL)
+  kept <- tryCatch(suppressWarnings(if (is_regular_file(file)) unpack(readRDS(file), id)),
+                   error = function(e) NULL)
   if (!is.null(kept) && !valid(kept$value)) kept <- NULL
   if (is.null(kept))
-    cli::cli_inform(
-      c("!" = "The kept file {.file {file}} is damaged or not from this package; its work is done again."),
+    cli::cli_inform(c("!" = paste("The kept file {.file {file}} is damaged or not from this",
+                                  "package; its work is done again.")),
                     class = "amiss_message_kept")
   kept
 }
@@ -80,11 +83,13 @@ keep_value <- function(value, file, id, write = saveRDS) {
 }
 
 tell_unkept <- function(folder) {
-  cli::cli_inform(c("!" = "What is finished could not be kept in {.file {folder}}; the work goes on without it.",
-                    i = "Is the disk full?"), class = "amiss_message_kept")
+  cli::cli_inform(c("!" = paste("What is finished could not be kept in {.file {folder}}; the work",
+                                "goes on without it."), i = "Is the disk full?"),
+                  class = "amiss_message_kept")
 }
 
-# Written under a name of its own, read back, then renamed: under its name a file is whole. Whether this was done.
+# Written under a name of its own, read back, then renamed: under its name a file is whole. Whether
+# this was done.
 store_value <- function(value, file, id, write = saveRDS) {
   folder <- dirname(file)
   dir.create(folder, recursive = TRUE, showWarnings = FALSE)
@@ -110,30 +115,35 @@ remove_stages <- function(stages) {
 }
 
 remove_empty <- function(folder) {
-  if (dir.exists(folder) && !length(dir(folder, all.files = TRUE, no.. = TRUE))) unlink(folder, recursive = TRUE)
+  if (dir.exists(folder) && !length(dir(folder, all.files = TRUE, no.. = TRUE)))
+    unlink(folder, recursive = TRUE)
 }
 
 # The same for equal contents in every session: version 2 knows no compact forms of vectors.
 content_hash <- function(x) rlang::hash(serialize(x, NULL, version = 2))
 
-# A value as plain lists that are equal where it would work alike: functions as their text and all that they capture, by
-# value, environments as their contents. Packages are their version, and of the global environment only what a function
-# names.
+# A value as plain lists that are equal where it would work alike: functions as their text and all
+# that they capture, by value, environments as their contents. Packages are their version, and of
+# the global environment only what a function names.
 plain <- function(x, seen = new.env()) {
   if (is.environment(x)) return(plain_environment(x, seen))
   if (is.primitive(x)) return(deparse(x))
   if (is.function(x)) return(list(code(x), plain(environment(x), seen), named_globals(x, seen)))
   if (is.symbol(x)) return(as.character(x))
   attributes <- attributes(x)
-  attributes <- attributes[setdiff(names(attributes), c("names", "srcref", "srcfile", "wholeSrcref"))]
+  attributes <- attributes[setdiff(names(attributes),
+                                   c("names", "srcref", "srcfile", "wholeSrcref"))]
   values <- if (is.language(x)) code(x) else if (is.list(x)) lapply(unclass(x), plain, seen) else x
-  if ((is.language(x) || is.list(x)) && length(attributes)) list(values, lapply(attributes, plain, seen)) else values
+  if ((is.language(x) || is.list(x)) && length(attributes))
+    list(values, lapply(attributes, plain, seen))
+  else values
 }
 
 code <- function(x) deparse(x, control = c("keepNA", "keepInteger", "niceNames", "digits17"))
 
 plain_environment <- function(x, seen) {
-  if (isNamespace(x)) return(c("package", getNamespaceName(x), as.character(getNamespaceVersion(x))))
+  if (isNamespace(x))
+    return(c("package", getNamespaceName(x), as.character(getNamespaceVersion(x))))
   name <- environmentName(x)
   if (name %in% c("R_GlobalEnv", "R_EmptyEnv", "base") || startsWith(name, "package:")) return(name)
   address <- rlang::obj_address(x)
@@ -155,8 +165,8 @@ bindings <- function(x, names, seen) {
   names <- sort(names, method = "radix")
   value <- function(name) {
     if (rlang::env_binding_are_active(x, name)) return("active")
-    tryCatch(plain(if (name == "...") eval(quote(list(...)), x) else get(name, x, inherits = FALSE), seen),
-             error = function(e) "none")
+    tryCatch(plain(if (name == "...") eval(quote(list(...)), x) else get(name, x, inherits = FALSE),
+                   seen), error = function(e) "none")
   }
   stats::setNames(lapply(names, value), names)
 }

@@ -3,17 +3,20 @@
 command_parser <- function() {
   option <- function(name, help, ...) optparse::make_option(paste0("--", name), help = help, ...)
   switch <- function(name, help) option(name, help, action = "store_true", default = FALSE)
-  optparse::OptionParser(usage = "usage: amiss run STUDY.yml --out DIR [options]\n       amiss --help | --version",
-                         add_help_option = FALSE, option_list = list(
-    option("out", "folder for report.html, figures/, result.rds and result.json", metavar = "DIR"),
-    option("threads", "threads to use (1); results do not depend on it", default = "1", metavar = "N"),
-    option("seed", "seed of the random numbers; overrides that of the study", metavar = "N"),
-    switch("trust", "run the R files that the study names, and read files outside its folder"),
-    switch("large", "run even what is estimated to need more than a day or 4 GB"),
-    switch("quiet", "no progress on stderr"),
-    switch("version", "the version, and nothing else"),
-    optparse::make_option(c("-h", "--help"), help = "this text, and nothing else", action = "store_true",
-                          default = FALSE)),
+  optparse::OptionParser(
+    usage = "usage: amiss run STUDY.yml --out DIR [options]\n       amiss --help | --version",
+    add_help_option = FALSE, option_list = list(
+      option("out",
+             "folder for report.html, figures/, result.rds and result.json", metavar = "DIR"),
+      option("threads",
+             "threads to use (1); results do not depend on it", default = "1", metavar = "N"),
+      option("seed", "seed of the random numbers; overrides that of the study", metavar = "N"),
+      switch("trust", "run the R files that the study names, and read files outside its folder"),
+      switch("large", "run even what is estimated to need more than a day or 4 GB"),
+      switch("quiet", "no progress on stderr"),
+      switch("version", "the version, and nothing else"),
+      optparse::make_option(c("-h", "--help"), help = "this text, and nothing else",
+                            action = "store_true", default = FALSE)),
     description = "\nRuns the study and writes its results into DIR.")
 }
 
@@ -25,7 +28,8 @@ run_command <- function(words) {
     message(paste(c(paste("amiss:", conditionMessage(asked)), help), collapse = "\n"))
     return(2)
   }
-  told <- if (asked$help) help else if (asked$version) paste("amiss", utils::packageVersion("amiss"))
+  told <- if (asked$help) help
+          else if (asked$version) paste("amiss", utils::packageVersion("amiss"))
   if (!is.null(told)) {
     writeLines(told)
     return(0)
@@ -34,8 +38,8 @@ run_command <- function(words) {
   on.exit(options(before))
   missing <- FALSE
   tryCatch(withCallingHandlers({
-    result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads, quiet = asked$quiet,
-                        trust = asked$trust)
+    result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads,
+                        quiet = asked$quiet, trust = asked$trust)
     if (!asked$quiet) print(result)
     as.numeric(missing)
   }, amiss_warning_missing = function(w) missing <<- TRUE), error = function(e) {
@@ -49,7 +53,8 @@ run_command <- function(words) {
 
 # What is asked for; an error says what is wrong with the usage.
 read_command <- function(words, parser) {
-  parsed <- optparse::parse_args(parser, words, print_help_and_exit = FALSE, positional_arguments = TRUE)
+  parsed <- optparse::parse_args(parser, words, print_help_and_exit = FALSE,
+                                 positional_arguments = TRUE)
   asked <- parsed$options
   names <- parsed$args
   if (identical(names, "help")) asked$help <- TRUE
@@ -69,6 +74,7 @@ read_command <- function(words, parser) {
 whole_number <- function(text, option, least, most) {
   number <- suppressWarnings(as.numeric(text))
   whole <- checkmate::test_int(number, lower = least, upper = most)
-  if (!whole) stop("'--", option, "' needs a whole number from ", least, " to ", most, ", not '", text, "'")
+  if (!whole)
+    stop("'--", option, "' needs a whole number from ", least, " to ", most, ", not '", text, "'")
   number
 }

@@ -1,10 +1,10 @@
-# The two sides of a comparison in a condition as values of one kind. R compares different kinds as text, and text with
-# a time by the clock of the machine.
+# The two sides of a comparison in a condition as values of one kind. R compares different kinds as
+# text, and text with a time by the clock of the machine.
 
 # What conditions know of the record's time: its column as it was given and as it was read.
 condition_clock <- function(values, reading, zone) {
-  list(values = if (is.factor(values)) as.character(values) else values, time = reading$time, format = reading$format,
-       zone = zone)
+  list(values = if (is.factor(values)) as.character(values) else values, time = reading$time,
+       format = reading$format, zone = zone)
 }
 
 comparison_operators <- c("==", "!=", "<", "<=", ">", ">=", "%in%")
@@ -15,13 +15,15 @@ comparisons <- function(clock) {
     compare <- get(name, baseenv())
     ordered <- name %in% c("<", "<=", ">", ">=")
     function(e1, e2) {
-      if (name == "%in%" || length(e2) <= length(e1)) return(do.call(compare, comparable(e1, e2, ordered, clock)))
+      if (name == "%in%" || length(e2) <= length(e1))
+        return(do.call(compare, comparable(e1, e2, ordered, clock)))
       do.call(compare, rev(comparable(e2, e1, ordered, clock)))
     }
   })
 }
 
-# list(column, value): `value`, mostly one that is written in the condition, is taken as what the column holds.
+# list(column, value): `value`, mostly one that is written in the condition, is taken as what the
+# column holds.
 comparable <- function(column, value, ordered, clock) {
   if (is.factor(column)) column <- as.character(column)
   if (is.factor(value)) value <- as.character(value)
@@ -41,10 +43,11 @@ comparable <- function(column, value, ordered, clock) {
 }
 
 is_moment <- function(x) inherits(x, c("POSIXt", "Date"))
-as_text <- function(x) if (is.character(x)) x else format(x, scientific = FALSE, trim = TRUE, digits = 15)
+as_text <- function(x)
+  if (is.character(x)) x else format(x, scientific = FALSE, trim = TRUE, digits = 15)
 
-# Whether it is the column of time that is compared, with what is to be read as a time. Its own numbers stay numbers,
-# but digits of a date may be written in part.
+# Whether it is the column of time that is compared, with what is to be read as a time. Its own
+# numbers stay numbers, but digits of a date may be written in part.
 is_record_time <- function(column, value, clock) {
   if (is_moment(column) || length(column) < 2 || !identical(column, clock$values)) return(FALSE)
   if (is_moment(value)) return(!is.numeric(clock$time))
@@ -65,7 +68,9 @@ time_pair <- function(time, value, format, zone) {
 }
 
 moment_number <- function(x) {
-  if (is.numeric(x)) as.numeric(x) else if (inherits(x, "Date")) 86400 * as.numeric(x) else as.numeric(as.POSIXct(x))
+  if (is.numeric(x)) as.numeric(x)
+  else if (inherits(x, "Date")) 86400 * as.numeric(x)
+  else as.numeric(as.POSIXct(x))
 }
 
 # A time beside a text, or another time: a text is read by the clock of the time.
@@ -76,8 +81,8 @@ moment_pair <- function(column, value, clock) {
   time <- pair[[which(moment)]]
   text <- pair[[which(!moment)]]
   if (!is.character(text)) {
-    stop("a time is compared with ", seen(text), "; write a time in quotes, such as \"2013-09-02 00:00\"",
-         call. = FALSE)
+    stop("a time is compared with ", seen(text),
+         "; write a time in quotes, such as \"2013-09-02 00:00\"", call. = FALSE)
   }
   format <- if (identical(time, clock$time)) clock$format
   pair[[which(!moment)]] <- read_moments(text, time, format, clock_zone(time, clock))
@@ -88,8 +93,9 @@ clock_zone <- function(time, clock) {
   if (inherits(time, "Date")) return("UTC")
   zone <- clock$zone %||% attr(time, "tzone")[1] %||% ""
   if (nzchar(zone)) return(zone)
-  stop("the times of the column name no zone, so that a text is another time on each machine; say `time_zone`, such ",
-       "as \"UTC\"", call. = FALSE)
+  stop(
+    "the times of the column name no zone, so that a text is another time on each machine; say `time_zone`, such ",
+    "as \"UTC\"", call. = FALSE)
 }
 
 # Two texts have an order only if they are numbers, times of day or times.
@@ -105,7 +111,8 @@ ordered_texts <- function(column, value, clock) {
     time_pair(time, value, own_format(format, column, value), clock$zone)
   }, amiss_error_input = function(e) {
     first <- column[!is.na(column)][1]
-    stop(dQuote(first, FALSE), " and ", dQuote(value[1], FALSE), " are compared by their order, but they are no times ",
+    stop(dQuote(first, FALSE), " and ", dQuote(value[1], FALSE),
+         " are compared by their order, but they are no times ",
          "in one format, and texts have no order; compare them by == or %in%", call. = FALSE)
   })
 }
@@ -124,11 +131,13 @@ as_kind_of <- function(other, text) {
   bad <- which(is.na(values) & !is.na(text))
   if (!length(bad)) return(values)
   row <- if (length(text) > 1) paste0(" (row ", bad[1], ")") else ""
-  stop(dQuote(text[bad[1]], FALSE), row, if (is.logical(other)) " is compared with TRUE and FALSE, but is neither" else
-    " is compared with numbers, but is none", call. = FALSE)
+  stop(dQuote(text[bad[1]], FALSE), row,
+       if (is.logical(other)) " is compared with TRUE and FALSE, but is neither"
+       else " is compared with numbers, but is none", call. = FALSE)
 }
 
-# Texts of a condition as times: in the format of the column, in the beginning of it, or as ISO 8601.
+# Texts of a condition as times: in the format of the column, in the beginning of it, or as ISO
+# 8601.
 read_moments <- function(text, time, format, zone) {
   zone <- zone %||% if (!is.numeric(time)) attr(time, "tzone")[1]
   for (form in literal_formats(format)) {
@@ -138,7 +147,8 @@ read_moments <- function(text, time, format, zone) {
     if (is.null(format)) check_one_year(time)
     return(read)
   }
-  stop(dQuote(text[1], FALSE), " is no time; write it as in the column, or such as \"2013-09-02 00:00\"", call. = FALSE)
+  stop(dQuote(text[1], FALSE),
+       " is no time; write it as in the column, or such as \"2013-09-02 00:00\"", call. = FALSE)
 }
 
 # A format, those of its beginnings that hold a date, none, and the order of day and month in it.
@@ -155,5 +165,6 @@ literal_formats <- function(format) {
 # Stamps without a year, such as those of EnergyPlus, tell times apart within one year only.
 check_one_year <- function(time) {
   if (!is.numeric(time) || max(time) <= 8784) return(invisible())
-  stop("the stamps of the column have no year and go beyond one; give the rows by another column", call. = FALSE)
+  stop("the stamps of the column have no year and go beyond one; give the rows by another column",
+       call. = FALSE)
 }

@@ -4,49 +4,56 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 
 #' Compare models by their evidence, and what practice does beside it
 #'
-#' Every model is simulated on one design seed, trained and calibrated on the same record. What comes out is the
-#' evidence with its interval, Bayes factors in the words of the paper's table 1, posterior probabilities (equal ones
-#' beforehand), what each model's discrepancy answers to, and its parameters. Beside them stand the criteria by which
-#' models are chosen in practice, so that one sees where they mislead.
+#' Every model is simulated on one design seed, trained and calibrated on the same record. What
+#' comes out is the evidence with its interval, Bayes factors in the words of the paper's table 1,
+#' posterior probabilities (equal ones beforehand), what each model's discrepancy answers to, and
+#' its parameters. Beside them stand the criteria by which models are chosen in practice, so that
+#' one sees where they mislead.
 #'
-#' *The criteria.* The root mean squared error is that of the simulation averaged over the posterior, in calibration and
-#' on held-out rows. Likelihood, AIC, BIC and likelihood ratio are taken where the simulator itself (not its emulator)
-#' has the least squared error within the priors, as if errors were independent and normal with one unknown variance: k
-#' counts the parameters and that variance, as `AIC()` of an [lm()] does. The likelihood ratio is that against the last
-#' earlier model that is nested: whose parameters all stand in this one with the same priors. By names alone it cannot
-#' be known whether the smaller model is a special case of the larger within the priors; where an added parameter ends
-#' at the edge of its range the chi-square distribution of the statistic does not hold, and `lr_note` says so. None of
-#' these criteria knows that a simulation has a discrepancy; `autocorrelation` (of the least-squares errors at one step)
+#' *The criteria.* The root mean squared error is that of the simulation averaged over the
+#' posterior, in calibration and on held-out rows. Likelihood, AIC, BIC and likelihood ratio are
+#' taken where the simulator itself (not its emulator) has the least squared error within the
+#' priors, as if errors were independent and normal with one unknown variance: k counts the
+#' parameters and that variance, as `AIC()` of an [lm()] does. The likelihood ratio is that against
+#' the last earlier model that is nested: whose parameters all stand in this one with the same
+#' priors. By names alone it cannot be known whether the smaller model is a special case of the
+#' larger within the priors; where an added parameter ends at the edge of its range the chi-square
+#' distribution of the statistic does not hold, and `lr_note` says so. None of these criteria knows
+#' that a simulation has a discrepancy; `autocorrelation` (of the least-squares errors at one step)
 #' shows how far they are from the independence that they take for granted.
 #'
-#' @param models A named list of simulators. Runs made elsewhere ([ensemble()]) are not compared here: calibrate each
-#'   and use [bayes_factor()].
+#' @param models A named list of simulators. Runs made elsewhere ([ensemble()]) are not compared
+#'   here: calibrate each and use [bayes_factor()].
 #' @param measurements The [measurements()].
-#' @param method `"paper"`: [calibrate_paper()] with its variance index; `"history"`: [calibrate()] and
-#'   [attribute_discrepancy()].
-#' @param runs Runs of the first design of each model. On top come those for predictions and the least-squares search
-#'   and, of `"history"`, where the runs are not used, of searches, regions and checks ([calibrate_refined()]).
-#'   `"paper"` is neither checked by runs nor refined.
-#' @param control List of lists: `emulator`, `calibration` and `attribution` (of `"history"` only), as the stages take
-#'   them.
-#' @param truth Of a synthetic record: a list of the `simulator` and the named `values` that made it, to be marked in
-#'   tables and figures; `NULL` if it is not known.
+#' @param method `"paper"`: [calibrate_paper()] with its variance index; `"history"`: [calibrate()]
+#'   and [attribute_discrepancy()].
+#' @param runs Runs of the first design of each model. On top come those for predictions and the
+#'   least-squares search and, of `"history"`, where the runs are not used, of searches, regions and
+#'   checks ([calibrate_refined()]). `"paper"` is neither checked by runs nor refined.
+#' @param control List of lists: `emulator`, `calibration` and `attribution` (of `"history"` only),
+#'   as the stages take them.
+#' @param truth Of a synthetic record: a list of the `simulator` and the named `values` that made
+#'   it, to be marked in tables and figures; `NULL` if it is not known.
 #' @inheritParams upgrade_model
-#' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`, `attribution`, `prediction`,
-#'   `scores`, `best` (the least-squares parameters) and, of a [zone()], draws of its `heat_loss` coefficient), and the
-#'   tables that `tidy()` gives:
-#'   * `"evidence"`: `log10_evidence` with `lower95` and `upper95`, `trusted`, `log10_bf` of the best model against the
-#'     second, of every other against the one ranked above it (that is `against`), with `bf_lower95`, `bf_upper95` and
-#'     `word`, `log10_bf_first` against the first model of the list, posterior `probability`, and `rank`;
-#'   * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`, `aic`, `bic`, `nested`,
-#'     `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`, `converged` (the least-squares search);
+#' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`,
+#'   `attribution`, `prediction`, `scores`, `best` (the least-squares parameters) and, of a
+#'   [zone()], draws of its `heat_loss` coefficient), and the tables that `tidy()` gives:
+#'   * `"evidence"`: `log10_evidence` with `lower95` and `upper95`, `trusted`, `log10_bf` of the
+#'     best model against the second, of every other against the one ranked above it (that is
+#'     `against`), with `bf_lower95`, `bf_upper95` and `word`, `log10_bf_first` against the first
+#'     model of the list, posterior `probability`, and `rank`;
+#'   * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`,
+#'     `aic`, `bic`, `nested`, `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`,
+#'     `converged` (the least-squares search);
 #'   * `"ranking"`: the rank of each model by each criterion;
-#'   * `"attribution"` (columns as in [calibrate_paper()], `index`, or in [attribute_discrepancy()]) and `"parameters"`,
-#'     with the column `model`.
+#'   * `"attribution"` (columns as in [calibrate_paper()], `index`, or in [attribute_discrepancy()])
+#'     and `"parameters"`, with the column `model`.
 #'
-#'   `heat_loss` holds 200 draws in W/K at the mean of each driver over the calibration rows. Name the wind's direction
-#'   as `circular(Wd)` in [measurements()]: otherwise degrees are averaged, and 350 and 10 give 180.
-#' @source Monari (2022), table 1 for the words. The likelihood criteria are those of [logLik()], [AIC()] and [BIC()].
+#'   `heat_loss` holds 200 draws in W/K at the mean of each driver over the calibration rows. Name
+#'   the wind's direction as `circular(Wd)` in [measurements()]: otherwise degrees are averaged, and
+#'   350 and 10 give 180.
+#' @source Monari (2022), table 1 for the words. The likelihood criteria are those of [logLik()],
+#'   [AIC()] and [BIC()].
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)
@@ -61,8 +68,8 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #'                control = list(calibration = list(ais = list(pilot_chains = 48, groups = 4))))
 #' @seealso [heat_loss_coefficient()], [report()], [figures]
 #' @export
-compare_models <- function(models, measurements, method = c("paper", "history"), runs = 150, control = NULL,
-                           seed = NULL, threads = 1,
+compare_models <- function(models, measurements, method = c("paper", "history"), runs = 150,
+                           control = NULL, seed = NULL, threads = 1,
                            quiet = FALSE, checkpoint = NULL, truth = NULL) {
   check_models(models)
   check_object(measurements, "amiss_measurements", "measurements")
@@ -79,7 +86,8 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
                    control = control, seed = seed, threads = threads)
   say <- progress(quiet)
   settings$keep <- checkpoint_keeper(checkpoint,
-                                     c(settings[c("measurements", "runs", "control", "seed")], method = method))
+                                     c(settings[c("measurements", "runs", "control", "seed")],
+                                       method = method))
   turn <- turns("model", length(models))
   compared <- sapply(names(models), function(name) {
     say("Calibrating {.strong {name}}")
@@ -92,8 +100,8 @@ compare_models <- function(models, measurements, method = c("paper", "history"),
   tables$ranking <- ranking_table(tables)
   tables$attribution <- bind_models(compared, function(model) model$attribution)
   tables$parameters <- bind_models(compared, function(model) parameter_rows(model$fit))
-  structure(list(format_version = format_version, method = method, models = compared, tables = tables,
-                 measurements = measurements,
+  structure(list(format_version = format_version, method = method, models = compared,
+                 tables = tables, measurements = measurements,
                  truth = truth, seed = seed, control = control), class = "amiss_comparison")
 }
 
@@ -119,32 +127,40 @@ compared_model <- function(simulator, name, settings) {
     prediction <- stats::predict(fit, seed = settings$seed, threads = settings$threads)
     list(name = name, fit = fit, attribution = attribution, prediction = prediction,
          scores = prediction_scores(prediction),
-         best = staged("least squares", least_squares(fit, settings$threads)), heat_loss = posterior_heat_loss(fit))
+         best = staged("least squares", least_squares(fit, settings$threads)),
+         heat_loss = posterior_heat_loss(fit))
   })
 }
 
-# By the paper's method from runs over the priors, the same for all models; by the package's own from a search.
+# By the paper's method from runs over the priors, the same for all models; by the package's own
+# from a search.
 compared_fit <- function(simulator, settings) settings$keep(list("fit", plain(simulator)), {
   m <- settings$measurements
   if (identical(settings$calibrate, calibrate)) {
     context <- new_context(settings$seed, settings$threads, settings$control)
-    calibrate_model(new_model(list(simulator), list(loop_record(m, settings$control$calibration))), context)$fit
+    calibrate_model(new_model(list(simulator), list(loop_record(m, settings$control$calibration))),
+                    context)$fit
   } else without_basis_warnings({
-    runs <- simulate_design(simulator, m, settings$runs, seed = settings$seed, threads = settings$threads)
+    runs <- simulate_design(simulator, m, settings$runs, seed = settings$seed,
+                            threads = settings$threads)
     emulator <- train_emulator(runs, m, settings$control$emulator, threads = settings$threads)
-    settings$calibrate(emulator, m, settings$control$calibration, seed = settings$seed, threads = settings$threads)
+    settings$calibrate(emulator, m, settings$control$calibration, seed = settings$seed,
+                       threads = settings$threads)
   })
 })
 
-# The heat loss coefficient at equally weighted posterior draws, in the mean wind of the calibration rows.
+# The heat loss coefficient at equally weighted posterior draws, in the mean wind of the calibration
+# rows.
 posterior_heat_loss <- function(fit, draws = 200) {
   simulator <- fit$emulator$simulator
   if (!inherits(simulator, "amiss_zone")) return(NULL)
   picked <- systematic_draws(fit$weights, draws)
-  heat_loss_coefficient(simulator, fit$values[picked, , drop = FALSE], mean_drivers(simulator, fit$measurements))
+  heat_loss_coefficient(simulator, fit$values[picked, , drop = FALSE],
+                        mean_drivers(simulator, fit$measurements))
 }
 
-# Means over the calibration rows; of what the boundary conditions call circular, the mean direction.
+# Means over the calibration rows; of what the boundary conditions call circular, the mean
+# direction.
 mean_drivers <- function(simulator, measurements) {
   raw <- measurements$raw
   rows <- raw$use == "calibrate"
@@ -172,8 +188,8 @@ evidence_table <- function(models) {
   }))
   data.frame(model = names(models), log10_evidence = value / ten, lower95 = interval[1, ] / ten,
              upper95 = interval[2, ] / ten,
-             trusted = vapply(models, function(m) m$fit$trust$trusted, NA), against = names(models)[rival],
-             log10_bf = factors$log10_bf,
+             trusted = vapply(models, function(m) m$fit$trust$trusted, NA),
+             against = names(models)[rival], log10_bf = factors$log10_bf,
              bf_lower95 = factors$lower95, bf_upper95 = factors$upper95, word = factors$word,
              log10_bf_first = (value - value[1]) / ten,
              probability = exp(value - max(value)) / sum(exp(value - max(value))),
@@ -182,18 +198,21 @@ evidence_table <- function(models) {
 
 criteria_table <- function(models) {
   criteria <- do.call(rbind, lapply(models, function(m) likelihood_criteria(m$best)))
-  ratios <- do.call(rbind, lapply(seq_along(models), function(i) likelihood_ratio(models, criteria, i)))
-  correlation <- vapply(models,
-                        function(m) lag_correlation(m$best$error, segment_starts(m$fit$measurements, m$fit$rows)), 0)
+  ratios <- do.call(rbind,
+                    lapply(seq_along(models), function(i) likelihood_ratio(models, criteria, i)))
+  correlation <- vapply(
+    models,
+    function(m) lag_correlation(m$best$error, segment_starts(m$fit$measurements, m$fit$rows)), 0)
   score <- function(use) vapply(models, function(m) m$scores[[use]][["rmse"]], 0)
-  data.frame(model = names(models), rmse_calibration = score("calibrate"), rmse_validation = score("validate"),
-             criteria, ratios,
-             autocorrelation = correlation, converged = vapply(models, function(m) m$best$converged, NA),
-             row.names = NULL)
+  data.frame(model = names(models), rmse_calibration = score("calibrate"),
+             rmse_validation = score("validate"), criteria, ratios,
+             autocorrelation = correlation,
+             converged = vapply(models, function(m) m$best$converged, NA), row.names = NULL)
 }
 
-criterion_names <- c(evidence = "evidence", rmse_calibration = "RMSE in calibration", rmse_validation = "RMSE held out",
-                     log_likelihood = "likelihood", aic = "AIC", bic = "BIC")
+criterion_names <- c(evidence = "evidence", rmse_calibration = "RMSE in calibration",
+                     rmse_validation = "RMSE held out", log_likelihood = "likelihood", aic = "AIC",
+                     bic = "BIC")
 
 # Ranks by each criterion, 1 the best.
 ranking_table <- function(tables) {
@@ -222,21 +241,25 @@ disagreements <- function(comparison) {
 
 best_model <- function(comparison) with(comparison$tables$evidence, model[which.min(rank)])
 
-# For each criterion, the share of pairs of models that it puts in another order than the evidence does.
+# For each criterion, the share of pairs of models that it puts in another order than the evidence
+# does.
 pairs_otherwise <- function(comparison) {
   ranks <- comparison$tables$ranking
   if (nrow(ranks) < 2) return(numeric())
   pairs <- utils::combn(nrow(ranks), 2)
-  order_of <- function(criterion) sign(ranks[[criterion]][pairs[1, ]] - ranks[[criterion]][pairs[2, ]])
+  order_of <- function(criterion)
+    sign(ranks[[criterion]][pairs[1, ]] - ranks[[criterion]][pairs[2, ]])
   others <- setdiff(names(ranks), c("model", "evidence"))
-  counts <- vapply(others, function(criterion) sum(order_of(criterion) * order_of("evidence") < 0), 0)
+  counts <- vapply(others, function(criterion) sum(order_of(criterion) * order_of("evidence") < 0),
+                   0)
   structure(counts[counts > 0], pairs = ncol(pairs))
 }
 
 # Where the likelihood ratio at 5 % prefers another model than the evidence does.
 ratio_disagreements <- function(comparison) {
   table <- comparison$tables$criteria
-  evidence <- stats::setNames(comparison$tables$evidence$log10_evidence, comparison$tables$evidence$model)
+  evidence <- stats::setNames(comparison$tables$evidence$log10_evidence,
+                              comparison$tables$evidence$model)
   table$log10_bf <- evidence[table$model] - evidence[table$nested]
   table[!is.na(table$lr_p_value) & (table$lr_p_value < 0.05) != (table$log10_bf > 0), ]
 }
@@ -244,22 +267,26 @@ ratio_disagreements <- function(comparison) {
 disagreement_sentences <- function(comparison) {
   first <- disagreements(comparison)
   best <- best_model(comparison)
-  told <- vapply(split(names(first), first), function(criteria) listed(unname(criterion_names[criteria])), "")
+  told <- vapply(split(names(first), first),
+                 function(criteria) listed(unname(criterion_names[criteria])), "")
   ratios <- ratio_disagreements(comparison)
   pairs <- pairs_otherwise(comparison)
-  c(if (length(first)) sprintf("%s would choose %s; the evidence chooses %s.", told, names(told), best),
+  c(if (length(first))
+      sprintf("%s would choose %s; the evidence chooses %s.", told, names(told), best),
     if (length(pairs)) {
       sprintf("Of %d pairs of models, %s in another order than the evidence.", attr(pairs, "pairs"),
               listed(sprintf("%s puts %d", criterion_names[names(pairs)], as.integer(pairs))))
     },
     if (nrow(ratios)) {
-      sprintf("The likelihood ratio test %s %s to %s (p = %s); the log10 Bayes factor between them is %s.",
-              ifelse(ratios$lr_p_value < 0.05, "prefers", "does not prefer"), ratios$model, ratios$nested,
-              format.pval(ratios$lr_p_value, 2, eps = 1e-4), signed(ratios$log10_bf))
+      sprintf(paste("The likelihood ratio test %s %s to %s (p = %s); the log10 Bayes factor",
+                    "between them is %s."),
+              ifelse(ratios$lr_p_value < 0.05, "prefers", "does not prefer"), ratios$model,
+              ratios$nested, format.pval(ratios$lr_p_value, 2, eps = 1e-4), signed(ratios$log10_bf))
     })
 }
 
-# What keeps a result from being trusted: the sampler, the basis, the emulator, priors too narrow, the search.
+# What keeps a result from being trusted: the sampler, the basis, the emulator, priors too narrow,
+# the search.
 doubt_sentences <- function(comparison) {
   of_each <- unlist(lapply(comparison$models, function(model) {
     doubts <- model_doubts(model)
@@ -268,8 +295,8 @@ doubt_sentences <- function(comparison) {
   edge <- comparison$tables$parameters[comparison$tables$parameters$at_edge, ]
   at_edge <- vapply(split(edge$label, factor(edge$model, unique(edge$model))), listed, "")
   c(of_each, if (nrow(edge)) {
-    sprintf(paste("At the edge of what was thought possible: %s. Widen these priors, or suspect that the parameters",
-                  "make up for something else."),
+    sprintf(paste("At the edge of what was thought possible: %s. Widen these priors, or suspect",
+                  "that the parameters make up for something else."),
             paste0(names(at_edge), ": ", at_edge, collapse = "; "))
   })
 }
@@ -286,21 +313,24 @@ model_doubts <- function(model) {
               beside(emulator$basis$discarded_rms))
     },
     if (emulator$diagnostics$series_rmse > 0.5 * noise)
-      sprintf("the emulator is rough (leave-one-out error %s).", beside(emulator$diagnostics$series_rmse)),
-    if (!model$best$converged)
-      paste("the search for the least squares did not settle; its likelihood is a lower bound, and with it AIC and BIC",
-            "are upper ones."))
+      sprintf("the emulator is rough (leave-one-out error %s).",
+              beside(emulator$diagnostics$series_rmse)),
+    if (!model$best$converged) paste("the search for the least squares did not settle; its",
+                                     "likelihood is a lower bound, and with it AIC and BIC are",
+                                     "upper ones."))
 }
 
 evidence_sentences <- function(comparison) {
   table <- comparison$tables$evidence
   best <- table[which.min(table$rank), ]
-  if (nrow(table) < 2) return(sprintf("log10 evidence of %s: %s [%s, %s].", best$model, signed(best$log10_evidence),
-                                      signed(best$lower95), signed(best$upper95)))
-  sprintf(paste("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s [%s, %s]; it holds %s of the",
-                "probability."),
+  if (nrow(table) < 2)
+    return(sprintf("log10 evidence of %s: %s [%s, %s].", best$model, signed(best$log10_evidence),
+                   signed(best$lower95), signed(best$upper95)))
+  sprintf(paste("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s [%s,",
+                "%s]; it holds %s of the probability."),
           best$model, best$against,
-          best$word, signed(best$log10_bf), signed(best$bf_lower95), signed(best$bf_upper95), percent(best$probability))
+          best$word, signed(best$log10_bf), signed(best$bf_lower95), signed(best$bf_upper95),
+          percent(best$probability))
 }
 
 #' @export
@@ -308,14 +338,16 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
   evidence <- x$tables$evidence
   criteria <- x$tables$criteria
   held_out <- !all(is.na(criteria$rmse_validation))
-  interval <- sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95, evidence$upper95,
-                      ifelse(evidence$trusted, "", " ?"))
-  table <- data.frame(model = evidence$model, log10_L = interval, P = sprintf("%.3f", evidence$probability),
+  interval <- sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95,
+                      evidence$upper95, ifelse(evidence$trusted, "", " ?"))
+  table <- data.frame(model = evidence$model, log10_L = interval,
+                      P = sprintf("%.3f", evidence$probability),
                       RMSE = short(criteria$rmse_calibration, 3))
   if (held_out) table$held_out <- short(criteria$rmse_validation, 3)
   p_value <- ifelse(is.na(criteria$lr_p_value), "", format.pval(criteria$lr_p_value, 2, eps = 1e-4))
   table <- cbind(table, AIC = round(criteria$aic), BIC = round(criteria$bic), LR_p = p_value)
-  cli::cli_text("{.strong Comparison} of {nrow(table)} model{?s} on {.val {x$measurements$name}} (method {x$method})")
+  cli::cli_text(paste("{.strong Comparison} of {nrow(table)} model{?s} on",
+                      "{.val {x$measurements$name}} (method {x$method})"))
   shown <- utils::head(order(evidence$rank), 6)
   say_table(table[sort(shown), ])
   doubts <- length(doubt_sentences(x))
@@ -359,19 +391,22 @@ glance.amiss_comparison <- function(x, ...) {
   check_whole(x, "x")
   rlang::check_dots_empty()
   best <- x$tables$evidence[which.min(x$tables$evidence$rank), ]
-  data.frame(best[c("model", "log10_evidence", "lower95", "upper95", "against", "log10_bf", "word", "probability",
-                    "trusted")],
+  data.frame(best[c("model", "log10_evidence", "lower95", "upper95", "against", "log10_bf",
+                    "word", "probability", "trusted")],
              models = length(x$models), n = length(x$models[[1]]$fit$rows),
-             disagreements = length(disagreements(x)) + nrow(ratio_disagreements(x)), row.names = NULL)
+             disagreements = length(disagreements(x)) + nrow(ratio_disagreements(x)),
+             row.names = NULL)
 }
 
 check_models <- function(models, call = rlang::caller_env()) {
   check_input(checkmate::check_list(models, min.len = 1, names = "unique"), "models",
-              "Give a named list of simulators, such as {.code list(M1 = zone(...), M2 = zone(...))}.", call = call)
+              paste("Give a named list of simulators, such as",
+                    "{.code list(M1 = zone(...), M2 = zone(...))}."), call = call)
   for (name in names(models)) {
     rlang::try_fetch(check_simulator(models[[name]], call), amiss_error_input = function(e) {
-      abort_input(c("Model {.val {name}} is no simulator but of class {.cls {class(models[[name]])}}.",
-                    i = "Make it with {.fun zone} or {.fun function_simulator}."), call = call)
+      abort_input(
+        c("Model {.val {name}} is no simulator but of class {.cls {class(models[[name]])}}.",
+          i = "Make it with {.fun zone} or {.fun function_simulator}."), call = call)
     })
   }
 }
@@ -383,8 +418,8 @@ check_truth <- function(truth, call = rlang::caller_env()) {
   check_input(checkmate::check_subset(c("simulator", "values"), names(truth)), "truth",
               "Give a list of a {.code simulator} and its {.code values}.", call = call)
   check_simulator(truth$simulator, call)
-  check_input(checkmate::check_numeric(truth$values, finite = TRUE, any.missing = FALSE, names = "unique"),
-              "truth$values", call = call)
+  check_input(checkmate::check_numeric(truth$values, finite = TRUE, any.missing = FALSE,
+                                       names = "unique"), "truth$values", call = call)
   absent <- setdiff(names(free_parameters(truth$simulator)), names(truth$values))
   if (length(absent)) {
     abort_input(c("{.arg truth$values} has no value for {.val {absent}}.",
@@ -404,5 +439,6 @@ validates <- function(comparison) !all(is.na(comparison$tables$criteria$rmse_val
 true_heat_loss <- function(comparison) {
   truth <- comparison$truth
   if (is.null(truth) || !inherits(truth$simulator, "amiss_zone")) return(NA_real_)
-  heat_loss_coefficient(truth$simulator, truth$values, mean_drivers(truth$simulator, comparison$measurements))
+  heat_loss_coefficient(truth$simulator, truth$values,
+                        mean_drivers(truth$simulator, comparison$measurements))
 }

@@ -1,13 +1,15 @@
-# Classed conditions. A message says what was wrong, where, the value seen and what to do; cli markup is
-# interpolated in the caller's frame.
+# Classed conditions. A message says what was wrong, where, the value seen and what to do; cli
+# markup is interpolated in the caller's frame.
 
-abort_input <- function(message, call = rlang::caller_env(), class = character(), .envir = parent.frame()) {
-  cli::cli_abort(message, class = c(class, "amiss_error_input", "amiss_error"), call = short_call(call),
-                 .envir = .envir)
+abort_input <- function(message, call = rlang::caller_env(), class = character(),
+                        .envir = parent.frame()) {
+  cli::cli_abort(message, class = c(class, "amiss_error_input", "amiss_error"),
+                 call = short_call(call), .envir = .envir)
 }
 
 abort_numerical <- function(message, call = rlang::caller_env(), .envir = parent.frame()) {
-  cli::cli_abort(message, class = c("amiss_error_numerical", "amiss_error"), call = short_call(call), .envir = .envir)
+  cli::cli_abort(message, class = c("amiss_error_numerical", "amiss_error"),
+                 call = short_call(call), .envir = .envir)
 }
 
 # The call as name(): without its arguments, which do.call() would print in full.
@@ -25,8 +27,8 @@ warn_result <- function(message, class = character(), .envir = parent.frame()) {
   cli::cli_warn(message, class = c(class, "amiss_warning_result", "amiss_warning"), .envir = .envir)
 }
 
-# The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own condition. The value that
-# it checks, its first argument, is told.
+# The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own
+# condition. The value that it checks, its first argument, is told.
 check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) {
   check <- substitute(verdict)
   checks <- is.call(check) && is.call(check[[1]]) && identical(check[[1]][[2]], quote(checkmate))
@@ -34,10 +36,12 @@ check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) 
   value <- if (checks) present(eval(check[[2]], frame), call)
   if (checks && is.character(value)) check_readable(value, name, call)
   kind <- if (checks) as.character(check[[1]][[3]]) else ""
-  if (isTRUE(verdict) && kind %in% number_checks) verdict <- plain_number(value, kind != "check_numeric")
+  if (isTRUE(verdict) && kind %in% number_checks)
+    verdict <- plain_number(value, kind != "check_numeric")
   if (isTRUE(verdict)) return(invisible(TRUE))
   told <- if (checks) value_words(value)
-  abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)), call = call)
+  abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)),
+              call = call)
 }
 
 # A value, or an error that names the argument that it needs and that was not given.
@@ -51,9 +55,11 @@ present <- function(value, call = rlang::caller_env()) {
 # Arguments without a default, in the order of their function.
 check_present <- function(..., call = rlang::caller_env()) present(list(...), call)
 
-# Of R's own error, which has no class before version 4.3 and is in the session's language; NULL of any other.
+# Of R's own error, which has no class before version 4.3 and is in the session's language; NULL of
+# any other.
 missing_argument <- function(e) {
-  words <- strsplit(gettext("argument \"%s\" is missing, with no default", domain = "R"), "%s", fixed = TRUE)[[1]]
+  words <- strsplit(gettext("argument \"%s\" is missing, with no default", domain = "R"), "%s",
+                    fixed = TRUE)[[1]]
   said <- conditionMessage(e)
   if (startsWith(said, words[1]) && endsWith(said, words[2])) {
     substr(said, nchar(words[1]) + 1, nchar(said) - nchar(words[2]))
@@ -64,12 +70,15 @@ missing_argument <- function(e) {
 check_readable <- function(text, name, call) {
   bad <- which(Encoding(text) == "bytes" | !validEnc(text))
   if (length(bad)) {
-    abort_input(c("{.arg {name}} cannot be used: {.val {one_line(text[bad[1]])}} holds bytes that are no characters.",
-                  i = "Say its encoding, as {.code iconv(x, \"latin1\", \"UTF-8\")} does."), call = call)
+    abort_input(c(paste("{.arg {name}} cannot be used: {.val {one_line(text[bad[1]])}} holds bytes",
+                        "that are no characters."),
+                  i = "Say its encoding, as {.code iconv(x, \"latin1\", \"UTF-8\")} does."),
+                call = call)
   }
 }
 
-# What the objects of the package are made of; another number, as an object read from a file may have, is refused.
+# What the objects of the package are made of; another number, as an object read from a file may
+# have, is refused.
 format_version <- 3L
 
 check_object <- function(x, classes, name, hint = NULL, call = rlang::caller_env()) {
@@ -77,26 +86,28 @@ check_object <- function(x, classes, name, hint = NULL, call = rlang::caller_env
   check_whole(x, name, hint, call)
 }
 
-# What reads an object of the package begins with this: its format is this version's, and none of its parts is missing
-# or damaged.
+# What reads an object of the package begins with this: its format is this version's, and none of
+# its parts is missing or damaged.
 check_whole <- function(x, name, hint = NULL, call = rlang::caller_env()) {
   version <- if (is.list(x)) unclass(x)[["format_version"]]
   if (!is.null(version) && !identical(version, format_version)) {
     told <- if (is.numeric(version) && length(version) == 1) format(version) else seen(version)
     abort_input(c("{.arg {name}} was made by another version of the package.",
                   x = "Its format is {told}; this version reads {.val {format_version}}.",
-                  i = "Make it again with this version."), class = "amiss_error_version", call = call)
+                  i = "Make it again with this version."),
+                class = "amiss_error_version", call = call)
   }
   fault <- object_fault(x)
   if (is.null(fault)) return(invisible(TRUE))
   wrong <- if (!is.null(fault$absent)) "it has no {.field {fault$absent}}."
-           else paste("its part {.field {fault$part}} is {seen(fault$value)}, and not {kind_words(fault$expected)} of",
-                      "the size that goes with the other parts.")
+           else paste("its part {.field {fault$part}} is {seen(fault$value)}, and not",
+                      "{kind_words(fault$expected)} of the size that goes with the other parts.")
   abort_input(c(paste("{.arg {name}} has the class {.cls {class(x)}}, but is not whole:", wrong),
                 i = hint %||% "Make it with the package's own function."), call = call)
 }
 
-# For checkmate dates, times, numbers with a unit or in other bits (integer64) and empty texts are numbers, too.
+# For checkmate dates, times, numbers with a unit or in other bits (integer64) and empty texts are
+# numbers, too.
 number_checks <- paste0("check_", c("number", "count", "int", "numeric"))
 
 plain_number <- function(x, single) {
@@ -107,7 +118,9 @@ plain_number <- function(x, single) {
 
 # " = value", or nothing for what is not told in a few words.
 value_words <- function(x) {
-  if (is.null(x) || is.atomic(x) && !is.object(x) && is.null(dim(x)) && length(x) <= 5) paste0(" = ", seen(x)) else ""
+  if (is.null(x) || is.atomic(x) && !is.object(x) && is.null(dim(x)) && length(x) <= 5)
+    paste0(" = ", seen(x))
+  else ""
 }
 
 # A value in a few words, whatever it is.
@@ -119,9 +132,12 @@ seen <- function(x) {
   paste0("<", class(x)[1], if (is.vector(x)) paste(" of length", length(x)), ">")
 }
 
-# Options travel as one list: defaults overwritten by what the user names; an unknown name is an error.
-merge_control <- function(defaults, control, what = "control", known = names(defaults), call = rlang::caller_env()) {
-  check_input(checkmate::check_list(control, null.ok = TRUE), what, "Give a list of named options.", call = call)
+# Options travel as one list: defaults overwritten by what the user names; an unknown name is an
+# error.
+merge_control <- function(defaults, control, what = "control", known = names(defaults),
+                          call = rlang::caller_env()) {
+  check_input(checkmate::check_list(control, null.ok = TRUE), what, "Give a list of named options.",
+              call = call)
   check_option_names(control, known, what, call)
   defaults[names(control)] <- control
   defaults
@@ -130,8 +146,9 @@ merge_control <- function(defaults, control, what = "control", known = names(def
 check_option_names <- function(control, known, what, call) {
   names <- rlang::names2(control)
   if (any(names == "")) {
-    abort_input(c("Every option in {.arg {what}} needs its name; number {which(names == '')[1]} has none.",
-                  i = "Known options: {.val {known}}."), call = call)
+    abort_input(c(paste("Every option in {.arg {what}} needs its name; number",
+                        "{which(names == '')[1]} has none."), i = "Known options: {.val {known}}."),
+                call = call)
   }
   unknown <- setdiff(names, known)
   if (length(unknown)) {
@@ -139,5 +156,6 @@ check_option_names <- function(control, known, what, call) {
                   i = "Known options: {.val {known}}."), call = call)
   }
   twice <- names[duplicated(names)]
-  if (length(twice)) abort_input("{.arg {what}} has the option {.val {twice[1]}} twice.", call = call)
+  if (length(twice))
+    abort_input("{.arg {what}} has the option {.val {twice[1]}} twice.", call = call)
 }

@@ -1,7 +1,8 @@
-# Coordinates z of the parameters in which a simulator is most nearly linear: of a flat prior the place between its
-# ends, from -sqrt(3) to sqrt(3), so that its variance is 1; of any other the normal quantile of the distribution before
-# it is cut at its limits, where z ends too. A prior with ends seen in normal quantiles of its own bends every simulator
-# there: the last thousandth of its range would be as long as all the rest.
+# Coordinates z of the parameters in which a simulator is most nearly linear: of a flat prior the
+# place between its ends, from -sqrt(3) to sqrt(3), so that its variance is 1; of any other the
+# normal quantile of the distribution before it is cut at its limits, where z ends too. A prior with
+# ends seen in normal quantiles of its own bends every simulator there: the last thousandth of its
+# range would be as long as all the rest.
 
 flat_limit <- sqrt(3)
 
@@ -10,19 +11,23 @@ is_flat <- function(prior) {
   if (prior$family == "uniform") return(TRUE)
   if (!is.finite(prior$lower) || !is.finite(prior$upper)) return(FALSE)
   switch(prior$family, normal = (prior$upper - prior$lower) < prior$parameters$sd,
-         lognormal = prior$lower > 0 && log(prior$upper / prior$lower) < prior$parameters$sdlog, FALSE)
+         lognormal = prior$lower > 0 && log(prior$upper / prior$lower) < prior$parameters$sdlog,
+         FALSE)
 }
 
 are_flat <- function(parameters) {
   vapply(parameters, function(p) is_flat(p$prior), NA, USE.NAMES = FALSE)
 }
 
-# The coordinates of parameters, one a row: whether the prior is `flat`; of any other the probability `below` and
-# `within` its limits before it was cut; and where z ends, `lower` and `upper`.
+# The coordinates of parameters, one a row: whether the prior is `flat`; of any other the
+# probability `below` and `within` its limits before it was cut; and where z ends, `lower` and
+# `upper`.
 coordinates_of <- function(parameters) {
   flat <- are_flat(parameters)
-  cut <- vapply(parameters, function(p) untruncated_cdf(p$prior, c(p$prior$lower, p$prior$upper)), numeric(2))
-  space <- data.frame(flat, below = ifelse(flat, 0, cut[1, ]), within = ifelse(flat, 1, cut[2, ] - cut[1, ]))
+  cut <- vapply(parameters, function(p) untruncated_cdf(p$prior, c(p$prior$lower, p$prior$upper)),
+                numeric(2))
+  space <- data.frame(flat, below = ifelse(flat, 0, cut[1, ]),
+                      within = ifelse(flat, 1, cut[2, ] - cut[1, ]))
   ends <- stats::pnorm(c(-1, 1) * rules$farthest)
   space$lower <- ifelse(flat, -flat_limit, stats::qnorm(space$below + ends[1] * space$within))
   space$upper <- ifelse(flat, flat_limit, stats::qnorm(space$below + ends[2] * space$within))
@@ -32,7 +37,8 @@ coordinates_of <- function(parameters) {
 # Points in the unit cube (one a row) in these coordinates, and back.
 from_unit <- function(unit, space) {
   n <- nrow(unit)
-  z <- to_normal(rep(space$below, each = n) + rep(space$within, each = n) * pmin(pmax(unit, 1e-15), 1 - 1e-15))
+  z <- to_normal(
+    rep(space$below, each = n) + rep(space$within, each = n) * pmin(pmax(unit, 1e-15), 1 - 1e-15))
   dim(z) <- dim(unit)
   z[, space$flat] <- 2 * flat_limit * (unit[, space$flat] - 0.5)
   z
@@ -45,17 +51,18 @@ to_unit <- function(z, space) {
   pmin(pmax(unit, 0), 1)
 }
 
-# dz/dx, x the normal quantile in a prior with its limits: 0 at its ends, beyond which nothing can move. `z`: one of
-# each parameter, or several of one.
+# dz/dx, x the normal quantile in a prior with its limits: 0 at its ends, beyond which nothing can
+# move. `z`: one of each parameter, or several of one.
 per_normal <- function(z, space) {
   space <- space[rep_len(seq_len(nrow(space)), length(z)), ]
   x <- stats::qnorm(as.numeric(to_unit(rbind(z), space)))
-  ifelse(space$flat, 2 * flat_limit * stats::dnorm(x), ifelse(is.finite(x), space$within * exp((z^2 - x^2) / 2), 0))
+  ifelse(space$flat, 2 * flat_limit * stats::dnorm(x),
+         ifelse(is.finite(x), space$within * exp((z^2 - x^2) / 2), 0))
 }
 
-# The most probable point of N(mean, precision^-1) between `lower` and `upper`, by an active set: of the coordinates
-# held at an end that one is let go from which the density rises fastest inwards; the others go to their best, or to the
-# first end in their way.
+# The most probable point of N(mean, precision^-1) between `lower` and `upper`, by an active set: of
+# the coordinates held at an end that one is let go from which the density rises fastest inwards;
+# the others go to their best, or to the first end in their way.
 within_limits <- function(mean, precision, space) {
   lower <- space$lower
   upper <- space$upper
@@ -65,7 +72,8 @@ within_limits <- function(mean, precision, space) {
     if (any(!held)) {
       pull <- -as.numeric(precision[!held, , drop = FALSE] %*% (z - mean))
       step <- solve(precision[!held, !held, drop = FALSE], pull)
-      room <- ifelse(step == 0, Inf, (ifelse(step > 0, upper[!held], lower[!held]) - z[!held]) / step)
+      room <- ifelse(step == 0, Inf,
+                     (ifelse(step > 0, upper[!held], lower[!held]) - z[!held]) / step)
       z[!held] <- z[!held] + min(1, room) * step
       if (min(room) < 1) {
         held[which(!held)[which.min(room)]] <- TRUE

@@ -1,18 +1,18 @@
 #' Diagnosis in words
 #'
-#' What is wrong, how sure that is, what would change, what it brings and what remains, as plain sentences and tables;
-#' [report()] sets it out.
+#' What is wrong, how sure that is, what would change, what it brings and what remains, as plain
+#' sentences and tables; [report()] sets it out.
 #'
 #' @param object An upgrade ([upgrade_model()]).
 #' @param x The summary.
 #' @param ... Not used.
-#' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`), `tag`, `headline`; the
-#'   sentences `record` (faults of the record), `note`, `sure`, `change`, `gain`, `remains` and `inspect` (what to
-#'   inspect next, to settle what is open);
-#'   `mechanisms`, for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits
-#'   `also` and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`, `attribution` and
-#'   `method`. Of several records the sentences and `scores` are in units of each one's noise, and `records` and
-#'   `of_records` have the scores of each in its own unit.
+#' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`),
+#'   `tag`, `headline`; the sentences `record` (faults of the record), `note`, `sure`, `change`,
+#'   `gain`, `remains` and `inspect` (what to inspect next, to settle what is open); `mechanisms`,
+#'   for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits
+#'   `also` and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`,
+#'   `attribution` and `method`. Of several records the sentences and `scores` are in units of each
+#'   one's noise, and `records` and `of_records` have the scores of each in its own unit.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -36,17 +36,17 @@ summary.amiss_upgrade <- function(object, ...) {
   verdict <- diagnosis_verdict(object)
   last <- object$models[[length(object$models)]]
   structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
-              list(record = record_faults(object), note = size_note(object), sure = sure_sentences(object),
-                   change = change_sentences(object), gain = gain_sentences(object),
-                   remains = remaining_sentences(object),
+              list(record = record_faults(object), note = size_note(object),
+                   sure = sure_sentences(object), change = change_sentences(object),
+                   gain = gain_sentences(object), remains = remaining_sentences(object),
                    inspect = upgrade_inspections(object),
-                   mechanisms = lapply(adopted_models(object), mechanism_words, object), scores = scores_table(object),
-                   changes = changes_table(object), candidates = candidates_words(object),
-                   parameters = parameters_words(last$fit), attribution = last$attribution$table,
-                   method = method_table(object),
+                   mechanisms = lapply(adopted_models(object), mechanism_words, object),
+                   scores = scores_table(object), changes = changes_table(object),
+                   candidates = candidates_words(object), parameters = parameters_words(last$fit),
+                   attribution = last$attribution$table, method = method_table(object),
                    stopped_because = object$stopped_because, seed = object$seed),
-              if (is_several(object$measurements)) list(of_records = record_sentences(object),
-                                                        records = record_scores(object))),
+              if (is_several(object$measurements))
+                list(of_records = record_sentences(object), records = record_scores(object))),
             class = "summary.amiss_upgrade")
 }
 
@@ -55,9 +55,9 @@ summary.amiss_upgrade <- function(object, ...) {
 print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$tag}")
   cli::cli_text("{x$headline}")
-  parts <- list("Faults of the record" = x$record, "How sure" = x$sure, "What would change" = x$change,
-                "What it brings" = c(x$gain, x$of_records), "What remains" = x$remains,
-                "What to inspect next" = x$inspect)
+  parts <- list("Faults of the record" = x$record, "How sure" = x$sure,
+                "What would change" = x$change, "What it brings" = c(x$gain, x$of_records),
+                "What remains" = x$remains, "What to inspect next" = x$inspect)
   say_parts(parts[lengths(parts) > 0])
 })
 
@@ -77,7 +77,8 @@ diagnosis_verdict <- function(upgrade) {
   faults <- record_doubt_words(ids)
   if (is.null(faults)) return(verdict)
   if (verdict$verdict != "likely") verdict$tag <- paste0(verdict$tag, "; ", faults)
-  verdict$headline <- paste0("Mend the record first: ", record_doubt_words(ids, "it"), ". ", verdict$headline)
+  verdict$headline <- paste0("Mend the record first: ", record_doubt_words(ids, "it"), ". ",
+                             verdict$headline)
   verdict
 }
 
@@ -96,9 +97,10 @@ mechanism_verdict <- function(upgrade) {
   likely <- of("likely")
   if (length(likely)) {
     tag <- if (describes(upgrade$catalogue[[likely[[1]]$mechanism]])) "Described, not explained"
-           else paste("Likely cause, but", paste(c(utils::head(likely[[1]]$doubts, 2),
-                                                   if (length(likely[[1]]$doubts) > 2) "more speaks against it"),
-                                                 collapse = "; "))
+           else paste("Likely cause, but",
+                      paste(c(utils::head(likely[[1]]$doubts, 2),
+                              if (length(likely[[1]]$doubts) > 2) "more speaks against it"),
+                            collapse = "; "))
     return(list(verdict = "likely", tag = tag, headline = headline))
   }
   list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
@@ -106,94 +108,107 @@ mechanism_verdict <- function(upgrade) {
 
 open_verdict <- function(upgrade) {
   explained <- if (is.null(upgrade$candidates)) "no mechanism was tried"
-               else if (unjudged(upgrade)) "whether a mechanism of the catalogue explains it cannot be told"
+               else if (unjudged(upgrade))
+                 "whether a mechanism of the catalogue explains it cannot be told"
                else "no mechanism of the catalogue explains it"
-  tag <- if (unjudged(upgrade)) "Unexplained; the emulator is not good enough to judge mechanisms" else "Unexplained"
+  tag <- if (unjudged(upgrade)) "Unexplained; the emulator is not good enough to judge mechanisms"
+         else "Unexplained"
   unexplained <- function(headline) list(verdict = "unexplained", tag = tag, headline = headline)
   base <- upgrade$models[[1]]
   answers <- significant_conditions(base$attribution$table)
   remainder <- remaining_error(base, upgrade$measurements)
   if (unjudged(upgrade) && remainder$large) {
-    return(unexplained(sprintf(paste("The error is %s times the stated noise%s. Whether something is missing from the",
-                                     "model or its parameters were not found cannot be told: its emulator is not good",
-                                     "enough."), short(remainder$ratio),
-                               if (length(answers)) paste(" and answers to", listed(answers)) else "")))
+    return(
+      unexplained(sprintf(paste("The error is %s times the stated noise%s. Whether something is",
+                                "missing from the model or its parameters were not found cannot be",
+                                "told: its emulator is not good enough."), short(remainder$ratio),
+                          if (length(answers)) paste(" and answers to", listed(answers)) else "")))
   }
   if (length(answers) && !remainder$large) {
-    return(unexplained(sprintf(paste("The error is of the size of the stated noise (%s times), but a part of it",
-                                     "answers to %s: something small is missing from the model, or its state at the",
-                                     "start is off, and %s."), short(remainder$ratio), listed(answers), explained)))
+    return(unexplained(sprintf(paste("The error is of the size of the stated noise (%s times), but",
+                                     "a part of it answers to %s: something small is missing from",
+                                     "the model, or its state at the start is off, and %s."),
+                               short(remainder$ratio), listed(answers), explained)))
   }
   if (length(answers)) {
-    return(unexplained(sprintf("Something that answers to %s is missing from the model, but %s.", listed(answers),
-                               explained)))
+    return(unexplained(sprintf("Something that answers to %s is missing from the model, but %s.",
+                               listed(answers), explained)))
   }
   if (remainder$large) {
-    return(unexplained(sprintf(paste("Something is missing from the model, and %s: its error is %s times the stated",
-                                     "noise; %s."), explained, short(remainder$ratio),
-                               remainder$pattern$what %||% "no response to a boundary condition was found in it")))
+    return(unexplained(
+      sprintf(paste("Something is missing from the model, and %s: its error is %s times the stated",
+                    "noise; %s."), explained, short(remainder$ratio),
+              remainder$pattern$what %||% "no response to a boundary condition was found in it")))
   }
   if (!base$fit$trust$trusted) {
     return(list(verdict = "nothing", tag = "Nothing decisive, but the numbers are not trusted",
-                headline = paste0("No mechanism is called for, but the numbers behind this are not to be trusted: ",
-                                  base$fit$trust$verdict, ".")))
+                headline = paste0("No mechanism is called for, but the numbers behind this are ",
+                                  "not to be trusted: ", base$fit$trust$verdict, ".")))
   }
-  nothing <- paste("no mechanism is called for, and the remaining error answers to no boundary condition")
+  nothing <- paste("no mechanism is called for, and the remaining error answers to no boundary",
+                   "condition")
   held_out <- held_out_excess(base, upgrade$measurements)
   if (!is.null(held_out)) {
-    return(list(verdict = "nothing", tag = "Nothing decisive in calibration; the error on held-out data is larger",
-                headline = sprintf("In calibration %s. But on held-out data the error is %s times as large.", nothing,
-                                   short(held_out))))
+    return(list(verdict = "nothing",
+                tag = "Nothing decisive in calibration; the error on held-out data is larger",
+                headline = sprintf(paste("In calibration %s. But on held-out data the error is %s",
+                                         "times as large."), nothing, short(held_out))))
   }
-  list(verdict = "nothing", tag = "Nothing decisive", headline = sprintf("Nothing decisive is wrong: %s.", nothing))
+  list(verdict = "nothing", tag = "Nothing decisive",
+       headline = sprintf("Nothing decisive is wrong: %s.", nothing))
 }
 
 # The sentences of all mechanisms adopted, each as firmly as its verdict allows.
 cause_headline <- function(upgrade) {
   adopted <- adopted_models(upgrade)
   sentence <- function(m) upgrade$catalogue[[m$mechanism]]$sentence
-  adopted <- adopted[order(match(vapply(adopted, `[[`, "", "verdict"), c("named", "likely", "stand-in")))]
+  adopted <- adopted[order(match(vapply(adopted, `[[`, "", "verdict"),
+                                 c("named", "likely", "stand-in")))]
   told <- vapply(seq_along(adopted), function(k) {
     m <- adopted[[k]]
     switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
            likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
-           paste0("\"", m$mechanism, "\" fits", if (k > 1) " too",
-                  ", but data held out do not gain by it: take it as a stand-in for something else."))
+           paste0("\"", m$mechanism, "\" fits", if (k > 1) " too", ", but data held out do not ",
+                  "gain by it: take it as a stand-in for something else."))
   }, "")
   paste(told, collapse = " ")
 }
 
-# TRUE where no data were held out, or the changes as a whole lower their error by more than its own error.
+# TRUE where no data were held out, or the changes as a whole lower their error by more than its own
+# error.
 improves_held_out <- function(upgrade) {
   last <- upgrade$models[[length(upgrade$models)]]
   !isFALSE(held_out_gain(upgrade$models[[1]], last)$improves)
 }
 
 evidence_sentence <- function(row) {
-  sprintf("The evidence for %s over no change is %s: odds of %s%s.", row$mechanism, row$word, odds(row$log10_bf),
-          odds_interval(c(row$lower95, row$upper95)))
+  sprintf("The evidence for %s over no change is %s: odds of %s%s.", row$mechanism, row$word,
+          odds(row$log10_bf), odds_interval(c(row$lower95, row$upper95)))
 }
 
 sure_sentences <- function(upgrade) {
-  if (is.null(upgrade$candidates)) return("No mechanism was tried, so that no cause could be found.")
+  if (is.null(upgrade$candidates))
+    return("No mechanism was tried, so that no cause could be found.")
   trials <- first_trials(upgrade)
   if (!nrow(trials)) return(c(missing_sentence(upgrade), "No mechanism could be computed."))
   adopted <- adopted_models(upgrade)
   best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
-  needed <-
-    sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95 %% interval that lies",
-                  "wholly in its favour."),
-            sub(" in favour", "", odds(upgrade$control$decisive)))
+  needed <- sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95",
+                          "%% interval that lies wholly in its favour."),
+                    sub(" in favour", "", odds(upgrade$control$decisive)))
   if (!length(adopted)) {
-    if (unjudged(upgrade)) return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
+    if (unjudged(upgrade))
+      return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
     if (keeps_error(best)) needed <- raised_sentence(best)
     else if (is_refuted(best)) needed <- refuted_sentence(best)
-    else if (is_unverified(best, upgrade)) needed <- "It was not adopted, because no runs were left to verify it."
-    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best), needed,
-             trust_sentence(upgrade, best)))
+    else if (is_unverified(best, upgrade))
+      needed <- "It was not adopted, because no runs were left to verify it."
+    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best),
+             needed, trust_sentence(upgrade, best)))
   }
   each <- unlist(lapply(adopted, function(m) {
-    row <- upgrade$candidates[upgrade$candidates$from == m$parent & upgrade$candidates$mechanism == m$mechanism, ]
+    row <- upgrade$candidates[upgrade$candidates$from == m$parent &
+                              upgrade$candidates$mechanism == m$mechanism, ]
     evidence_sentence(row)
   }))
   first <- trials[1, ]
@@ -203,14 +218,14 @@ sure_sentences <- function(upgrade) {
 }
 
 raised_sentence <- function(row, when = "") {
-  sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration does not fall",
-                "(%s times as large): what is gained, the discrepancy gains."), when, row$mechanism,
-          short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
+  sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration",
+                "does not fall (%s times as large): what is gained, the discrepancy gains."),
+          when, row$mechanism, short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
 }
 
 refuted_sentence <- function(row) {
-  sprintf(paste("It was not adopted, because an unknown response to what drives it does better: beside that, its log10",
-                "Bayes factor is %s."), signed(row$beside_unknown))
+  sprintf(paste("It was not adopted, because an unknown response to what drives it does better:",
+                "beside that, its log10 Bayes factor is %s."), signed(row$beside_unknown))
 }
 
 unjudged_sentence <- function(fit) {
@@ -220,17 +235,18 @@ unjudged_sentence <- function(fit) {
           gsub("not trusted: ", "", fit$trust$verdict), remedy)
 }
 
-# Only where the size of the error itself says that something is missing, and not that the parameters were not found.
+# Only where the size of the error itself says that something is missing, and not that the
+# parameters were not found.
 missing_sentence <- function(upgrade) {
   if (unjudged(upgrade)) return(NULL)
   left <- remaining_error(upgrade$models[[1]], upgrade$measurements)
-  if (left$large)
-    sprintf("That something is missing is plain: the error is %s times the stated noise. What it is stays open.",
-            short(left$ratio))
+  if (left$large) sprintf(paste("That something is missing is plain: the error is %s times the",
+                                "stated noise. What it is stays open."), short(left$ratio))
 }
 
 probability_sentence <- function(trials) {
-  all <- stats::setNames(c(trials$probability, max(0, 1 - sum(trials$probability))), c(trials$mechanism, "no change"))
+  all <- stats::setNames(c(trials$probability, max(0, 1 - sum(trials$probability))),
+                         c(trials$mechanism, "no change"))
   all <- sort(all, decreasing = TRUE)
   near <- all[-1][all[-1] >= 0.01]
   told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
@@ -240,20 +256,23 @@ probability_sentence <- function(trials) {
          if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
 }
 
-# Whether the numbers behind the first decision can be trusted, in words; if not, whether the decision hangs on it.
+# Whether the numbers behind the first decision can be trusted, in words; if not, whether the
+# decision hangs on it.
 trust_sentence <- function(upgrade, best) {
   base <- upgrade$models[[1]]$fit$trust
   if (base$trusted && best$trusted) {
     open <- open_trials(upgrade)
     return(paste0("The numbers behind this can be trusted: the sampler passed its own checks.",
-                  if (NROW(open)) sprintf(" Not so those of %s, which %s not adopted: see what to inspect next.",
-                                          listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
+                  if (NROW(open))
+                    sprintf(" Not so those of %s, which %s not adopted: see what to inspect next.",
+                            listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
   }
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
   why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
-  sprintf("The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
-          if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
-          else "The decision may hang on it: more runs or chains would settle it.")
+  sprintf(
+    "The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
+    if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
+    else "The decision may hang on it: more runs or chains would settle it.")
 }
 
 # How large the matter is, beside the noise and on data held out.
@@ -267,13 +286,14 @@ size_note <- function(upgrade) {
   if (length(seen) < 2) return(sprintf("The model's typical error is %s; %s.", told(seen), noise))
   change <- if (length(upgrade$models) > 2) "changes" else "change"
   if (!improves_held_out(upgrade)) {
-    return(sprintf(paste("The %s not improve predictions of data the model has not seen (typical error %s before,",
-                         "%s after; %s). Take it as a hint, not as a repair."),
+    return(sprintf(paste("The %s not improve predictions of data the model has not seen (typical",
+                         "error %s before, %s after; %s). Take it as a hint, not as a repair."),
                    if (length(upgrade$models) > 2) "changes do" else "change does", told(held[1]),
                    told(held[2]), noise))
   }
   if (anyNA(held))
-    sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit), noise)
+    sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit),
+            noise)
   else sprintf("With the %s the typical error on data the model has not seen %s; %s.", change,
                change_words(held[1], held[2], m$unit), noise)
 }
@@ -286,21 +306,22 @@ change_sentences <- function(upgrade) {
     row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
     entry <- upgrade$catalogue[[model$mechanism]]
     driven <- if (length(entry$boundary)) paste0(", driven by ", listed(entry$boundary)) else ""
-    c(sprintf("%s (%s)%s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, driven, entry$sentence,
-              row$word, odds(row$log10_bf)),
-      description_sentence(entry, last_fit(upgrade)), step_sentence(upgrade, model), doubt_sentence(model),
-      confounded_sentence(model))
+    c(sprintf("%s (%s)%s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, driven,
+              entry$sentence, row$word, odds(row$log10_bf)),
+      description_sentence(entry, last_fit(upgrade)), step_sentence(upgrade, model),
+      doubt_sentence(model), confounded_sentence(model))
   }))
 }
 
 # All that is told of one mechanism.
 mechanism_words <- function(model, upgrade) {
-  row <- upgrade$candidates[upgrade$candidates$from == model$parent & upgrade$candidates$mechanism == model$mechanism, ]
+  row <- upgrade$candidates[upgrade$candidates$from == model$parent &
+                            upgrade$candidates$mechanism == model$mechanism, ]
   entry <- upgrade$catalogue[[model$mechanism]]
   changes <- changes_table(upgrade)
   list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
-       sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))), collapse = " "),
-       evidence = evidence_sentence(row),
+       sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))),
+                        collapse = " "), evidence = evidence_sentence(row),
        brought = step_sentence(upgrade, model), against = doubt_sentence(model),
        also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
        inspect = mechanism_inspections(upgrade, model),
@@ -311,11 +332,13 @@ mechanism_words <- function(model, upgrade) {
 rival_sentence <- function(upgrade, model) {
   trials <- upgrade$candidates[upgrade$candidates$from == model$parent, ]
   others <- trials[trials$mechanism != model$mechanism, ]
-  kept <- stats::setNames(c(others$probability, max(0, 1 - sum(trials$probability))), c(others$mechanism, "no change"))
+  kept <- stats::setNames(c(others$probability, max(0, 1 - sum(trials$probability))),
+                          c(others$mechanism, "no change"))
   kept <- sort(kept[kept >= 0.01], decreasing = TRUE)
-  if (!length(kept))
-    return("Neither another mechanism tried at this step nor \"no change\" keeps one per cent of the probability.")
-  sprintf("At this step %s too: %s.", if (length(kept) > 1) "others are possible" else "another is possible",
+  if (!length(kept)) return(paste("Neither another mechanism tried at this step nor \"no change\"",
+                                  "keeps one per cent of the probability."))
+  sprintf("At this step %s too: %s.",
+          if (length(kept) > 1) "others are possible" else "another is possible",
           listed(paste0(names(kept), " (", percent(unname(kept)), ")")))
 }
 
@@ -323,16 +346,18 @@ rival_sentence <- function(upgrade, model) {
 step_sentence <- function(upgrade, model) {
   parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
   unit <- upgrade$measurements$unit
-  told <- function(use) change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
+  told <- function(use)
+    change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
   gain <- model$held_out_gain
   sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
-          if (is.na(gain$improves)) "" else sprintf("; on held-out data it %s, %s", told("validate"),
-                                                    if (gain$mean > 0) gain_words(gain) else "no gain"))
+          if (is.na(gain$improves)) ""
+          else sprintf("; on held-out data it %s, %s", told("validate"),
+                       if (gain$mean > 0) gain_words(gain) else "no gain"))
 }
 
 gain_words <- function(gain) {
-  if (gain$standard_error > 0) sprintf("a gain of %s standard errors", short(gain$mean / gain$standard_error))
-  else "a gain"
+  if (gain$standard_error > 0) sprintf("a gain of %s standard errors",
+                                       short(gain$mean / gain$standard_error)) else "a gain"
 }
 
 doubt_sentence <- function(model) {
@@ -352,26 +377,31 @@ gain_sentences <- function(upgrade) {
   held <- score_of(upgrade, "validate", "rmse")
   inside <- score_of(upgrade, if (anyNA(held)) "calibrate" else "validate", "coverage95")
   inside <- round(100 * inside[length(inside)])
-  told <- function(v) if (length(v) < 2) paste("is", with_unit(short(v), unit)) else change_words(v[1], v[2], unit)
+  told <- function(v)
+    if (length(v) < 2) paste("is", with_unit(short(v), unit)) else change_words(v[1], v[2], unit)
   c(paste0("The typical error (RMSE) ", told(seen), " in calibration",
            if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
     nearest_run_sentence(upgrade),
-    if (anyNA(held)) "No data were held out, so that it is not known how well the model predicts what it has not seen.",
+    if (anyNA(held)) paste("No data were held out, so that it is not known how well the model",
+                           "predicts what it has not seen."),
     sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside,
             if (anyNA(held)) "calibration" else "held-out",
-            if (inside < 88) paste0(": ",
-                                    narrow_words(upgrade)) else if (inside == 100) ": the band is rather wide" else ""))
+            if (inside < 88) paste0(": ", narrow_words(upgrade))
+            else if (inside == 100) ": the band is rather wide"
+            else ""))
 }
 
-# Where the base model's discrepancy, and not its parameters, follows the record, other values of them come nearer.
+# Where the base model's discrepancy, and not its parameters, follows the record, other values of
+# them come nearer.
 nearest_run_sentence <- function(upgrade) {
   base <- upgrade$models[[1]]
   if (length(upgrade$models) < 2 || is_several(upgrade$measurements)) return(NULL)
-  nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)), nearest_run, 0, base$fit))
+  nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)),
+                        nearest_run, 0, base$fit))
   if (nearest > 0.9 * base$scores$calibrate[["rmse"]]) return(NULL)
-  sprintf(paste("A part of this fall is not due to the change: the base model has a run that errs by only %s in",
-                "calibration, and may have better ones. Calibrated it errs by more, as a part of its error was left to",
-                "the discrepancy."),
+  sprintf(paste("A part of this fall is not due to the change: the base model has a run that errs",
+                "by only %s in calibration, and may have better ones. Calibrated it errs by more,",
+                "as a part of its error was left to the discrepancy."),
           with_unit(short(nearest), upgrade$measurements$unit))
 }
 
@@ -394,9 +424,10 @@ narrow_words <- function(upgrade) {
   p <- p[p$use == if (has_validation(upgrade)) "validate" else "calibrate", ]
   bias <- mean(p$observed - p$mean)
   several <- is_several(upgrade$measurements)
-  if (several || abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2))) return("the band is too narrow")
-  sprintf("the simulation is on average %s too %s there", with_unit(short(abs(bias)), upgrade$measurements$unit),
-          if (bias > 0) "low" else "high")
+  if (several || abs(bias) < 0.5 * sqrt(mean((p$observed - p$mean)^2)))
+    return("the band is too narrow")
+  sprintf("the simulation is on average %s too %s there",
+          with_unit(short(abs(bias)), upgrade$measurements$unit), if (bias > 0) "low" else "high")
 }
 
 remaining_sentences <- function(upgrade) {
@@ -406,23 +437,25 @@ remaining_sentences <- function(upgrade) {
   edge <- rows$label[rows$at_edge]
   moved <- step_moved_words(model)
   last <- remaining_error(model, upgrade$measurements)
-  c(if (length(answers)) sprintf("The remaining error answers to %s.",
-                                 listed(answers)) else "The remaining error answers to no boundary condition.",
-    if (last$large) sprintf("In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
-                            if (is.null(last$pattern))
-                              paste0(": either the stated noise is too small, or something else is missing",
-                                     if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
-                            else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
+  c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers))
+    else "The remaining error answers to no boundary condition.",
+    if (last$large) sprintf(
+      "In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
+      if (is.null(last$pattern))
+        paste0(": either the stated noise is too small, or something else is missing",
+               if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
+      else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
     reach_sentence(model$fit) %||% if (last$large)
-      "The parameters may have taken the place of what is missing: do not read their values as physical.",
+                                     paste("The parameters may have taken the place of what is",
+                                           "missing: do not read their values as physical."),
     if (!is.null(moved))
       sprintf("With finer steps of the simulator %s: do not read %s as physical.", moved,
               if (length(step_moved(model)) > 1) "these values" else "this value"),
     vapply(group_words(model$attribution), paste0, "", "."),
-    if (length(edge))
-      sprintf(paste("At the edge of what was thought possible: %s. Widen these ranges, or suspect that these",
-                    "parameters make up for something else."),
-              listed(edge))
+    if (length(edge)) sprintf(paste("At the edge of what was thought possible: %s. Widen these",
+                                    "ranges, or suspect that these parameters make up for",
+                                    "something else."),
+                              listed(edge))
     else "No parameter is at the edge of its range.",
     sprintf("The search stopped because %s%s.",
             upgrade$stopped_reason,
@@ -432,23 +465,28 @@ remaining_sentences <- function(upgrade) {
 #' @export
 print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   adopted <- adopted_models(x)
-  cli::cli_text("{.strong Upgrade} of {.val {x$measurements$name}}: {length(adopted)} mechanism{?s} adopted")
+  cli::cli_text(
+    "{.strong Upgrade} of {.val {x$measurements$name}}: {length(adopted)} mechanism{?s} adopted")
   cli::cli_bullets(c("*" = "{diagnosis_verdict(x)$tag}"))
   listed_alone <- if (length(adopted) > 8) 7 else length(adopted)
   for (model in adopted[seq_len(listed_alone)]) {
-    row <- x$candidates[x$candidates$from == model$parent & x$candidates$mechanism == model$mechanism, ]
+    row <- x$candidates[x$candidates$from == model$parent &
+                        x$candidates$mechanism == model$mechanism, ]
     boundary <- x$catalogue[[model$mechanism]]$boundary
     driven <- if (length(boundary)) sprintf(" (%s)", listed(boundary)) else ""
-    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}{driven}, log10 Bayes factor",
-                                   "{round(row$log10_bf, 1)}")))
+    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}{driven}, log10",
+                                   "Bayes factor {round(row$log10_bf, 1)}")))
   }
-  others <- vapply(adopted[-seq_len(listed_alone)], function(model) paste(model$verdict, model$mechanism), "")
+  others <- vapply(adopted[-seq_len(listed_alone)],
+                   function(model) paste(model$verdict, model$mechanism), "")
   if (length(others)) cli::cli_bullets(c("*" = "{others}"))
-  told <- unlist(lapply(x$catalogue[vapply(adopted, `[[`, "", "mechanism")], description_sentence, last_fit(x)))
+  told <- unlist(lapply(x$catalogue[vapply(adopted, `[[`, "", "mechanism")], description_sentence,
+                        last_fit(x)))
   for (sentence in told) cli::cli_bullets(c("*" = "{sentence}"))
   for (fault in utils::head(record_faults(x), 3)) cli::cli_bullets(c("!" = "{fault}"))
   g <- x$gain
-  errors <- function(rmse) if (length(adopted)) paste(signif(rmse, 3), collapse = " -> ") else signif(rmse[1], 3)
+  errors <- function(rmse)
+    if (length(adopted)) paste(signif(rmse, 3), collapse = " -> ") else signif(rmse[1], 3)
   cli::cli_bullets(c("*" = paste0("RMSE {errors(g$rmse_calibration)} in calibration, ",
                                   if (has_validation(x)) "{errors(g$rmse_validation)} held out"
                                   else "no data held out",

@@ -22,7 +22,8 @@ changes_table <- function(upgrade) {
   models <- upgrade$models
   last <- parameters_words(models[[length(models)]]$fit)
   rows <- lapply(seq_along(models)[-1], function(k) {
-    new <- setdiff(names(drawn_parameters(models[[k]]$fit)), names(drawn_parameters(models[[k - 1]]$fit)))
+    new <- setdiff(names(drawn_parameters(models[[k]]$fit)),
+                   names(drawn_parameters(models[[k - 1]]$fit)))
     brought <- last[last$name %in% new, ]
     if (nrow(brought)) cbind(mechanism = models[[k]]$mechanism, brought)
   })
@@ -31,15 +32,17 @@ changes_table <- function(upgrade) {
 
 parameters_words <- function(fit) {
   rows <- parameter_rows(fit)
-  data.frame(name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit), median = short(rows$median, 3),
-             "95 % interval" = interval_words(rows$lower95, rows$upper95, 3),
-             "range thought possible" = interval_words(rows$prior_lower, rows$prior_upper, 3),
-             note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
+  data.frame(
+    name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit),
+    median = short(rows$median, 3), "95 % interval" = interval_words(rows$lower95, rows$upper95, 3),
+    "range thought possible" = interval_words(rows$prior_lower, rows$prior_upper, 3),
+    note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
 }
 
 scores_table <- function(upgrade) {
   table <- gain_table(upgrade)
-  values <- stats::xtabs(seq_len(nrow(table)) ~ paste(table$panel, table$use, sep = ", ") + table$stage)
+  values <- stats::xtabs(
+    seq_len(nrow(table)) ~ paste(table$panel, table$use, sep = ", ") + table$stage)
   keys <- unique(paste(table$panel, table$use, sep = ", "))
   columns <- lapply(levels(table$stage), function(s) as.character(table$label[values[keys, s]]))
   cbind(score = keys, as.data.frame(stats::setNames(columns, levels(table$stage)), optional = TRUE))
@@ -50,7 +53,8 @@ candidates_words <- function(upgrade) {
   table <- candidate_table(upgrade)
   if (!nrow(table)) return(NULL)
   table <- table[order(table$step, -table$log10_bf), ]
-  drives <- vapply(table$mechanism, function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
+  drives <- vapply(table$mechanism,
+                   function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
              "log10 Bayes factor" = signed(table$log10_bf),
              "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)),
@@ -58,7 +62,8 @@ candidates_words <- function(upgrade) {
              "beside an unknown response" = signed(table$beside_unknown),
              probability = percent(table$probability),
              "error in calibration" = error_words(table$error_ratio),
-             estimate = ifelse(table$judged_by == "runs", "verified", ifelse(table$trusted, "trial", "rough")),
+             estimate = ifelse(table$judged_by == "runs", "verified",
+                               ifelse(table$trusted, "trial", "rough")),
              decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
 }
 
@@ -68,7 +73,8 @@ error_words <- function(ratio) ifelse(is.na(ratio), "", paste(short(ratio), "tim
 # The scores of each of several records, in its own unit.
 record_scores <- function(upgrade) {
   names <- names(upgrade$measurements$records)
-  tables <- lapply(names, function(name) cbind(record = name, scores_table(record_upgrade(upgrade, name))))
+  tables <- lapply(names,
+                   function(name) cbind(record = name, scores_table(record_upgrade(upgrade, name))))
   columns <- unique(unlist(lapply(tables, names)))
   do.call(rbind, lapply(tables, function(table) {
     table[setdiff(columns, names(table))] <- ""
@@ -88,11 +94,12 @@ method_table <- function(upgrade) {
   }
   columns <- unlist(lapply(upgrade$models, function(model) {
     fits <- record_fits(model$fit)
-    stats::setNames(lapply(fits, value), paste0(model$name, if (length(names(fits))) paste(":", names(fits))))
+    stats::setNames(lapply(fits, value),
+                    paste0(model$name, if (length(names(fits))) paste(":", names(fits))))
   }), recursive = FALSE)
-  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q", "runs of the simulator, M",
-                     "stated measurement noise",
-                     "part of the runs that the Q vectors leave out (RMS)", "log10 evidence (95 % interval)",
-                     "emulator", "trust"),
+  cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q",
+                     "runs of the simulator, M", "stated measurement noise",
+                     "part of the runs that the Q vectors leave out (RMS)",
+                     "log10 evidence (95 % interval)", "emulator", "trust"),
         as.data.frame(columns, optional = TRUE))
 }

@@ -1,14 +1,15 @@
 #' The discrepancy over time
 #'
-#' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean of its parameters,
-#' and the whole response to the boundary conditions that the model lacks, with a 95 % band.
+#' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean
+#' of its parameters, and the whole response to the boundary conditions that the model lacks, with a
+#' 95 % band.
 #'
 #' Of a calibration as in the paper the discrepancy is that of equation 8, at the same time step.
 #'
 #' @param fit A calibration ([calibrate()], [calibrate_paper()]).
-#' @return An object of class `amiss_discrepancy`: `series`, a data frame with the columns `time`, `observed`,
-#'   `simulated`, `residual`, `discrepancy`, `lower95` and `upper95`; `responses`, one column for each condition (`NULL`
-#'   for the paper's, which has no sum of responses).
+#' @return An object of class `amiss_discrepancy`: `series`, a data frame with the columns `time`,
+#'   `observed`, `simulated`, `residual`, `discrepancy`, `lower95` and `upper95`; `responses`, one
+#'   column for each condition (`NULL` for the paper's, which has no sum of responses).
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -33,8 +34,8 @@ discrepancy <- function(fit) {
   new_discrepancy(fit, rowMeans(draws), limits[1, ], limits[2, ], responses)
 }
 
-# Response to the boundary conditions for each kept draw (rows x draws), given the filter bank and simulator_moves() at
-# these rows.
+# Response to the boundary conditions for each kept draw (rows x draws), given the filter bank and
+# simulator_moves() at these rows.
 lacking_response <- function(fit, responses, moves) {
   phi <- sweep(sweep(responses, 2, fit$centre), 2, fit$scale, "/")
   phi %*% fit$coefficients - moves %*% fit$withheld
@@ -44,9 +45,11 @@ new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
   m <- fit$measurements
   simulated <- simulated_mean(fit)
   series <- data.frame(time = m$time[fit$rows], observed = m$y[fit$rows], simulated = simulated,
-                       residual = m$y[fit$rows] - simulated, discrepancy = mean, lower95 = lower95, upper95 = upper95)
-  structure(list(format_version = format_version, series = series, responses = responses, segment = m$segment[fit$rows],
-                 target = m$target, unit = m$unit), class = "amiss_discrepancy")
+                       residual = m$y[fit$rows] - simulated, discrepancy = mean, lower95 = lower95,
+                       upper95 = upper95)
+  structure(list(format_version = format_version, series = series, responses = responses,
+                 segment = m$segment[fit$rows], target = m$target, unit = m$unit),
+            class = "amiss_discrepancy")
 }
 
 # Mean and variance over posterior draws of the hyper-parameters, by the law of total variance.
@@ -55,8 +58,8 @@ paper_discrepancy <- function(fit, draws = 24) {
   picked <- systematic_draws(hyper$weights, draws)
   of <- call_engine(paper_discrepancy_(
     paper_data(fit$emulator, fit$measurements, fit$rows, fit$control), fit$priors,
-    list(alpha = hyper$alpha[picked, , drop = FALSE], t2 = hyper$t2[picked], lambda = hyper$lambda[picked]),
-    engine_context(fit$seed, 1)))
+    list(alpha = hyper$alpha[picked, , drop = FALSE], t2 = hyper$t2[picked],
+         lambda = hyper$lambda[picked]), engine_context(fit$seed, 1)))
   mean <- rowMeans(of$mean)
   sd <- sqrt(rowMeans(of$variance) + rowMeans((of$mean - mean)^2))
   new_discrepancy(fit, mean, mean - 1.96 * sd, mean + 1.96 * sd)
@@ -64,9 +67,10 @@ paper_discrepancy <- function(fit, draws = 24) {
 
 #' @export
 print.amiss_discrepancy <- function(x, ...) on_stdout(x, {
-  cli::cli_text(paste("{.strong Discrepancy} of {.field {x$target}} over {nrow(x$series)} steps: residual RMS",
-                      "{signif(sqrt(mean(x$series$residual^2)), 3)} {x$unit}, of which",
-                      "{signif(sqrt(mean(x$series$discrepancy^2)), 3)} answers to boundary conditions"))
+  cli::cli_text(paste("{.strong Discrepancy} of {.field {x$target}} over {nrow(x$series)} steps:",
+                      "residual RMS {signif(sqrt(mean(x$series$residual^2)), 3)} {x$unit}, of",
+                      "which {signif(sqrt(mean(x$series$discrepancy^2)), 3)} answers to boundary",
+                      "conditions"))
   cli::cli_bullets(c(">" = "next: {.fun plot} or {.fun attribute_discrepancy}"))
 })
 

@@ -1,7 +1,7 @@
 #' Design and runs: an ensemble of simulations
 #'
-#' Draws a Latin hypercube over the priors and runs the simulator at each point. Runs that were made elsewhere enter by
-#' [ensemble()].
+#' Draws a Latin hypercube over the priors and runs the simulator at each point. Runs that were made
+#' elsewhere enter by [ensemble()].
 #'
 #' @param simulator A simulator: [zone()], [function_simulator()].
 #' @param measurements [measurements()]; the simulator is driven by them.
@@ -9,10 +9,11 @@
 #' @param seed Seed of the design; if `NULL`, R's generator gives one.
 #' @param threads Number of threads.
 #' @param quiet No progress messages.
-#' @return An object of class `amiss_ensemble`: parameter values, their places in the unit cube and the outputs at
-#'   the calibration rows (one column per run).
-#' @source McKay, Beckman and Conover (1979), A comparison of three methods for selecting values of input variables in
-#'   the analysis of output from a computer code, Technometrics 21, 239-245; drawn by package lhs.
+#' @return An object of class `amiss_ensemble`: parameter values, their places in the unit cube and
+#'   the outputs at the calibration rows (one column per run).
+#' @source McKay, Beckman and Conover (1979), A comparison of three methods for selecting values of
+#'   input variables in the analysis of output from a computer code, Technometrics 21, 239-245;
+#'   drawn by package lhs.
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
@@ -20,7 +21,8 @@
 #'                              free("gain", uniform(0, 1)), boundary = "Te")
 #' simulate_design(linear, room, runs = 12, seed = 1)
 #' @export
-simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1, quiet = FALSE) {
+simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1,
+                            quiet = FALSE) {
   hush(quiet)
   check_simulator(simulator)
   check_object(measurements, "amiss_measurements", "measurements")
@@ -35,31 +37,35 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
   unit <- with_seed(seed, lhs::randomLHS(runs, length(parameters)))
   values <- unit_to_values(unit, parameters)
   outputs <- simulate_measured(simulator, values, measurements, "calibrate", threads)
-  new_ensemble(parameters, unit, values, outputs, simulator, seed, hours = row_hours(measurements, "calibrate"))
+  new_ensemble(parameters, unit, values, outputs, simulator, seed,
+               hours = row_hours(measurements, "calibrate"))
 }
 
 #' Runs that were made elsewhere
 #'
-#' A design and its runs as an ensemble. Given runs at the validation rows too, a calibration of them predicts held-out
-#' rows, and [upgrade_model()] judges mechanisms by them, each another set of runs.
+#' A design and its runs as an ensemble. Given runs at the validation rows too, a calibration of
+#' them predicts held-out rows, and [upgrade_model()] judges mechanisms by them, each another set of
+#' runs.
 #'
-#' With the `measurements`, `outputs` may hold their calibration rows, calibration and validation rows in the order of
-#' the record, all rows, or all rows of the data before they were averaged: then the runs are averaged alike. With
-#' `time` rows may stand in any order, and what the measurements do not use may be there too. Either way the ensemble
-#' keeps the times of its rows, and is refused for measurements of others.
+#' With the `measurements`, `outputs` may hold their calibration rows, calibration and validation
+#' rows in the order of the record, all rows, or all rows of the data before they were averaged:
+#' then the runs are averaged alike. With `time` rows may stand in any order, and what the
+#' measurements do not use may be there too. Either way the ensemble keeps the times of its rows,
+#' and is refused for measurements of others.
 #'
-#' @param design Matrix or data frame of parameter values, one run a row, named columns; at least five runs, and two
-#'   more than there are parameters.
-#' @param outputs Matrix or data frame of outputs, one run a column (one that is not finite is left out, with a
-#'   warning): at the calibration rows of the measurements (those that calibrate
-#'   and have a target), or as said below.
-#' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not given, each gets a
-#'   uniform prior over the range of its column.
-#' @param measurements The [measurements()] that the runs are compared with. Without them `outputs` are taken to be at
-#'   the calibration rows, and validation rows are not known.
-#' @param validation Matrix of outputs at the validation rows, one run a column, if `outputs` does not hold them.
-#' @param time Times of the rows of `outputs`, and then of `validation`: anything that [measurements()] reads, as in the
-#'   data.
+#' @param design Matrix or data frame of parameter values, one run a row, named columns; at least
+#'   five runs, and two more than there are parameters.
+#' @param outputs Matrix or data frame of outputs, one run a column (one that is not finite is left
+#'   out, with a warning): at the calibration rows of the measurements (those that calibrate and
+#'   have a target), or as said below.
+#' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not
+#'   given, each gets a uniform prior over the range of its column.
+#' @param measurements The [measurements()] that the runs are compared with. Without them `outputs`
+#'   are taken to be at the calibration rows, and validation rows are not known.
+#' @param validation Matrix of outputs at the validation rows, one run a column, if `outputs` does
+#'   not hold them.
+#' @param time Times of the rows of `outputs`, and then of `validation`: anything that
+#'   [measurements()] reads, as in the data.
 #' @return An object of class `amiss_ensemble`; `held_out` holds its runs at the validation rows.
 #' @seealso [read_calibro()]
 #' @examples
@@ -74,11 +80,12 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #'                  control = list(ais = list(pilot_chains = 48, groups = 4)))
 #' head(predict(fit, use = "validate"))
 #' @export
-ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL, time = NULL) {
+ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL,
+                     time = NULL) {
   check_present(design, outputs)
   design <- as_number_matrix(design)
-  check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1, col.names = "unique"),
-              "design")
+  check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1,
+                                      col.names = "unique"), "design")
   check_all_finite(design, "design")
   storage.mode(design) <- "double"
   outputs <- check_runs(outputs, "outputs", nrow(design))
@@ -87,9 +94,11 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
   check_enough_runs(nrow(unique(design)), ncol(design), nrow(design))
   if (is.null(parameters)) {
     for (name in colnames(design)) check_varies(name, design[, name])
-    parameters <- lapply(colnames(design), function(name) free(name, uniform(min(design[, name]), max(design[, name]))))
+    parameters <- lapply(colnames(design), function(name) free(
+      name, uniform(min(design[, name]), max(design[, name]))))
   }
-  check_input(checkmate::check_list(parameters), "parameters", "Give a list of parameters, each made by {.fun free}.")
+  check_input(checkmate::check_list(parameters), "parameters",
+              "Give a list of parameters, each made by {.fun free}.")
   parameters <- named_parameters(parameters)
   check_design_columns(colnames(design), names(parameters))
   values <- design[, names(parameters), drop = FALSE]
@@ -100,17 +109,19 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
   uncovered <- uncovered_statement(made)
   if (!is.null(uncovered)) {
     warn_input(c("{toupper(substr(uncovered, 1, 1))}{substring(uncovered, 2)}.",
-                 i = "The emulator extrapolates over the rest: add runs there or narrow the prior."))
+                 i = paste("The emulator extrapolates over the rest: add runs there or narrow the",
+                           "prior.")))
   }
   made
 }
 
-# A run that is given again, point and output, says nothing new: left out, its twin would seem to be foreseen.
+# A run that is given again, point and output, says nothing new: left out, its twin would seem to be
+# foreseen.
 without_repeats <- function(ensemble) {
   again <- duplicated(cbind(ensemble$unit, t(ensemble$outputs)))
   if (!any(again)) return(ensemble)
-  warn_input(c("{sum(again)} of {length(again)} runs stand{?s/} in {.arg design} and {.arg outputs} more than once.",
-               i = "Each counts once."))
+  warn_input(c(paste("{sum(again)} of {length(again)} runs stand{?s/} in {.arg design} and",
+                     "{.arg outputs} more than once."), i = "Each counts once."))
   ensemble$unit <- ensemble$unit[!again, , drop = FALSE]
   ensemble$values <- ensemble$values[!again, , drop = FALSE]
   ensemble$outputs <- ensemble$outputs[, !again, drop = FALSE]
@@ -125,8 +136,8 @@ check_runs <- function(outputs, name, runs, call = rlang::caller_env()) {
   check_input(checkmate::check_matrix(outputs, "numeric", min.rows = 1), name, call = call)
   storage.mode(outputs) <- "double"
   if (runs != ncol(outputs)) {
-    abort_input(c(paste("{.arg design} has {runs} rows and {.arg {name}} {ncol(outputs)} columns; each row of the",
-                        "design needs its run."),
+    abort_input(c(paste("{.arg design} has {runs} rows and {.arg {name}} {ncol(outputs)} columns;",
+                        "each row of the design needs its run."),
                   i = "Give the outputs as one column per run."), call = call)
   }
   unname(outputs)
@@ -143,12 +154,14 @@ check_all_finite <- function(x, name, call = rlang::caller_env()) {
 
 check_design_columns <- function(columns, parameters, call = rlang::caller_env()) {
   absent <- setdiff(parameters, columns)
-  if (length(absent)) abort_input("{.arg design} lacks {cli::qty(absent)}column{?s} {.val {absent}}.", call = call)
+  if (length(absent))
+    abort_input("{.arg design} lacks {cli::qty(absent)}column{?s} {.val {absent}}.", call = call)
   unknown <- setdiff(columns, parameters)
   if (length(unknown)) {
-    abort_input(c(paste("{.arg design} has {cli::qty(unknown)}column{?s} {.val {unknown}} without a parameter; the",
-                        "runs vary with {?it/them} nevertheless."),
-                  i = "Declare {cli::qty(unknown)}{?it/them} by {.fun free} in {.arg parameters}."), call = call)
+    abort_input(c(paste("{.arg design} has {cli::qty(unknown)}column{?s} {.val {unknown}} without",
+                        "a parameter; the runs vary with {?it/them} nevertheless."),
+                  i = "Declare {cli::qty(unknown)}{?it/them} by {.fun free} in {.arg parameters}."),
+                call = call)
   }
 }
 
@@ -159,13 +172,15 @@ places_in_priors <- function(values, parameters, call = rlang::caller_env()) {
     prior <- parameters[[name]]$prior
     outside <- which(values[, name] < prior$lower | values[, name] > prior$upper)
     if (length(outside) == nrow(values)) {
-      abort_input(c(paste("No run lies where the prior of {.val {name}} has mass: {format(prior)}, while the runs span",
-                          "{signif(min(values[, name]), 4)} to {signif(max(values[, name]), 4)}."),
+      abort_input(c(paste("No run lies where the prior of {.val {name}} has mass: {format(prior)},",
+                          "while the runs span {signif(min(values[, name]), 4)} to",
+                          "{signif(max(values[, name]), 4)}."),
                     i = "Correct the prior or make runs inside it."), call = call)
     }
     if (length(outside)) {
-      abort_input(c(paste("{length(outside)} run{?s} lie{?s/} outside the prior of {.val {name}}, {format(prior)};",
-                          "the first is run {outside[1]} with value {values[outside[1], name]}."),
+      abort_input(c(paste("{length(outside)} run{?s} lie{?s/} outside the prior of {.val {name}},",
+                          "{format(prior)}; the first is run {outside[1]} with value",
+                          "{values[outside[1], name]}."),
                     i = "Widen the prior or leave these runs out."), call = call)
     }
     unit[, name] <- prior_cdf(prior, values[, name])
@@ -174,12 +189,14 @@ places_in_priors <- function(values, parameters, call = rlang::caller_env()) {
   unit
 }
 
-# Runs by the use of their rows: list(calibrate, hours, held_out), the last list(outputs, hours) or NULL.
+# Runs by the use of their rows: list(calibrate, hours, held_out), the last list(outputs, hours) or
+# NULL.
 place_runs <- function(outputs, validation, measurements, time, call = rlang::caller_env()) {
-  if (!is.null(measurements)) check_object(measurements, "amiss_measurements", "measurements", call = call)
+  if (!is.null(measurements))
+    check_object(measurements, "amiss_measurements", "measurements", call = call)
   if (is.null(measurements)) {
-    if (!is.null(validation)) abort_input(paste("{.arg validation} needs {.arg measurements}, which say what its rows",
-                                                "are."), call = call)
+    if (!is.null(validation)) abort_input(paste("{.arg validation} needs {.arg measurements},",
+                                                "which say what its rows are."), call = call)
     hours <- if (!is.null(time)) row_times(time, nrow(outputs), NULL, call)
     return(list(calibrate = outputs, hours = hours))
   }
@@ -198,25 +215,29 @@ place_runs <- function(outputs, validation, measurements, time, call = rlang::ca
 }
 
 row_times <- function(time, rows, measurements, call) {
-  hours <- time_hours(read_time(time, "time", measurements$time_format, measurements$time_zone, call))
-  if (length(hours) != rows) abort_input(paste("{.arg time} has {length(hours)} value{?s}, the runs have {rows}",
-                                               "row{?s}."), call = call)
+  hours <- time_hours(read_time(time, "time", measurements$time_format,
+                                measurements$time_zone, call))
+  if (length(hours) != rows) abort_input(paste("{.arg time} has {length(hours)} value{?s}, the",
+                                               "runs have {rows} row{?s}."), call = call)
   hours
 }
 
 row_hours <- function(measurements, use) measurements$hours[used_rows(measurements, use)]
 
-# Runs at each row of the (averaged) record, NA where there are none: what the rows are is told by how many there are.
+# Runs at each row of the (averaged) record, NA where there are none: what the rows are is told by
+# how many there are.
 runs_by_count <- function(outputs, validation, measurements, call) {
   m <- measurements
   record <- matrix(NA_real_, length(m$y), ncol(outputs))
-  rows <- list(calibration = used_rows(m, "calibrate"), validation = used_rows(m, "validate"), record = seq_along(m$y))
+  rows <- list(calibration = used_rows(m, "calibrate"), validation = used_rows(m, "validate"),
+               record = seq_along(m$y))
   if (!is.null(validation)) {
     if (nrow(outputs) != length(rows$calibration) || nrow(validation) != length(rows$validation)) {
-      abort_input(c(paste("{.arg outputs} has {nrow(outputs)} rows and {.arg validation} {nrow(validation)}; the",
-                          "measurements have {length(rows$calibration)} calibration and {length(rows$validation)}",
-                          "validation rows."),
-                    i = "Give the runs at exactly these rows, or the {.arg time} of each."), call = call)
+      abort_input(c(paste("{.arg outputs} has {nrow(outputs)} rows and {.arg validation}",
+                          "{nrow(validation)}; the measurements have {length(rows$calibration)}",
+                          "calibration and {length(rows$validation)} validation rows."),
+                    i = "Give the runs at exactly these rows, or the {.arg time} of each."),
+                  call = call)
     }
     record[unlist(rows[1:2]), ] <- rbind(outputs, validation)
     return(record)
@@ -225,18 +246,20 @@ runs_by_count <- function(outputs, validation, measurements, call) {
   kinds <- list(rows$calibration, sort(c(rows$calibration, rows$validation)), rows$record)
   kind <- match(nrow(outputs), lengths(kinds))
   if (is.na(kind)) {
-    readings <- if (m$per_step > 1) paste0(", and ", length(m$raw$hours), " before they were averaged") else ""
-    abort_input(c(paste("The runs have {nrow(outputs)} rows; the measurements have {length(rows$calibration)}",
-                        "calibration and {length(rows$validation)} validation rows, of {length(m$y)} in",
-                        "all{readings}."),
-                  i = paste("Give the runs at the calibration rows, at both, or at all; or the {.arg time} of each",
-                            "row.")), call = call)
+    readings <- if (m$per_step > 1) paste0(", and ", length(m$raw$hours),
+                                           " before they were averaged") else ""
+    abort_input(c(paste("The runs have {nrow(outputs)} rows; the measurements have",
+                        "{length(rows$calibration)} calibration and {length(rows$validation)}",
+                        "validation rows, of {length(m$y)} in all{readings}."),
+                  i = paste("Give the runs at the calibration rows, at both, or at all; or the",
+                            "{.arg time} of each row.")), call = call)
   }
   record[kinds[[kind]], ] <- outputs
   record
 }
 
-averaged_runs <- function(fine, measurements) unname(block_means(fine, measurements$block, measurements$per_step))
+averaged_runs <- function(fine, measurements)
+  unname(block_means(fine, measurements$block, measurements$per_step))
 
 runs_by_time <- function(runs, hours, measurements, call) {
   m <- measurements
@@ -249,12 +272,11 @@ runs_by_time <- function(runs, hours, measurements, call) {
     wanted <- used_rows(m, use)
     absent <- wanted[is.na(rows[wanted])]
     if (!length(absent) || use == "validate" && length(absent) == length(wanted)) next
-    abort_input(
-      c(paste("The runs lack {length(absent)} of the {length(wanted)} rows of the measurements that {use}; the",
-                        "first is at {format(m$time[absent[1]])}."),
-                  i = paste("The runs span {signif(min(hours), 8)} to {signif(max(hours), 8)} h and the measurements",
-                            "{signif(min(m$hours), 8)} to {signif(max(m$hours), 8)} h: check time zone and step.")),
-                            call = call)
+    abort_input(c(paste("The runs lack {length(absent)} of the {length(wanted)} rows of the",
+                        "measurements that {use}; the first is at {format(m$time[absent[1]])}."),
+                  i = paste("The runs span {signif(min(hours), 8)} to {signif(max(hours), 8)} h",
+                            "and the measurements {signif(min(m$hours), 8)} to",
+                            "{signif(max(m$hours), 8)} h: check time zone and step.")), call = call)
   }
   if (fine) averaged_runs(runs[raw, , drop = FALSE], m) else runs[rows, , drop = FALSE]
 }
@@ -266,18 +288,19 @@ check_same_rows <- function(hours, measurements, use = "calibrate", call = rlang
   same <- length(hours) == length(expected) && all(abs(hours - expected) < 1e-6)
   if (same) return(invisible())
   differs <- if (length(hours) == length(expected)) which(abs(hours - expected) >= 1e-6)[1] else 1
-  abort_input(c(paste("The runs were made at other rows than those of the measurements that {use}: row {differs} is",
-                      "at {signif(hours[differs], 8)} h in the runs, at {signif(expected[differs], 8)} h in the",
-                      "measurements."),
-                i = "Use the measurements that the ensemble was made with, or make the runs anew."), call = call)
+  abort_input(c(paste("The runs were made at other rows than those of the measurements that {use}:",
+                      "row {differs} is at {signif(hours[differs], 8)} h in the runs, at",
+                      "{signif(expected[differs], 8)} h in the measurements."),
+                i = "Use the measurements that the ensemble was made with, or make the runs anew."),
+              call = call)
 }
 
 # Whether an ensemble has the calibration rows of the measurements.
 check_ensemble_rows <- function(ensemble, measurements, call = rlang::caller_env()) {
   rows <- used_rows(measurements, "calibrate")
   if (nrow(ensemble$outputs) != length(rows)) {
-    abort_input(c(paste("The runs have {nrow(ensemble$outputs)} steps and the measurements {length(rows)}",
-                        "calibration rows."),
+    abort_input(c(paste("The runs have {nrow(ensemble$outputs)} steps and the measurements",
+                        "{length(rows)} calibration rows."),
                   i = "Give the runs at exactly these rows."), call = call)
   }
   check_same_rows(ensemble$hours, measurements, call = call)
@@ -285,7 +308,8 @@ check_ensemble_rows <- function(ensemble, measurements, call = rlang::caller_env
 
 check_varies <- function(name, values, call = rlang::caller_env()) {
   if (diff(range(values)) == 0) {
-    abort_input(c("Parameter {.val {name}} has the same value, {signif(values[1], 4)}, in all {length(values)} runs.",
+    abort_input(c(paste("Parameter {.val {name}} has the same value, {signif(values[1], 4)}, in",
+                        "all {length(values)} runs."),
                   i = "Vary it, or leave it out of the design."), call = call)
   }
 }
@@ -295,15 +319,16 @@ check_covered <- function(name, prior, values, unit, call = rlang::caller_env())
   check_varies(name, values, call)
   share <- diff(range(unit))
   if (share < 0.05) {
-    abort_input(c(paste("The runs lie where the prior of {.val {name}} has next to no mass: {format(prior)} has",
-                        "{signif(100 * share, 2)} % of it between {signif(min(values), 4)} and",
-                        "{signif(max(values), 4)}."),
+    abort_input(c(paste("The runs lie where the prior of {.val {name}} has next to no mass:",
+                        "{format(prior)} has {signif(100 * share, 2)} % of it between",
+                        "{signif(min(values), 4)} and {signif(max(values), 4)}."),
                   i = "Correct the prior or make runs where its mass is."), call = call)
   }
 }
 
-# The parameters whose prior reaches further than the runs, or NULL. Of M points scattered over the prior, the range
-# holds a Beta(M - 1, 2) share of its mass: what happens to one design in a thousand, and leaves out a tenth, is told.
+# The parameters whose prior reaches further than the runs, or NULL. Of M points scattered over the
+# prior, the range holds a Beta(M - 1, 2) share of its mass: what happens to one design in a
+# thousand, and leaves out a tenth, is told.
 uncovered_statement <- function(ensemble) {
   if (!is.null(ensemble$region)) return(NULL)
   runs <- nrow(ensemble$unit)
@@ -312,8 +337,8 @@ uncovered_statement <- function(ensemble) {
   if (!length(little)) return(NULL)
   spans <- vapply(little, function(p) {
     span <- format(signif(range(ensemble$values[, p]), 4))
-    sprintf("%.0f %% of the prior of %s (from %s to %s)", 100 * share[p], names(ensemble$parameters)[p],
-            trimws(span[1]), trimws(span[2]))
+    sprintf("%.0f %% of the prior of %s (from %s to %s)", 100 * share[p],
+            names(ensemble$parameters)[p], trimws(span[1]), trimws(span[2]))
   }, "")
   paste("the runs cover only", paste(spans, collapse = ", "))
 }
@@ -324,55 +349,61 @@ check_enough_runs <- function(runs, parameters, given = runs, call = rlang::call
   if (runs >= least) return(invisible())
   points <- if (given > runs) " at {runs} distinct point{?s}" else ""
   own <- if (given > runs) ", each at a point of its own"
-  abort_input(c(paste0("{given} run{?s}", points, " {cli::qty(given)}{?is/are} too few for {parameters} ",
-                       "parameter{?s}; at least {least} are needed", own, "."),
+  abort_input(c(paste0("{given} run{?s}", points, " {cli::qty(given)}{?is/are} too few for ",
+                       "{parameters} parameter{?s}; at least {least} are needed", own, "."),
                 i = "Ten times the number of parameters is a good start."), call = call)
 }
 
 unit_to_values <- function(unit, parameters) {
-  values <- vapply(seq_along(parameters), function(p) prior_quantile(parameters[[p]]$prior, unit[, p]),
+  values <- vapply(seq_along(parameters),
+                   function(p) prior_quantile(parameters[[p]]$prior, unit[, p]),
                    numeric(nrow(unit)))
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
 }
 
-# `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do; `hours`: times of the
-# rows, if known; `held_out`: given runs at the validation rows.
-new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL, over_priors = NULL,
-                         hours = NULL, held_out = NULL, call = rlang::caller_env()) {
+# `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do;
+# `hours`: times of the rows, if known; `held_out`: given runs at the validation rows.
+new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL,
+                         over_priors = NULL, hours = NULL, held_out = NULL,
+                         call = rlang::caller_env()) {
   everything <- rbind(outputs, held_out$outputs)
   failed <- which(colSums(!is.finite(everything)) > 0)
   if (length(failed)) {
     left <- ncol(outputs) - length(failed)
     row <- which(!is.finite(everything[, failed[1]]))[1]
-    first <- paste("The first is run {failed[1]} at {point_words(values[failed[1], , drop = FALSE])}: its row {row}",
-                   "is {everything[row, failed[1]]}.")
+    first <- paste("The first is run {failed[1]} at",
+                   "{point_words(values[failed[1], , drop = FALSE])}: its row {row} is",
+                   "{everything[row, failed[1]]}.")
     if (left < max(5, length(parameters) + 2)) {
-      abort_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite; {left} usable",
-                          "run{?s} {?is/are} too few."),
+      abort_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not",
+                          "finite; {left} usable run{?s} {?is/are} too few."),
                     x = first,
                     i = if (left) "Find out why the simulator fails there, or narrow the priors."
-                        else "Every run failed: look for a mistake in the simulator before you change its priors."),
-                  call = call)
+                        else paste("Every run failed: look for a mistake in the simulator before",
+                                   "you change its priors.")), call = call)
     }
-    warn_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite and {?is/are} left",
-                       "out."), i = first))
+    warn_input(c(paste("{length(failed)} of {ncol(outputs)} runs hold values that are not finite",
+                       "and {?is/are} left out."), i = first))
     outputs <- outputs[, -failed, drop = FALSE]
     if (!is.null(held_out)) held_out$outputs <- held_out$outputs[, -failed, drop = FALSE]
     unit <- unit[-failed, , drop = FALSE]
     values <- values[-failed, , drop = FALSE]
   }
-  structure(list(format_version = format_version, parameters = parameters, unit = unit, values = values,
-                 outputs = outputs,
+  structure(list(format_version = format_version, parameters = parameters, unit = unit,
+                 values = values, outputs = outputs,
                  simulator = simulator, failed = length(failed), seed = seed, region = region,
-                 over_priors = over_priors, hours = hours, held_out = held_out), class = "amiss_ensemble")
+                 over_priors = over_priors, hours = hours, held_out = held_out),
+            class = "amiss_ensemble")
 }
 
 #' @export
 print.amiss_ensemble <- function(x, ...) on_stdout(x, {
   cli::cli_text(paste("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over",
-                      "{length(x$parameters)} parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}"))
+                      "{length(x$parameters)}",
+                      "parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}"))
   cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}",
                      if (!is.null(x$region)) c("*" = "in the region where a posterior lies"),
-                     if (!is.null(x$held_out)) c("*" = "and at {nrow(x$held_out$outputs)} validation steps"),
+                     if (!is.null(x$held_out))
+                       c("*" = "and at {nrow(x$held_out$outputs)} validation steps"),
                      ">" = "next: {.fun train_emulator}"))
 })

@@ -1,12 +1,13 @@
 #' Bayes factor of two calibrated models
 #'
-#' Both evidences are densities of the same measured record, so that models with different bases may be compared. The
-#' words are those of Monari (2022), table 1, for what the whole interval supports: a Bayes factor of 10^3.6 that may as
-#' well be 10^-18 is "undecided".
+#' Both evidences are densities of the same measured record, so that models with different bases may
+#' be compared. The words are those of Monari (2022), table 1, for what the whole interval supports:
+#' a Bayes factor of 10^3.6 that may as well be 10^-18 is "undecided".
 #'
 #' @param model,reference Calibrations on the same measurements by the same method ([calibrate()] or
 #'   [calibrate_paper()]).
-#' @return A one-row data frame: `log10_bf` in favour of `model`, its 95 % interval `lower95`, `upper95`, and `word`.
+#' @return A one-row data frame: `log10_bf` in favour of `model`, its 95 % interval `lower95`,
+#'   `upper95`, and `word`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -30,13 +31,13 @@ bayes_factor <- function(model, reference) {
     check_object(fits[[name]], c("amiss_fit", "amiss_joint"), name)
   lapply(fits, check_not_part)
   if (!identical(class(model)[1], class(reference)[1])) {
-    abort_input(
-      c("{.arg model} and {.arg reference} were calibrated by different methods; their evidences cannot be compared.",
+    abort_input(c(paste("{.arg model} and {.arg reference} were calibrated by different methods;",
+                        "their evidences cannot be compared."),
                   i = "Use {.fun calibrate} for both, or {.fun calibrate_paper}."))
   }
   if (!identical(calibrated_record(model), calibrated_record(reference))) {
-    abort_input(c("The two models were calibrated on different records; their evidences cannot be compared.",
-                  i = "Calibrate both on the same measurements."))
+    abort_input(c(paste("The two models were calibrated on different records; their evidences",
+                        "cannot be compared."), i = "Calibrate both on the same measurements."))
   }
   factor_of(model, reference)
 }
@@ -59,14 +60,15 @@ evidence_word <- function(lower, upper) {
 
 #' Evidence for bridgesampling
 #'
-#' `logml()` and `bf()` of the package `bridgesampling` for calibrations, whose evidence comes from annealed importance
-#' sampling. [bayes_factor()] gives the interval as well.
+#' `logml()` and `bf()` of the package `bridgesampling` for calibrations, whose evidence comes from
+#' annealed importance sampling. [bayes_factor()] gives the interval as well.
 #'
-#' @param x,x1,x2 Calibrations ([calibrate()], [calibrate_paper()]); two on the same measurements by the same method.
+#' @param x,x1,x2 Calibrations ([calibrate()], [calibrate_paper()]); two on the same measurements by
+#'   the same method.
 #' @param log Whether the natural logarithm of the Bayes factor is given.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return `logml()`: the natural logarithm of the evidence. `bf()`: the Bayes factor in favour of `x1`, of the class
-#'   `bf_bridge`.
+#' @return `logml()`: the natural logarithm of the evidence. `bf()`: the Bayes factor in favour of
+#'   `x1`, of the class `bf_bridge`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)

@@ -1,18 +1,20 @@
-# What a mechanism explains by itself. If both models may respond to the conditions of the mechanism in an unknown way,
-# the true cause competes with a response that can imitate it. With that response in neither model, the Bayes factor is
-#     Z1(-s) / Z0(-s) = (Z1 / Z0) (Z0 / Z0(-s)) / (Z1 / Z1(-s)),
-# s the conditions of the mechanism: the factor Z1 / Z0 with the response in both, and what the mechanism takes away of
-# the evidence for that response. It decides; the factor with the response in both must not speak against it.
+# What a mechanism explains by itself. If both models may respond to the conditions of the mechanism
+# in an unknown way, the true cause competes with a response that can imitate it. With that response
+# in neither model, the Bayes factor is Z1(-s) / Z0(-s) = (Z1 / Z0) (Z0 / Z0(-s)) / (Z1 / Z1(-s)), s
+# the conditions of the mechanism: the factor Z1 / Z0 with the response in both, and what the
+# mechanism takes away of the evidence for that response. It decides; the factor with the response
+# in both must not speak against it.
 
-# What a mechanism takes away: decades by which the present model needs the response more than the extension does; 0 if
-# its mechanism has no condition.
+# What a mechanism takes away: decades by which the present model needs the response more than the
+# extension does; 0 if its mechanism has no condition.
 taken_away <- function(trial, present, context) {
   conditions <- present$conditions[[trial$mechanism]]
   if (!length(conditions)) return(0)
   present$lost[[toString(conditions)]] - lost_without(trial, conditions, context)
 }
 
-# The present model with the conditions of the mechanisms that are left, and what it loses without a response to them.
+# The present model with the conditions of the mechanisms that are left, and what it loses without a
+# response to them.
 with_losses <- function(model, catalogue, context) {
   model$conditions <- lapply(catalogue, function(mechanism) sort(mechanism$boundary))
   sets <- unique(Filter(length, unname(model$conditions)))
@@ -26,7 +28,8 @@ lost_without <- function(model, conditions, context) {
   fits <- record_fits(model$fit)
   ais <- fill_attribution_control(context$control$attribution, fits[[1]]$control$ais,
                                   length(fits[[1]]$measurements$conditions))$ais
-  dropped <- lapply(unname(fits), function(fit) which(fit$measurements$conditions %in% conditions) - 1L)
+  dropped <- lapply(unname(fits),
+                    function(fit) which(fit$measurements$conditions %in% conditions) - 1L)
   if (!any(lengths(dropped))) return(0)
   call_engine(drop_conditions_(engine_records(fits), engine_draws(fits), dropped, ais,
                                engine_context(context$seed, context$threads)))$lost / log(10)

@@ -9,38 +9,41 @@ with_height <- function(figure, inches) {
 # Inches; on a canvas narrower than usual, panels go below each other and titles take more lines.
 figure_height <- function(figure, width = canvas_width) {
   columns <- figure$facet$params$ncol %||% 1
-  (attr(figure, "height_in") %||% 5) * columns / narrow_columns(columns, width) + 0.3 * max(0, canvas_width - width)
+  (attr(figure, "height_in") %||% 5) * columns / narrow_columns(columns, width) +
+    0.3 * max(0, canvas_width - width)
 }
 
 # Where there is nothing to draw, the title says so.
-figure_of_nothing <- function(title) with_height(ggplot2::ggplot() + figure_titles(title) + figure_theme(), 1.5)
+figure_of_nothing <- function(title)
+  with_height(ggplot2::ggplot() + figure_titles(title) + figure_theme(), 1.5)
 
 # Okabe and Ito's colours: told apart by colour-blind readers and, one light and one dark, in grey.
 stage_colours <- c("before" = "#E69F00", "after" = "#0072B2", "the model" = "#0072B2")
 
-stage_lines <- function() ggplot2::scale_linetype_manual(values = c("before" = "longdash", "after" = "solid",
-                                                                    "the model" = "solid"))
+stage_lines <- function() ggplot2::scale_linetype_manual(
+  values = c("before" = "longdash", "after" = "solid", "the model" = "solid"))
 
 figure_theme <- function() {
-  ggplot2::theme_minimal(base_size = letter_points, base_family = figure_family()) +
-    ggplot2::theme(plot.title = ggplot2::element_text(face = "bold", size = ggplot2::rel(title_size),
-                                                      lineheight = 1.05),
-                   plot.subtitle = ggplot2::element_text(colour = "grey30", size = ggplot2::rel(subtitle_size),
-                                                         lineheight = 1.1),
-                   plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(),
-                   panel.spacing = ggplot2::unit(14, "pt"),
-                   strip.text = ggplot2::element_text(face = "bold", hjust = 0), strip.placement = "outside",
-                   strip.text.y.left = ggplot2::element_text(angle = 90, hjust = 0.5), strip.clip = "off",
-                   axis.text = ggplot2::element_text(colour = "grey20"), legend.position = "top",
-                   legend.justification = "left",
-                   legend.title = ggplot2::element_blank(), legend.margin = ggplot2::margin(0, 0, 0, 0))
+  ggplot2::theme_minimal(base_size = letter_points, base_family = figure_family()) + ggplot2::theme(
+    plot.title = ggplot2::element_text(face = "bold",
+                                       size = ggplot2::rel(title_size), lineheight = 1.05),
+    plot.subtitle = ggplot2::element_text(colour = "grey30",
+                                          size = ggplot2::rel(subtitle_size), lineheight = 1.1),
+    plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(),
+    panel.spacing = ggplot2::unit(14, "pt"),
+    strip.text = ggplot2::element_text(face = "bold", hjust = 0), strip.placement = "outside",
+    strip.text.y.left = ggplot2::element_text(angle = 90, hjust = 0.5), strip.clip = "off",
+    axis.text = ggplot2::element_text(colour = "grey20"), legend.position = "top",
+    legend.justification = "left",
+    legend.title = ggplot2::element_blank(), legend.margin = ggplot2::margin(0, 0, 0, 0))
 }
 
 figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {
   ggplot2::labs(title = title, subtitle = subtitle, x = x, y = y)
 }
 
-stage_scales <- function() ggplot2::scale_colour_manual(values = stage_colours, aesthetics = c("colour", "fill"))
+stage_scales <- function()
+  ggplot2::scale_colour_manual(values = stage_colours, aesthetics = c("colour", "fill"))
 
 # Labels of an axis that would touch are left out.
 apart <- ggplot2::guide_axis(check.overlap = TRUE)
@@ -51,12 +54,15 @@ signed_log_axis <- function(values, extra = NULL) {
   if (!is.null(extra)) steps <- c(steps[abs(log(steps / extra)) > 0.6], extra)
   breaks <- sort(c(-steps, 0, steps))
   reach <- range(values, 0, na.rm = TRUE)
-  ggplot2::scale_x_continuous(trans = "pseudo_log", breaks = breaks[breaks >= reach[1] - 1 & breaks <= reach[2] + 1],
+  ggplot2::scale_x_continuous(trans = "pseudo_log",
+                              breaks = breaks[breaks >= reach[1] - 1 & breaks <= reach[2] + 1],
                               guide = apart)
 }
 
-# Temperatures whose differences are in K are themselves recorded in degrees Celsius, unless they are far above.
-level_unit <- function(unit, values) if (identical(unit, "K") && max(values, na.rm = TRUE) < 150) "\u00b0C" else unit
+# Temperatures whose differences are in K are themselves recorded in degrees Celsius, unless they
+# are far above.
+level_unit <- function(unit, values)
+  if (identical(unit, "K") && max(values, na.rm = TRUE) < 150) "\u00b0C" else unit
 
 short_axis <- function(x) {
   largest <- max(abs(x), na.rm = TRUE)
@@ -69,7 +75,8 @@ time_label <- function(time) if (is.numeric(time)) "time [h]"
 
 time_axis <- function(time) {
   if (!is.numeric(time))
-    ggplot2::scale_x_datetime(breaks = function(limits) pretty(limits, 6), date_labels = "%d %b", guide = apart)
+    ggplot2::scale_x_datetime(breaks = function(limits) pretty(limits, 6), date_labels = "%d %b",
+                              guide = apart)
 }
 
 # Middle of the clock hour in which an interval lies that ends at `time`.

@@ -3,35 +3,40 @@
 attribution_title <- function(attributions) {
   named <- lapply(attributions, function(a) significant_conditions(a$table))
   if (length(named) < 2)
-    return(paste("The discrepancy of the model follows", listed(named[[1]], none = "no boundary condition")))
+    return(paste("The discrepancy of the model follows",
+                 listed(named[[1]], none = "no boundary condition")))
   if (!length(named[[1]]) && !length(named[[2]]))
     return("The remaining error follows no boundary condition, neither before nor after")
-  sprintf("Before, the remaining error follows %s; after the change it follows %s", listed(named[[1]]),
-          listed(named[[2]]))
+  sprintf("Before, the remaining error follows %s; after the change it follows %s",
+          listed(named[[1]]), listed(named[[2]]))
 }
 
 figure_attribution <- function(attributions) {
   table <- stage_table(attributions, function(a) a$table)
   strength <- tapply(table$log10_bf_dropped, table$boundary, max)
   table$boundary <- factor(table$boundary, names(sort(strength)))
-  table$label <- ifelse(table$significant, paste0("   ", percent(pmax(table$share, 0)), " of it"), "")
+  table$label <- ifelse(table$significant, paste0("   ", percent(pmax(table$share, 0)), " of it"),
+                        "")
   table$y <- as.integer(table$boundary) +
     if (length(attributions) > 1) ifelse(table$stage == "before", 0.18, -0.18) else 0
   axis <- signed_log_axis(table$log10_bf_dropped)
-  figure <- ggplot2::ggplot(table, ggplot2::aes(.data$log10_bf_dropped, .data$y, colour = .data$stage)) +
+  figure <- ggplot2::ggplot(table,
+                            ggplot2::aes(.data$log10_bf_dropped, .data$y, colour = .data$stage)) +
     ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
-    ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$log10_bf_dropped), linewidth = 1.1) +
-    ggplot2::geom_point(ggplot2::aes(shape = .data$significant), size = 4, fill = "white", stroke = 1.3) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = 0, xmax = .data$log10_bf_dropped),
+                            linewidth = 1.1) +
+    ggplot2::geom_point(ggplot2::aes(shape = .data$significant), size = 4, fill = "white",
+                        stroke = 1.3) +
     ggplot2::geom_text(ggplot2::aes(label = .data$label), hjust = 0, size = 4.6, colour = "grey20",
                        show.legend = FALSE) +
     ggplot2::scale_shape_manual(values = c("TRUE" = 19, "FALSE" = 21),
                                 labels = c("TRUE" = "significant", "FALSE" = "may be chance"),
                                 limits = c("TRUE", "FALSE")) +
-    ggplot2::scale_y_continuous(NULL, breaks = seq_along(levels(table$boundary)), labels = levels(table$boundary)) +
-    axis + stage_scales() +
+    ggplot2::scale_y_continuous(NULL, breaks = seq_along(levels(table$boundary)),
+                                labels = levels(table$boundary)) + axis + stage_scales() +
     figure_titles(attribution_title(attributions),
-                  paste("Each boundary condition, present and past: how much worse the remaining error is explained",
-                        "without it. Per cent: its part of that error."),
+                  paste("Each boundary condition, present and past: how much worse the remaining",
+                        "error is explained without it. Per cent: its part of that error."),
                   x = "evidence lost when it is ignored (log10 Bayes factor)") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), table$label)

@@ -1,5 +1,6 @@
-# A figure is fitted to its canvas when it is drawn: texts are wrapped by their measured width in the font of the device
-# at hand, letters shrink on a narrow canvas, panels go below each other, and labels at the ends of lines get room.
+# A figure is fitted to its canvas when it is drawn: texts are wrapped by their measured width in
+# the font of the device at hand, letters shrink on a narrow canvas, panels go below each other, and
+# labels at the ends of lines get room.
 
 canvas_width <- 9  # inches: here letters have their full size
 letter_points <- 15
@@ -38,7 +39,8 @@ fit_to_canvas <- function(plot) {
   scale <- letter_scale()
   family <- plot$theme$text$family %||% ""
   wrap <- function(text, width, size, face = "plain") {
-    if (is.character(text)) wrap_measured(text, width, letter_points * scale * size, face, family) else text
+    if (is.character(text)) wrap_measured(text, width, letter_points * scale * size, face, family)
+    else text
   }
   inside <- inches[["width"]] - 2 * margin_points / 72.27
   plot$labels["title"] <- list(wrap(plot$labels$title, inside, title_size, "bold"))
@@ -66,7 +68,8 @@ narrow_columns <- function(columns, width) max(1, min(columns, floor(width / 2.6
 fit_columns <- function(facet, width) {
   columns <- facet$params$ncol
   if (is.null(columns)) return(facet)
-  ggplot2::ggproto(NULL, facet, params = utils::modifyList(facet$params, list(ncol = narrow_columns(columns, width))))
+  ggplot2::ggproto(NULL, facet, params = utils::modifyList(
+    facet$params, list(ncol = narrow_columns(columns, width))))
 }
 
 # Labels that begin at a point may reach beyond the panel, into the margin.
@@ -89,8 +92,8 @@ text_inches <- function(text, points, face = "plain", family = "") {
   }, 0, USE.NAMES = FALSE)
 }
 
-# Lines no wider than `width` inches; a number stays beside its "%", a last word of three letters or fewer (a unit)
-# beside the one before it, and a word wider than a line is broken.
+# Lines no wider than `width` inches; a number stays beside its "%", a last word of three letters or
+# fewer (a unit) beside the one before it, and a word wider than a line is broken.
 wrap_measured <- function(text, width, points, face = "plain", family = "") {
   measure <- function(t) text_inches(t, points, face, family)
   wrap_line <- function(line) {
@@ -119,20 +122,24 @@ break_word <- function(word, width, measure) {
   c(substr(word, 1, fits), break_word(substring(word, fits + 1), width, measure))
 }
 
-# For scales and facets, which ask for their labels when they are drawn: wrapped to a share of the canvas.
+# For scales and facets, which ask for their labels when they are drawn: wrapped to a share of the
+# canvas.
 wrap_labels <- function(share) {
   function(x) {
-    wrap_measured(x, share * canvas_inches()[["width"]], letter_points * letter_scale(), "bold", figure_family())
+    wrap_measured(x, share * canvas_inches()[["width"]], letter_points * letter_scale(), "bold",
+                  figure_family())
   }
 }
 
 # Strips above `columns` panels beside each other, or beside `rows` panels, turned.
 wrap_strips <- function(columns = 1) {
-  ggplot2::as_labeller(function(x) wrap_labels(0.85 / narrow_columns(columns, canvas_inches()[["width"]]))(x))
+  ggplot2::as_labeller(
+    function(x) wrap_labels(0.85 / narrow_columns(columns, canvas_inches()[["width"]]))(x))
 }
 
 wrap_turned <- function(rows) {
   ggplot2::as_labeller(function(x) {
-    wrap_measured(x, 0.6 * canvas_inches()[["height"]] / rows, letter_points * letter_scale(), "bold", figure_family())
+    wrap_measured(x, 0.6 * canvas_inches()[["height"]] / rows, letter_points * letter_scale(),
+                  "bold", figure_family())
   })
 }

@@ -1,4 +1,5 @@
-# Whether the numbers can be trusted: the emulator's errors on runs left out, and how the annealing went.
+# Whether the numbers can be trusted: the emulator's errors on runs left out, and how the annealing
+# went.
 
 left_out_table <- function(fit) {
   z <- sort(as.numeric(fit$emulator$left_out$error / sqrt(fit$emulator$left_out$variance)))
@@ -11,22 +12,23 @@ check_words <- function(fits) {
   checks <- Filter(Negate(is.null), lapply(fits, `[[`, "check"))
   ratio <- vapply(checks, `[[`, 0, "ratio")
   if (!length(ratio)) return("The emulator was not checked by runs")
-  sprintf("Where the posterior lies, the emulator's error is %s of the noise: %s", listed(unique(short(ratio))),
+  sprintf("Where the posterior lies, the emulator's error is %s of the noise: %s",
+          listed(unique(short(ratio))),
           if (all(ratio <= rules$error_ratio)) "good enough" else "too much, more runs are needed")
 }
 
 figure_emulator <- function(fits) {
   table <- stage_table(fits, left_out_table)
-  figure <- ggplot2::ggplot(table, ggplot2::aes(.data$expected, .data$seen, colour = .data$stage,
-                                                shape = .data$stage)) +
+  figure <- ggplot2::ggplot(
+    table, ggplot2::aes(.data$expected, .data$seen, colour = .data$stage, shape = .data$stage)) +
     ggplot2::geom_abline(colour = "grey40") +
     ggplot2::geom_point(size = 1.8) +
     ggplot2::scale_shape_manual(values = c("before" = 4, "after" = 19, "the model" = 19)) +
     stage_scales() +
-    figure_titles(check_words(fits),
-                  paste("Errors on runs left out, each over its stated standard deviation. Points on the line: the",
-                        "emulator is as sure as it should be. Steeper than the line: it is too sure."),
-                  x = "expected of a normal error", y = "seen") +
+    figure_titles(check_words(fits), paste("Errors on runs left out, each over its stated standard",
+                                           "deviation. Points on the line: the emulator is as sure",
+                                           "as it should be. Steeper than the line: it is too",
+                                           "sure."), x = "expected of a normal error", y = "seen") +
     figure_theme()
   with_height(figure, 5.4)
 }
@@ -42,8 +44,8 @@ estimate_words <- function(results) {
   told <- function(e) sprintf("%s \u00b1 %s", format(round(e[1], 1), nsmall = 1), short(e[2]))
   words <- vapply(names(results), function(name) {
     r <- results[[name]]
-    second <- if (length(r$second) == 2 && all(is.finite(r$second))) paste0(", ", told(r$second),
-                                                                            " by the second estimator")
+    second <- if (length(r$second) == 2 && all(is.finite(r$second)))
+      paste0(", ", told(r$second), " by the second estimator")
     paste0(name, ", ", told(r$annealed), " by annealing", second)
   }, "")
   paste0("Log evidence: ", paste(words, collapse = "; "), ".")
@@ -56,18 +58,20 @@ figure_sampler <- function(results) {
   title <- if (all(trusted)) "The sampler passed its own checks"
            else paste("The sampler is not to be trusted:",
                       sub("^not trusted: ", "", results[[which(!trusted)[1]]]$verdict))
-  figure <- ggplot2::ggplot(table, ggplot2::aes(.data$beta, .data$value, colour = .data$stage, shape = .data$stage)) +
+  figure <- ggplot2::ggplot(
+    table, ggplot2::aes(.data$beta, .data$value, colour = .data$stage, shape = .data$stage)) +
     ggplot2::geom_line(ggplot2::aes(linetype = .data$stage), linewidth = 0.8) +
     ggplot2::geom_point(size = 3) +
     ggplot2::scale_shape_manual(values = c("before" = 17, "after" = 19, "the model" = 19)) +
     ggplot2::scale_y_continuous(limits = c(0, 100)) +
-    ggplot2::scale_x_continuous(trans = "sqrt", limits = c(0, 1), breaks = c(0, 0.05, 0.25, 0.5, 1), guide = apart) +
+    ggplot2::scale_x_continuous(trans = "sqrt", limits = c(0, 1), breaks = c(0, 0.05, 0.25, 0.5, 1),
+                                guide = apart) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, labeller = wrap_strips(2)) +
     stage_scales() + stage_lines() +
-    figure_titles(title,
-                  paste("From where the chains start (0) to the posterior (1). Low values: chains that stand still,",
-                        "or few that carry the weight; more chains or moves would help.",
-                        estimate_words(results)), x = "inverse temperature") +
+    figure_titles(title, paste("From where the chains start (0) to the posterior (1). Low values:",
+                               "chains that stand still, or few that carry the weight; more chains",
+                               "or moves would help.",
+                               estimate_words(results)), x = "inverse temperature") +
     figure_theme()
   with_height(figure, 4.8)
 }

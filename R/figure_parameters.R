@@ -1,9 +1,11 @@
 # Parameters, before and after the measurements and from model to model.
 
 parameters_title <- function(table) {
-  count <- vapply(split(table$at_edge, table$stage), function(e) sprintf("%d of %d", sum(e), length(e)), "")
+  count <- vapply(split(table$at_edge, table$stage),
+                  function(e) sprintf("%d of %d", sum(e), length(e)), "")
   if (length(count) < 2) paste("At the edge of what was thought possible:", count, "parameters")
-  else sprintf("At the edge of what was thought possible: %s parameters before, %s after", count[1], count[2])
+  else sprintf("At the edge of what was thought possible: %s parameters before, %s after", count[1],
+               count[2])
 }
 
 figure_parameters <- function(fits) {
@@ -13,22 +15,24 @@ figure_parameters <- function(fits) {
   table$row <- factor(table$stage, rev(levels(table$stage)))
   edge <- table[table$at_edge, ]
   figure <- ggplot2::ggplot(table, ggplot2::aes(y = .data$row, colour = .data$stage)) +
-    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$prior_lower, xmax = .data$prior_upper), colour = "grey88",
-                            linewidth = 9) +
-    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), linewidth = 1.6) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$prior_lower, xmax = .data$prior_upper),
+                            colour = "grey88", linewidth = 9) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95),
+                            linewidth = 1.6) +
     ggplot2::geom_point(ggplot2::aes(.data$median), size = 3.6) +
-    ggplot2::geom_point(ggplot2::aes(.data$median, shape = "at the edge of its prior"), edge, colour = "black",
-                        size = 6, stroke = 1.1) +
+    ggplot2::geom_point(ggplot2::aes(.data$median, shape = "at the edge of its prior"), edge,
+                        colour = "black", size = 6, stroke = 1.1) +
     ggplot2::scale_shape_manual(values = c("at the edge of its prior" = 1)) +
     ggplot2::scale_x_continuous(n.breaks = 4, labels = short_axis, guide = apart) +
     ggplot2::coord_cartesian(clip = "off") +
-    ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free", labeller = wrap_strips(2)) +
-    stage_scales() +
-    figure_titles(parameters_title(table),
-                  paste("Grey: what was thought possible (prior). Points and lines: what the measurements say, with 95",
-                        "% intervals.")) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free",
+                        labeller = wrap_strips(2)) + stage_scales() +
+    figure_titles(parameters_title(table), paste("Grey: what was thought possible (prior). Points",
+                                                 "and lines: what the measurements say, with 95 %",
+                                                 "intervals.")) +
     figure_theme() +
-    ggplot2::theme(panel.grid.major.y = ggplot2::element_blank(), axis.text.y = ggplot2::element_blank(),
+    ggplot2::theme(panel.grid.major.y = ggplot2::element_blank(),
+                   axis.text.y = ggplot2::element_blank(),
                    strip.text = ggplot2::element_text(size = ggplot2::rel(0.87)))
   with_height(figure, 1.9 + 1.2 * ceiling(nlevels(table$panel) / 2))
 }

@@ -2,10 +2,12 @@
 
 steps_table <- function(upgrade) {
   models <- upgrade$models
-  told <- vapply(seq_along(models), function(k) if (k == 1) models[[1]]$name else paste("+", models[[k]]$mechanism), "")
+  told <- vapply(seq_along(models), function(k) if (k == 1) models[[1]]$name
+                                                else paste("+", models[[k]]$mechanism), "")
   rows <- lapply(seq_along(models), function(k) {
     data.frame(step = told[k], use = names(use_names),
-               rmse = vapply(names(use_names), function(use) models[[k]]$scores[[use]][["rmse"]], 0))
+               rmse = vapply(names(use_names), function(use) models[[k]]$scores[[use]][["rmse"]],
+                             0))
   })
   table <- do.call(rbind, rows)
   table$step <- factor(table$step, rev(told))
@@ -14,7 +16,8 @@ steps_table <- function(upgrade) {
 }
 
 figure_steps <- function(upgrade) {
-  if (length(upgrade$models) < 2) return(figure_of_nothing("No mechanism was adopted, so that nothing was gained"))
+  if (length(upgrade$models) < 2)
+    return(figure_of_nothing("No mechanism was adopted, so that nothing was gained"))
   m <- upgrade$measurements
   table <- steps_table(upgrade)
   use <- levels(droplevels(table$use))
@@ -25,7 +28,8 @@ figure_steps <- function(upgrade) {
            else sprintf("%s brings most: the typical error (%s) %s",
                         sub("^\\+ ", "", as.character(shown$step[best + 1])), use[length(use)],
                         change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
-  figure <- ggplot2::ggplot(table, ggplot2::aes(.data$rmse, .data$step, colour = .data$use, shape = .data$use)) +
+  figure <- ggplot2::ggplot(
+    table, ggplot2::aes(.data$rmse, .data$step, colour = .data$use, shape = .data$use)) +
     ggplot2::geom_vline(xintercept = m$noise_sd, linetype = "dashed", colour = "grey20") +
     ggplot2::geom_path(ggplot2::aes(group = .data$use), linewidth = 0.8) +
     ggplot2::geom_point(size = 4) +
@@ -33,8 +37,8 @@ figure_steps <- function(upgrade) {
     ggplot2::scale_shape_manual(values = stats::setNames(c(19, 17), use_names)) +
     ggplot2::scale_x_continuous(limits = c(0, NA), guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.3)) +
-    figure_titles(title, paste("Each row adds one mechanism to the row above. Dashed: the stated noise, below which",
-                               "there is nothing left to gain."),
+    figure_titles(title, paste("Each row adds one mechanism to the row above. Dashed: the stated",
+                               "noise, below which there is nothing left to gain."),
                   x = axis_label("typical error, RMSE", m$unit)) +
     figure_theme()
   with_height(figure, 2.6 + 0.6 * nlevels(table$step))

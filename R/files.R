@@ -11,19 +11,22 @@ is_regular_file <- function(path) {
 # All bytes of a regular file.
 file_bytes <- function(path) readBin(path, "raw", file.size(path))
 
-# Whether a name stays in the folder that it is used in, on every system: `a.txt` and `b/a.txt`, not `../a.txt` or `/a`.
+# Whether a name stays in the folder that it is used in, on every system: `a.txt` and `b/a.txt`, not
+# `../a.txt` or `/a`.
 stays_inside <- function(name) {
   parts <- strsplit(name, "[/\\\\]")
   within <- vapply(parts, function(part) length(part) > 0 && !any(part %in% c("", ".", "..")), NA)
   within & !grepl("[/\\\\]$|^[A-Za-z]:|^~|[[:cntrl:]]", name) & nchar(name, "bytes") <= 255
 }
 
-# Names of files that stay in the run's directory. Each has the name of the argument that it is from.
+# Names of files that stay in the run's directory. Each has the name of the argument that it is
+# from.
 check_inside <- function(names, call = rlang::caller_env()) {
   out <- names[!stays_inside(names)]
   if (length(out)) {
-    abort_input(c("{.arg {names(out)[1]}} names {.file {out[1]}}, which is no file in the run's directory.",
-                  i = "Give a name as {.code model.txt} or {.code inputs/model.txt}."), call = call)
+    abort_input(
+      c("{.arg {names(out)[1]}} names {.file {out[1]}}, which is no file in the run's directory.",
+        i = "Give a name as {.code model.txt} or {.code inputs/model.txt}."), call = call)
   }
 }
 

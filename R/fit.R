@@ -2,28 +2,29 @@
 #'
 #' What R's users expect of a fitted model; of an upgrade it is that of its last model.
 #'
-#' @section The likelihood:
-#' `logLik()` is an error, and with it `AIC()` and `BIC()`: the discrepancy is integrated out and its settings are
-#' shares and grids with priors, so that no number of free parameters goes with a greatest likelihood. The evidence,
-#' `log_evidence` of the fit, is what models are compared by ([bayes_factor()]; `logml()` and `bf()` of the package
-#' `bridgesampling` give it as well). AIC and BIC of the simulator fitted by least squares are among the criteria of
+#' @section The likelihood: `logLik()` is an error, and with it `AIC()` and `BIC()`: the discrepancy
+#' is integrated out and its settings are shares and grids with priors, so that no number of free
+#' parameters goes with a greatest likelihood. The evidence, `log_evidence` of the fit, is what
+#' models are compared by ([bayes_factor()]; `logml()` and `bf()` of the package `bridgesampling`
+#' give it as well). AIC and BIC of the simulator fitted by least squares are among the criteria of
 #' [compare_models()].
 #'
-#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or, but for `update()`, an upgrade
-#'   ([upgrade_model()]).
+#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or, but for `update()`, an
+#'   upgrade ([upgrade_model()]).
 #' @param data Not used; the record is part of the fit.
 #' @param newdata As in [predict.amiss_fit()].
 #' @param emulator,measurements What is calibrated; by default the same again.
 #' @param control Options that change; the others stay as they were given.
-#' @param ... Not used, but in `augment()` with `newdata`, where [predict.amiss_fit()] takes them: an argument that is
-#'   not known is an error.
+#' @param ... Not used, but in `augment()` with `newdata`, where [predict.amiss_fit()] takes them:
+#'   an argument that is not known is an error.
 #' @inheritParams calibrate
-#' @return `fitted()`, `residuals()`: the posterior mean of the simulation at the calibration rows, without the
-#'   discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a data frame of one row with
-#'   `log10_evidence` and its interval, `trusted`, `emulator_error` (of the check by runs, in units of the noise),
-#'   `sigma` (of what the simulation leaves), `nobs`, `vectors` and `runs`.
-#'   `augment()`: the record with `.fitted` and `.resid`; with `newdata` its prediction, with `.lower` and `.upper` too.
-#'   `update()`: a new calibration by the same emulator (one that was refined for its region is not refined again).
+#' @return `fitted()`, `residuals()`: the posterior mean of the simulation at the calibration rows,
+#'   without the discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a
+#'   data frame of one row with `log10_evidence` and its interval, `trusted`, `emulator_error` (of
+#'   the check by runs, in units of the noise), `sigma` (of what the simulation leaves), `nobs`,
+#'   `vectors` and `runs`. `augment()`: the record with `.fitted` and `.resid`; with `newdata` its
+#'   prediction, with `.lower` and `.upper` too. `update()`: a new calibration by the same emulator
+#'   (one that was refined for its region is not refined again).
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -69,24 +70,27 @@ nobs.amiss_fit <- function(object, ...) {
 #' @export
 logLik.amiss_fit <- function(object, ...) {
   check_whole(object, "object")
-  abort_input(c("A calibration has no greatest likelihood with a number of free parameters.",
-                x = "Its discrepancy is integrated out.",
-                i = "Compare models by the evidence: {.fun bayes_factor}, or {.code $log_evidence} of the fit.",
-                i = "AIC and BIC of the least-squares fit are among the criteria of {.fun compare_models}."))
+  abort_input(c(
+    "A calibration has no greatest likelihood with a number of free parameters.",
+    x = "Its discrepancy is integrated out.",
+    i = "Compare models by the evidence: {.fun bayes_factor}, or {.code $log_evidence} of the fit.",
+    i = "AIC and BIC of the least-squares fit are among the criteria of {.fun compare_models}."))
 }
 
 #' @rdname fit
 #' @export
-update.amiss_fit <- function(object, emulator = object$emulator, measurements = object$measurements, control = NULL,
-                             seed = object$seed, threads = 1, ...) {
+update.amiss_fit <- function(object, emulator = object$emulator, measurements = object$measurements,
+                             control = NULL, seed = object$seed, threads = 1, ...) {
   check_whole(object, "object")
   rlang::check_dots_empty()
-  check_input(checkmate::check_list(control, null.ok = TRUE), "control", "Give a list of named options.")
+  check_input(checkmate::check_list(control, null.ok = TRUE), "control",
+              "Give a list of named options.")
   control <- utils::modifyList(given_control(object), as.list(control))
   calibrator(object)(emulator, measurements, control, seed = seed, threads = threads)
 }
 
-# The options that differ from what they would be if none were given. The others may follow from the measurements.
+# The options that differ from what they would be if none were given. The others may follow from the
+# measurements.
 given_control <- function(fit) {
   defaults <- default_control(fit)
   given <- changed(fit$control, defaults)
@@ -104,9 +108,11 @@ glance.amiss_fit <- function(x, ...) {
   check_whole(x, "x")
   rlang::check_dots_empty()
   decades <- c(x$log_evidence, x$interval) / log(10)
-  data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
-             emulator_error = x$check$ratio %||% NA_real_, sigma = error_sd(x),
-             nobs = length(x$rows), vectors = ncol(x$emulator$basis$vectors), runs = nrow(x$emulator$processes$inputs))
+  data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3],
+             trusted = x$trust$trusted, emulator_error = x$check$ratio %||% NA_real_,
+             sigma = error_sd(x),
+             nobs = length(x$rows), vectors = ncol(x$emulator$basis$vectors),
+             runs = nrow(x$emulator$processes$inputs))
 }
 
 #' @rdname fit
@@ -114,12 +120,14 @@ glance.amiss_fit <- function(x, ...) {
 augment.amiss_fit <- function(x, data = NULL, newdata = NULL, ...) {
   check_whole(x, "x")
   if (!is.null(data)) {
-    abort_input(c("{.arg data} is not used: the record is part of the fit.", i = "Another record is {.arg newdata}."))
+    abort_input(c("{.arg data} is not used: the record is part of the fit.",
+                  i = "Another record is {.arg newdata}."))
   }
   if (!is.null(newdata)) return(augment_prediction(x, stats::predict(x, newdata, ...)))
   rlang::check_dots_empty()
   m <- x$measurements
-  conditions <- lapply(stats::setNames(nm = m$conditions), function(name) condition_values(m, name)[x$rows])
+  conditions <- lapply(stats::setNames(nm = m$conditions),
+                       function(name) condition_values(m, name)[x$rows])
   simulated <- simulated_mean(x)
   out <- data.frame(time = m$time[x$rows], target = m$y[x$rows], conditions, .fitted = simulated,
                     .resid = m$y[x$rows] - simulated, check.names = FALSE)
@@ -129,8 +137,9 @@ augment.amiss_fit <- function(x, data = NULL, newdata = NULL, ...) {
 
 augment_prediction <- function(fit, prediction) {
   ends <- grep("^(lower|upper)", names(prediction), value = TRUE)
-  out <- data.frame(prediction[c("time", "observed")], .fitted = prediction$mean, .lower = prediction[[ends[1]]],
-                    .upper = prediction[[ends[2]]], .resid = prediction$observed - prediction$mean)
+  out <- data.frame(prediction[c("time", "observed")], .fitted = prediction$mean,
+                    .lower = prediction[[ends[1]]], .upper = prediction[[ends[2]]],
+                    .resid = prediction$observed - prediction$mean)
   names(out)[2] <- fit$measurements$target
   out
 }
@@ -140,8 +149,8 @@ augment_prediction <- function(fit, prediction) {
 #' @param object A calibration ([calibrate()], [calibrate_paper()]).
 #' @param x Its summary.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), `reach`, `check` and `trust` in
-#'   words.
+#' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), `reach`,
+#'   `check` and `trust` in words.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -157,9 +166,11 @@ augment_prediction <- function(fit, prediction) {
 summary.amiss_fit <- function(object, ...) {
   check_whole(object, "object")
   rlang::check_dots_empty()
-  structure(list(name = object$measurements$name, unit = object$measurements$unit, parameters = generics::tidy(object),
-                 glance = generics::glance(object), reach = if (!is.null(object$reach)) reach_words(object),
-                 check = object$check$verdict, trust = object$trust$verdict), class = "summary.amiss_fit")
+  structure(list(name = object$measurements$name, unit = object$measurements$unit,
+                 parameters = generics::tidy(object), glance = generics::glance(object),
+                 reach = if (!is.null(object$reach)) reach_words(object),
+                 check = object$check$verdict, trust = object$trust$verdict),
+            class = "summary.amiss_fit")
 }
 
 #' @rdname summary.amiss_fit
@@ -173,7 +184,8 @@ print.summary.amiss_fit <- function(x, ...) {
     say_table(shown)
     more <- nrow(x$parameters) - nrow(shown)
     if (more) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
-    then <- if (is.null(x$reach)) "its {.code index} of the boundary conditions" else "{.fun attribute_discrepancy}"
+    then <- if (is.null(x$reach)) "its {.code index} of the boundary conditions"
+            else "{.fun attribute_discrepancy}"
     cli::cli_bullets(c("*" = as_said(x$reach), "*" = as_said(x$check),
                        ">" = paste("next: {.fun predict}, {.fun confint} or", then)))
   })

@@ -1,12 +1,13 @@
 # What every calibration has, by whatever method it was made.
 
-# A calibration by whatever method: what went into it (`set`: emulator, measurements, control, seed, rows, priors), what
-# the sampler said of the parameters, the evidence in all (`total`), and what its method alone knows.
+# A calibration by whatever method: what went into it (`set`: emulator, measurements, control, seed,
+# rows, priors), what the sampler said of the parameters, the evidence in all (`total`), and what
+# its method alone knows.
 new_fit <- function(class, set, posterior, total, ...) {
   common <- c("emulator", "measurements", "control", "seed", "rows", "priors")
   structure(c(list(format_version = format_version), set[common],
-              list(values = unit_to_values(posterior$unit, set$emulator$parameters), weights = posterior$weights,
-                   posterior = posterior),
+              list(values = unit_to_values(posterior$unit, set$emulator$parameters),
+                   weights = posterior$weights, posterior = posterior),
               total[c("log_evidence", "standard_error", "interval")], list(...)),
             class = c(class, "amiss_fit"))
 }
@@ -17,12 +18,13 @@ calibrated_record <- function(fit) UseMethod("calibrated_record")
 #' @export
 calibrated_record.amiss_fit <- function(fit) fit$measurements$y[fit$rows]
 
-# The calibrations of each record: of several that were calibrated together, each with the evidence of all, as
-# calibrate_sets() gave them.
+# The calibrations of each record: of several that were calibrated together, each with the evidence
+# of all, as calibrate_sets() gave them.
 record_fits <- function(fit) {
   if (!inherits(fit, "amiss_joint")) return(list(fit))
   lapply(fit$records, function(one) {
-    one[c("log_evidence", "standard_error", "interval")] <- fit[c("log_evidence", "standard_error", "interval")]
+    one[c("log_evidence", "standard_error",
+          "interval")] <- fit[c("log_evidence", "standard_error", "interval")]
     one$part <- NULL
     one
   })
@@ -38,8 +40,9 @@ as_part <- function(fit) {
 
 check_not_part <- function(fit, call = rlang::caller_env()) {
   if (!isTRUE(fit$part)) return(invisible())
-  abort_input(c("This is one of several records that were calibrated together; by itself it has no evidence.",
-                i = "Use the whole of {.fun calibrate_jointly}, or calibrate the record alone."), call = call)
+  abort_input(
+    c("This is one of several records that were calibrated together; by itself it has no evidence.",
+      i = "Use the whole of {.fun calibrate_jointly}, or calibrate the record alone."), call = call)
 }
 
 # The function that made a fit, and its options if none are given.
@@ -52,7 +55,8 @@ condition_table <- function(fit, settings) UseMethod("condition_table")
 # What the sampler said: of the paper's calibration, which samples twice, of both.
 sampler_said <- function(fit) if (knows_history(fit)) fit$posterior else fit$trust
 
-# Whether the discrepancy answers to the history of the conditions: then it carries over to other rows.
+# Whether the discrepancy answers to the history of the conditions: then it carries over to other
+# rows.
 knows_history <- function(fit) !is.null(fit$coefficients)
 
 # Mean of the simulator's runs at posterior draws; by the emulator where there are none.

@@ -1,4 +1,5 @@
-# The archive that an FMU is: what is in it, checked before anything is read; its parts in memory or in a folder.
+# The archive that an FMU is: what is in it, checked before anything is read; its parts in memory or
+# in a folder.
 
 fmu_most_files <- 20000
 fmu_most_bytes <- 4e9       # of the archive, and of what is in it
@@ -7,8 +8,8 @@ fmu_most_packed <- 200      # times its own size, of an archive from which more 
 
 fmu_description_name <- "modelDescription.xml"
 
-# Data frame of the files in the archive: name, size. An archive is refused that could write outside of a folder, fill
-# the disk or plant links.
+# Data frame of the files in the archive: name, size. An archive is refused that could write outside
+# of a folder, fill the disk or plant links.
 fmu_entries <- function(file, call = rlang::caller_env()) {
   refuse <- function(...) {
     why <- paste(...)
@@ -18,7 +19,8 @@ fmu_entries <- function(file, call = rlang::caller_env()) {
   if (file.size(file) > fmu_most_bytes) refuse("It is larger than", fmu_most_bytes / 1e9, "GB.")
   entries <- tryCatch(suppressWarnings(utils::unzip(file, list = TRUE)), error = function(e) NULL)
   flags <- archive_flags(file)
-  if (is.null(entries) || is.null(flags) || !nrow(entries)) refuse("It is no zip archive, or is cut off.")
+  if (is.null(entries) || is.null(flags) || !nrow(entries))
+    refuse("It is no zip archive, or is cut off.")
   entries <- data.frame(name = entries$Name, size = entries$Length)
   if (nrow(entries) > fmu_most_files) refuse("It holds more than", fmu_most_files, "files.")
   if (nrow(entries) != nrow(flags)) refuse("Its list of files is not whole.")
@@ -27,7 +29,8 @@ fmu_entries <- function(file, call = rlang::caller_env()) {
   if (any(flags$secret)) refuse("It is encrypted.")
   total <- sum(entries$size)
   if (total > fmu_most_bytes || total > max(1e8, fmu_most_packed * file.size(file))) {
-    refuse("It would unpack", signif(total / 1e6, 3), "MB from", signif(file.size(file) / 1e6, 3), "MB.")
+    refuse("It would unpack", signif(total / 1e6, 3), "MB from", signif(file.size(file) / 1e6, 3),
+           "MB.")
   }
   entries[!grepl("/$", entries$name), ]
 }
@@ -35,7 +38,8 @@ fmu_entries <- function(file, call = rlang::caller_env()) {
 check_entry_names <- function(names, refuse) {
   bare <- sub("/$", "", names)  # a folder
   out <- !validEnc(names) | !stays_inside(bare)
-  if (any(out)) refuse("Its file", shown_name(names[out][1]), "would be written outside of its folder.")
+  if (any(out))
+    refuse("Its file", shown_name(names[out][1]), "would be written outside of its folder.")
   twice <- anyDuplicated(tolower(bare))
   if (twice) refuse("It holds the file", shown_name(names[twice]), "twice.")
 }
@@ -49,8 +53,9 @@ refuse_fmu <- function(file, why, call, hint = NULL, .envir = parent.frame()) {
               class = "amiss_error_fmu", call = call, .envir = rlang::env(.envir, file = file))
 }
 
-# What the list of unzip() does not say: data frame of link and secret (encrypted), a row for each entry of the central
-# directory (PKWARE's APPNOTE 6.3, 4.3.12 and 4.3.16); NULL if there is none, or a list of 64 bits.
+# What the list of unzip() does not say: data frame of link and secret (encrypted), a row for each
+# entry of the central directory (PKWARE's APPNOTE 6.3, 4.3.12 and 4.3.16); NULL if there is none,
+# or a list of 64 bits.
 archive_flags <- function(file) {
   bytes <- archive_directory(file)
   if (is.null(bytes)) return(NULL)
@@ -60,7 +65,8 @@ archive_flags <- function(file) {
     mode <- little_endian(bytes[at + 40:41])
     link <- c(link, mode %/% 4096 == 10)  # S_IFLNK, 0120000
     secret <- c(secret, little_endian(bytes[at + 8:9]) %% 2 == 1)
-    at <- at + 46 + sum(vapply(c(28, 30, 32), function(field) little_endian(bytes[at + field + 0:1]), 0))
+    at <- at + 46 +
+      sum(vapply(c(28, 30, 32), function(field) little_endian(bytes[at + field + 0:1]), 0))
     if (length(link) > fmu_most_files) return(data.frame(link, secret))
   }
   data.frame(link, secret)
@@ -89,10 +95,12 @@ little_endian <- function(bytes) sum(as.integer(bytes) * 256^(seq_along(bytes) -
 fmu_part <- function(file, name, most, entries, call) {
   size <- entries$size[entries$name == name]
   if (!length(size)) refuse_fmu(file, "It holds no {.file {name}}: it is no FMU.", call)
-  if (size > most) refuse_fmu(file, paste0("Its {.file {name}} is larger than ", most / 1e6, " MB."), call)
+  if (size > most)
+    refuse_fmu(file, paste0("Its {.file {name}} is larger than ", most / 1e6, " MB."), call)
   connection <- unz(file, name, "rb")
   on.exit(close(connection))
-  bytes <- tryCatch(suppressWarnings(readBin(connection, "raw", size + 1)), error = function(e) raw())
+  bytes <- tryCatch(suppressWarnings(readBin(connection, "raw", size + 1)),
+                    error = function(e) raw())
   if (length(bytes) != size) refuse_fmu(file, "Its {.file {name}} is damaged.", call)
   bytes
 }
@@ -100,7 +108,8 @@ fmu_part <- function(file, name, most, entries, call) {
 # A new folder, with the platform's binaries and the resources of an FMU.
 unpack_fmu <- function(file, platform, call = rlang::caller_env()) {
   entries <- fmu_entries(file, call)
-  used <- startsWith(entries$name, paste0("binaries/", platform, "/")) | startsWith(entries$name, "resources/")
+  used <- startsWith(entries$name, paste0("binaries/", platform, "/")) |
+    startsWith(entries$name, "resources/")
   entries <- entries[used, ]
   folder <- tempfile("fmu-")
   dir.create(file.path(folder, "resources"), recursive = TRUE)  # there even if it is empty

@@ -1,6 +1,6 @@
-# Processes in which FMUs run, one for each FMU and session, kept from run to run. A process gets the path of a file
-# with a request as a line, writes the answer beside it, and says that it has; it ends when its standard input does, or
-# its parent.
+# Processes in which FMUs run, one for each FMU and session, kept from run to run. A process gets
+# the path of a file with a request as a line, writes the answer beside it, and says that it has; it
+# ends when its standard input does, or its parent.
 
 fmu_workers <- new.env(parent = emptyenv())
 
@@ -14,7 +14,8 @@ fmu_worker_key <- function(fmu) paste(Sys.getpid(), fmu$hash)
 
 # list(value) of a run; list(why, said) if it failed.
 worker_run <- function(fmu, platform, simulator, request) {
-  worker <- tryCatch(fmu_worker(fmu, platform), amiss_error_worker = function(e) conditionMessage(e))
+  worker <- tryCatch(fmu_worker(fmu, platform),
+                     amiss_error_worker = function(e) conditionMessage(e))
   if (is.character(worker)) return(list(why = worker))
   spent <- TRUE
   on.exit(if (spent) stop_fmu_worker(fmu))  # also if the run is interrupted
@@ -53,7 +54,8 @@ tail_bytes <- function(path, most) {
 # Why there is no answer, or NULL when it is there.
 ask_worker <- function(worker, request_file, simulator) {
   ends <- elapsed() + simulator$time_limit
-  sent <- tryCatch(!length(worker$process$write_input(paste0(request_file, "\n"))), error = function(e) FALSE)
+  sent <- tryCatch(!length(worker$process$write_input(paste0(request_file, "\n"))),
+                   error = function(e) FALSE)
   if (!sent) return(ended_words(worker))
   repeat {
     worker$process$poll_io(as.integer(1000 * max(0, min(1, ends - elapsed()))))
@@ -98,10 +100,12 @@ start_fmu_worker <- function(fmu, platform) {
   dir.create(file.path(worker$folder, "work"), recursive = TRUE)
   worker$origin <- fmu_origin(fmu, platform)
   code <- sprintf("loadNamespace('amiss', lib.loc = %s); amiss:::serve_fmu(%d)",
-                  encodeString(dirname(getNamespaceInfo("amiss", "path")), quote = "'"), Sys.getpid())
+                  encodeString(dirname(getNamespaceInfo("amiss", "path")), quote = "'"),
+                  Sys.getpid())
   worker$process <- processx::process$new(
     file.path(R.home("bin"), "Rscript"), c("--vanilla", "-e", code), stdin = "|", stdout = "|",
-    stderr = file.path(worker$folder, "stderr.txt"), wd = file.path(worker$folder, "work"), cleanup_tree = TRUE,
+    stderr = file.path(worker$folder, "stderr.txt"), wd = file.path(worker$folder, "work"),
+    cleanup_tree = TRUE,
     env = c("current", R_LIBS = paste(.libPaths(), collapse = .Platform$path.sep), R_TESTS = ""))
   fmu_workers[[worker$key]] <- worker
   ready <- FALSE
@@ -113,7 +117,8 @@ start_fmu_worker <- function(fmu, platform) {
   }
   if (ready) return(worker)
   said <- fmu_last_words(NULL, file.path(worker$folder, "stderr.txt"))
-  abort_input(c("the process of the FMU could not be started: {said}"), class = "amiss_error_worker", call = NULL)
+  abort_input(c("the process of the FMU could not be started: {said}"),
+              class = "amiss_error_worker", call = NULL)
 }
 
 unpacked_fmus <- new.env(parent = emptyenv())
@@ -127,8 +132,8 @@ fmu_origin <- function(fmu, platform) {
     folder <- unpack_fmu(fmu$file, platform)
     unpacked_fmus[[fmu$hash]] <- folder
   }
-  list(library = library(folder), resources = file.path(folder, "resources"), version = fmu$version, token = fmu$token,
-       name = fmu$identifier)
+  list(library = library(folder), resources = file.path(folder, "resources"), version = fmu$version,
+       token = fmu$token, name = fmu$identifier)
 }
 
 library_extension <- function(platform) {

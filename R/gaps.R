@@ -3,9 +3,10 @@
 stray_limit <- 0.25   # of a step: a reading is at the nearest step if it strays by no more
 stray_share <- 0.1    # of the rows that may be off all steps and are left out
 
-# The rows of the record: list(row, hours, segment, step), `row` the row of the data, NA where it was lost. A segment
-# goes on over lost rows that together last no longer than `bridge` hours, over one in any case, unless the steps are
-# others after them: shifted by more than stamps stray elsewhere.
+# The rows of the record: list(row, hours, segment, step), `row` the row of the data, NA where it
+# was lost. A segment goes on over lost rows that together last no longer than `bridge` hours, over
+# one in any case, unless the steps are others after them: shifted by more than stamps stray
+# elsewhere.
 regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
   step <- stats::median(diff(hours))
   steps <- diff(hours) / step
@@ -17,7 +18,8 @@ regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
   if (any(!ends & (apart > 1e-6 * steps | steps < 0.5))) {
     snapped <- snap(hours, segment, step)
     row <- which(snapped$keep)
-    if (length(row) < (1 - stray_share) * length(hours)) refuse_unequal(steps, step, ends, name, call)
+    if (length(row) < (1 - stray_share) * length(hours))
+      refuse_unequal(steps, step, ends, name, call)
     if (any(!ends & (apart > 0.01 * steps | steps < 0.5))) tell_stray(hours, snapped, name)
     hours <- snapped$hours[row]
     segment <- segment[row]
@@ -28,15 +30,16 @@ regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
 
 refuse_unequal <- function(steps, step, ends, name, call) {
   off <- which(!ends & abs(steps - 1) > 0.01)[1]
-  abort_input(c(paste("Time column {.val {name}} has unequal steps: {signif(steps[off] * step, 4)} h after row {off},",
-                      "while the usual step is {signif(step, 4)} h; more than {100 * stray_share} % of the rows are at",
-                      "no step."),
-                i = "Interpolate or average the record to equal steps; gaps and stamps that stray a little may stay."),
-                call = call)
+  abort_input(c(paste("Time column {.val {name}} has unequal steps: {signif(steps[off] * step, 4)}",
+                      "h after row {off}, while the usual step is {signif(step, 4)} h; more than",
+                      "{100 * stray_share} % of the rows are at no step."),
+                i = paste("Interpolate or average the record to equal steps; gaps and stamps that",
+                          "stray a little may stay.")), call = call)
 }
 
-# Every stamp at the nearest of equal steps: list(hours, step, keep). The median of stamps that stray is not exactly
-# their step; whole minutes and the slope over the longest segment are tried beside it.
+# Every stamp at the nearest of equal steps: list(hours, step, keep). The median of stamps that
+# stray is not exactly their step; whole minutes and the slope over the longest segment are tried
+# beside it.
 snap <- function(hours, segment, step) {
   longest <- hours[segment == which.max(tabulate(segment))]
   count <- cumsum(c(0, round(diff(longest) / step)))
@@ -65,16 +68,17 @@ insert_lost <- function(row, hours, segment, step) {
   n <- length(hours)
   lost <- ifelse(diff(segment) == 0, pmax(round(diff(hours) / step) - 1, 0), 0)
   at <- seq_len(n) + c(0, cumsum(lost))
-  grid <- list(row = rep(NA_integer_, n + sum(lost)), hours = stats::approx(at, hours, seq_len(n + sum(lost)))$y,
+  grid <- list(row = rep(NA_integer_, n + sum(lost)),
+               hours = stats::approx(at, hours, seq_len(n + sum(lost)))$y,
                segment = rep(segment, c(lost, 0) + 1), step = step)
   grid$row[at] <- row
   grid$hours[at] <- hours
   if (sum(lost)) {
     first <- row[which(lost > 0)[1]]
-    cli::cli_inform(c(paste("{sum(lost)} lost row{?s} in {sum(lost > 0)} gap{?s} {cli::qty(sum(lost))}{?is/are}",
-                            "bridged, the first after row {first}."),
-                      i = "There the target is left out of the comparison; drivers are interpolated linearly."),
-                    class = "amiss_message_gap")
+    cli::cli_inform(c(paste("{sum(lost)} lost row{?s} in {sum(lost > 0)} gap{?s}",
+                            "{cli::qty(sum(lost))}{?is/are} bridged, the first after row {first}."),
+                      i = paste("There the target is left out of the comparison; drivers are",
+                                "interpolated linearly.")), class = "amiss_message_gap")
   }
   grid
 }
@@ -82,15 +86,16 @@ insert_lost <- function(row, hours, segment, step) {
 tell_stray <- function(hours, snapped, name) {
   far <- max(abs(hours - snapped$hours)[snapped$keep])
   left_out <- which(!snapped$keep)
-  cli::cli_inform(c(paste("Time column {.val {name}} has unequal steps; each row is taken at the nearest of equal",
-                          "steps of {signif(snapped$step, 4)} h, {signif(3600 * far, 3)} s away at most."),
-                    i = if (length(left_out)) paste("{length(left_out)} row{?s} between two steps {?is/are} left out;",
-                                                    "the first is row {left_out[1]}.")),
-                  class = "amiss_message_gap")
+  cli::cli_inform(
+    c(paste("Time column {.val {name}} has unequal steps; each row is taken at the nearest of",
+            "equal steps of {signif(snapped$step, 4)} h, {signif(3600 * far, 3)} s away at most."),
+      i = if (length(left_out)) paste("{length(left_out)} row{?s} between two steps {?is/are} left",
+                                      "out; the first is row {left_out[1]}.")),
+    class = "amiss_message_gap")
 }
 
-# Time at the hours of the grid, rounded to milliseconds, as hours are not whole: a second before 00:10:00 is in another
-# minute.
+# Time at the hours of the grid, rounded to milliseconds, as hours are not whole: a second before
+# 00:10:00 is in another minute.
 grid_time <- function(time, grid) {
   if (is.numeric(time)) return(grid$hours)
   at <- utc(round(3600 * grid$hours, 3))
@@ -98,8 +103,8 @@ grid_time <- function(time, grid) {
   at
 }
 
-# Gaps of the drivers that last at most `longest` hours, by straight lines; directions (degrees) by way of sine and
-# cosine. Lost rows are filled in any case.
+# Gaps of the drivers that last at most `longest` hours, by straight lines; directions (degrees) by
+# way of sine and cosine. Lost rows are filled in any case.
 fill_drivers <- function(drivers, grid, longest, turning) {
   for (name in colnames(drivers)) {
     v <- drivers[, name]
@@ -120,13 +125,14 @@ segment_ends <- function(segment) which(c(TRUE, diff(segment) != 0) | c(diff(seg
 
 interpolated <- function(v, gap, fill, hours, turning) {
   line <- function(v) stats::approx(hours[!gap], v[!gap], hours[fill])$y
-  if (turning) (atan2(line(sin(v * pi / 180)), line(cos(v * pi / 180))) * 180 / pi) %% 360 else line(v)
+  if (turning) (atan2(line(sin(v * pi / 180)), line(cos(v * pi / 180))) * 180 / pi) %% 360
+  else line(v)
 }
 
 tell_filled <- function(name, filled, run, lasts) {
   if (!any(filled)) return(invisible())
   gaps <- length(unique(run[filled]))
   cli::cli_inform(paste("{sum(filled)} value{?s} of {.val {name}} in {gaps} gap{?s} of at most",
-                        "{signif(max(lasts[filled]), 3)} h {cli::qty(sum(filled))}{?is/are} filled by straight lines."),
-                  class = "amiss_message_gap")
+                        "{signif(max(lasts[filled]), 3)} h {cli::qty(sum(filled))}{?is/are} filled",
+                        "by straight lines."), class = "amiss_message_gap")
 }

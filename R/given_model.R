@@ -31,5 +31,6 @@ given_model <- function(ensembles, measurements, name, context, parent = NULL, m
 }
 
 given_trial <- function(present, name, ensembles, context) {
-  given_model(ensembles, present$records, paste(present$name, "+", name), context, present$name, name)
+  given_model(ensembles, present$records, paste(present$name, "+", name), context,
+              present$name, name)
 }

@@ -1,5 +1,5 @@
-# Ensembles of runs that were made elsewhere, where others run their simulator: runs at held-out rows have another
-# emulator, of the same design.
+# Ensembles of runs that were made elsewhere, where others run their simulator: runs at held-out
+# rows have another emulator, of the same design.
 
 #' @export
 free_parameters.amiss_ensemble <- function(simulator) simulator$parameters
@@ -7,8 +7,8 @@ free_parameters.amiss_ensemble <- function(simulator) simulator$parameters
 #' @export
 driver_names.amiss_ensemble <- function(simulator) character()
 
-# What a fit is a fit of: its simulator or, where that is not known, the ensemble of its runs. Of several records a
-# list.
+# What a fit is a fit of: its simulator or, where that is not known, the ensemble of its runs. Of
+# several records a list.
 model_of <- function(fit) {
   if (inherits(fit, "amiss_joint")) return(lapply(fit$records, model_of))
   fit$emulator$simulator %||% fit$emulator$given
@@ -26,8 +26,8 @@ predictable <- function(fit) {
 held_out_runs <- function(fit, call = rlang::caller_env()) {
   held <- fit$emulator$given$held_out
   if (is.null(held)) {
-    abort_input(c(paste("The runs of this ensemble were made elsewhere, and none at the validation rows, so that",
-                        "these cannot be predicted."),
+    abort_input(c(paste("The runs of this ensemble were made elsewhere, and none at the validation",
+                        "rows, so that these cannot be predicted."),
                   i = paste("Give them to {.fun ensemble} with the {.arg measurements}, or ask for",
                             "{.code use = \"calibrate\"}.")), call = call)
   }
@@ -58,15 +58,17 @@ check_given <- function(models, measurements, call = rlang::caller_env()) {
     if (!inherits(model, "amiss_ensemble")) next
     if (!is.null(model$simulator)) {
       abort_input(c("The ensemble {.val {name}} knows its simulator.",
-                    i = "Give the simulator itself: it is run where the loop needs it."), call = call)
+                    i = "Give the simulator itself: it is run where the loop needs it."),
+                  call = call)
     }
     rows <- length(used_rows(measurements, "calibrate"))
     if (nrow(model$outputs) != rows) {
-      abort_input(c(paste("The runs of {.val {name}} have {nrow(model$outputs)} steps and the measurements {rows}",
-                          "calibration rows."),
+      abort_input(c(paste("The runs of {.val {name}} have {nrow(model$outputs)} steps and the",
+                          "measurements {rows} calibration rows."),
                     i = "Make the ensemble with these {.arg measurements}."), call = call)
     }
     check_same_rows(model$hours, measurements, call = call)
-    if (!is.null(model$held_out)) check_same_rows(model$held_out$hours, measurements, "validate", call)
+    if (!is.null(model$held_out))
+      check_same_rows(model$held_out$hours, measurements, "validate", call)
   }
 }

@@ -1,13 +1,15 @@
-# From a mode to a posterior: an emulator in the region of the mode, with the simulator's tangent as its
-# mean; the posterior under it; and runs at its draws, which first check the emulator and then train it.
+# From a mode to a posterior: an emulator in the region of the mode, with the simulator's tangent as
+# its mean; the posterior under it; and runs at its draws, which first check the emulator and then
+# train it.
 
 # How precisely the sampler works: to see where a posterior lies, and for a result.
-verified_ais <- list(pilot_chains = 200, groups = 6, max_groups = 8, max_sweeps = 12, precision = 0.2,
-                     gradient = FALSE)
+verified_ais <- list(pilot_chains = 200, groups = 6, max_groups = 8, max_sweeps = 12,
+                     precision = 0.2, gradient = FALSE)
 rough_ais <- list(pilot_chains = 128, groups = 2, max_groups = 4, max_sweeps = 8, precision = 0.5,
                   gradient = FALSE, importance_draws = 0)
 
-# What searches know, the best first: the run of the mode; of all of them the run of least squares, and its slopes.
+# What searches know, the best first: the run of the mode; of all of them the run of least squares,
+# and its slopes.
 with_modes <- function(model, searches, seed) {
   model$mode <- searches[[1]]$at
   ends <- vapply(searches, function(search) search$least$at, 0)
@@ -27,10 +29,12 @@ with_local_runs <- function(model, least, context) {
 
 is_inside <- function(model) succeeded(model) & straight_distance(model) <= 1
 
-# Those that fill it: of an extension not the runs of the model before, which show the region from one side.
+# Those that fill it: of an extension not the runs of the model before, which show the region from
+# one side.
 fills <- function(model) {
   is_new <- rep(TRUE, nrow(model$runs$z))
-  if (length(model$off)) is_new <- colSums(t(model$runs$z[, names(model$off), drop = FALSE]) != model$off) > 0
+  if (length(model$off))
+    is_new <- colSums(t(model$runs$z[, names(model$off), drop = FALSE]) != model$off) > 0
   is_inside(model) & is_new
 }
 
@@ -38,14 +42,14 @@ least_local <- function(model) {
   max(model$local %||% rules$local_runs, rules$local_parameter * length(model$parameters))
 }
 
-# Of its runs, how far out they lie in the straightened coordinates of the region: 1 is where it ends.
-# A run at the end of a flat prior, infinitely far in normal coordinates, is near in these.
+# Of its runs, how far out they lie in the straightened coordinates of the region: 1 is where it
+# ends. A run at the end of a flat prior, infinitely far in normal coordinates, is near in these.
 straight_distance <- function(model) {
   sqrt(colSums(along_axes(model$region, model$space, model$runs$z)^2)) / model$region$radius
 }
 
-# The posterior of the model by the runs there are. Where it reaches the end of its region, the region
-# follows it. list(model, fits): the region it ended with, and a calibration of each record.
+# The posterior of the model by the runs there are. Where it reaches the end of its region, the
+# region follows it. list(model, fits): the region it ended with, and a calibration of each record.
 posterior_of <- function(model, context, ais = NULL, border = rules$border_intervals) {
   for (try in seq_len(rules$region_tries)) {
     fits <- fits_in_region(model, context, ais)
@@ -60,8 +64,8 @@ posterior_of <- function(model, context, ais = NULL, border = rules$border_inter
 # The model with the region of its posterior.
 following <- function(found) {
   model <- found$model
-  model$region <- region_of_draws(joint_unit(model, found$fits), found$fits[[1]]$weights, model$parameters,
-                                  growth = rules$region_growth)
+  model$region <- region_of_draws(joint_unit(model, found$fits), found$fits[[1]]$weights,
+                                  model$parameters, growth = rules$region_growth)
   model
 }
 
@@ -103,7 +107,8 @@ without_failing <- function(model, fits) {
   })
 }
 
-# The run of least squares, of all runs that there are: if one is nearer to the record, the search goes on from it.
+# The run of least squares, of all runs that there are: if one is nearer to the record, the search
+# goes on from it.
 with_least <- function(model, context) {
   misfit <- squared_misfit(model)
   nearest <- which.min(misfit)
@@ -117,8 +122,8 @@ with_least <- function(model, context) {
   model
 }
 
-# The slopes there by differences, as what the discrepancy keeps out of hangs on them; and the search goes on as long as
-# they promise that it comes nearer to the record.
+# The slopes there by differences, as what the discrepancy keeps out of hangs on them; and the
+# search goes on as long as they promise that it comes nearer to the record.
 with_exact_least <- function(model, context) {
   model <- with_least(model, context)
   if (isTRUE(model$least$exact)) return(model)
@@ -134,11 +139,13 @@ with_exact_least <- function(model, context) {
 # Where slopes are known, as a search takes them.
 least_reference <- function(model) {
   least <- model$least
-  list(z = model$runs$z[least$at, ], slopes = least$slopes, stale = if (isTRUE(least$exact)) 0 else rules$trial_stale)
+  list(z = model$runs$z[least$at, ], slopes = least$slopes,
+       stale = if (isTRUE(least$exact)) 0 else rules$trial_stale)
 }
 
-# The simulator about the centre of the region as a line: its `output` there and its `slopes` for a standard
-# deviation of the prior of each parameter, those of least squares as the runs near it correct them.
+# The simulator about the centre of the region as a line: its `output` there and its `slopes` for a
+# standard deviation of the prior of each parameter, those of least squares as the runs near it
+# correct them.
 with_centre <- function(model) {
   at <- which.min(ifelse(succeeded(model), straight_distance(model), Inf))
   slopes <- secant_slopes(model, at, least_reference(model))
@@ -147,14 +154,15 @@ with_centre <- function(model) {
   model
 }
 
-# One record as the sampler takes it: an emulator of the runs in its region, whose discrepancy keeps out
-# of what the parameters do there, as far as its reach says.
+# One record as the sampler takes it: an emulator of the runs in its region, whose discrepancy keeps
+# out of what the parameters do there, as far as its reach says.
 record_setting <- function(model, k, context, ais) {
   record <- model$records[[k]]
   own <- model$own[[k]]
   region <- region_part(model$region, own)
   ensemble <- record_ensemble(model, k, region)
-  control <- utils::modifyList(list(noise_fraction = rules$basis_error), as.list(context$control$emulator))
+  control <- utils::modifyList(list(noise_fraction = rules$basis_error),
+                               as.list(context$control$emulator))
   emulator <- without_basis_warnings(
     train_emulator(ensemble, record$measurements, control, threads = context$threads))
   emulator$moves <- local_moves(model, k)
@@ -162,9 +170,9 @@ record_setting <- function(model, k, context, ais) {
   if (!is.null(ais)) {
     control$ais <- fill_ais_control(utils::modifyList(control$ais, ais))
   }
-  list(emulator = emulator, measurements = record$measurements, rows = record$rows, control = control,
-       priors = history_priors(record$measurements, control, length(record$rows),
-                               mean(emulator$basis$discarded_sd^2)),
+  list(emulator = emulator, measurements = record$measurements, rows = record$rows,
+       control = control, priors = history_priors(record$measurements, control, length(record$rows),
+                                                  mean(emulator$basis$discarded_sd^2)),
        seed = context$seed)
 }
 
@@ -173,7 +181,8 @@ local_moves <- function(model, k) {
   own <- model$own[[k]]
   unit <- normal_units(model, model$least)[own]
   slopes <- model$least$slopes[model$rows[[k]], own, drop = FALSE]
-  list(root = unname(sweep(slopes, 2, unit, "*")), z = model$runs$z[model$least$at, own], unit = unit)
+  list(root = unname(sweep(slopes, 2, unit, "*")), z = model$runs$z[model$least$at, own],
+       unit = unit)
 }
 
 # Runs inside the region or, if they are few, the nearest ones.
@@ -189,7 +198,8 @@ record_ensemble <- function(model, k, region) {
   parameters <- model$parameters[own]
   unit <- unname(to_unit(model$runs$z[wanted, own, drop = FALSE], model$space[own, ]))
   ensemble <- new_ensemble(parameters, unit, unit_to_values(unit, parameters),
-                           model$runs$outputs[rows, wanted, drop = FALSE], model$simulators[[k]], NA,
+                           model$runs$outputs[rows, wanted, drop = FALSE], model$simulators[[k]],
+                           NA,
                            region, hours = record$measurements$hours[record$rows])
   per_unit <- straightened(region, model$space[own, ])$slope * region$root
   ensemble$tangent <- list(centre = model$centre$output[rows],
@@ -199,8 +209,8 @@ record_ensemble <- function(model, k, region) {
 
 least_training <- function(own) max(6, length(own) + 3)
 
-# Runs at n draws of the posterior: list(model, fits) with the checks of the calibrations, whose evidence
-# they correct.
+# Runs at n draws of the posterior: list(model, fits) with the checks of the calibrations, whose
+# evidence they correct.
 check_by_runs <- function(model, fits, n, context) {
   drawn <- even_draws(fits[[1]], n)
   draws <- unique(drawn)
@@ -223,9 +233,11 @@ check_by_runs <- function(model, fits, n, context) {
   list(model = model, fits = exact_evidence(fits, each, context$threads))
 }
 
-# The verified posterior: local runs, the posterior by them, the check, until it passes with enough to spare for
-# intervals and two rounds agree on the evidence. `before`: the evidence that an earlier check found.
-verify_model <- function(model, context, before = NULL, rounds = context$control$rounds %||% rules$verify_rounds) {
+# The verified posterior: local runs, the posterior by them, the check, until it passes with enough
+# to spare for intervals and two rounds agree on the evidence. `before`: the evidence that an
+# earlier check found.
+verify_model <- function(model, context, before = NULL,
+                         rounds = context$control$rounds %||% rules$verify_rounds) {
   least <- least_local(model)
   best <- NULL
   for (round in seq_len(max(1, rounds))) {
@@ -265,11 +277,12 @@ verify_model <- function(model, context, before = NULL, rounds = context$control
   with_fit(best$model, best$fits, "verified", round, context)
 }
 
-# Whether the run of least squares lies outside the region and is more probable than the draws: their mode is another,
-# lower one. A model moves once.
+# Whether the run of least squares lies outside the region and is more probable than the draws:
+# their mode is another, lower one. A model moves once.
 misses_least <- function(model, fits) {
   at <- model$least$at
-  if (isTRUE(model$moved) || !length(model$checked$at) || straight_distance(model)[at] <= 1) return(FALSE)
+  if (isTRUE(model$moved) || !length(model$checked$at) || straight_distance(model)[at] <= 1)
+    return(FALSE)
   value <- values_under(model, fits, c(at, model$checked$at))
   isTRUE(value[1] > stats::median(rep(value[-1], model$checked$times)) + rules$mode_depth)
 }
@@ -282,14 +295,16 @@ moved_to_least <- function(model, context) {
   model
 }
 
-model_ais <- function(context) utils::modifyList(verified_ais, as.list(context$control$calibration$ais))
+model_ais <- function(context)
+  utils::modifyList(verified_ais, as.list(context$control$calibration$ais))
 
 has_settled <- function(fits, before) {
-  !is.null(before) && abs(fits[[1]]$log_evidence - before) <= rules$rounds_agree && all(vapply(fits, function(fit) {
-    check <- fit$check
-    isTRUE(check$passed) && check$border <= rules$border_intervals &&
-      check$effective >= rules$effective_intervals && fit$standard_error <= rules$evidence_error
-  }, NA))
+  !is.null(before) && abs(fits[[1]]$log_evidence - before) <= rules$rounds_agree &&
+    all(vapply(fits, function(fit) {
+      check <- fit$check
+      isTRUE(check$passed) && check$border <= rules$border_intervals &&
+        check$effective >= rules$effective_intervals && fit$standard_error <= rules$evidence_error
+    }, NA))
 }
 
 # Passed ones first, among them by the effective share of the runs.
@@ -310,7 +325,8 @@ with_fit <- function(model, fits, level, rounds, context) {
     fit$rounds <- rounds
     fit$runs_made <- runs_spent(context)
     fit$modes <- model$modes
-    if (isFALSE(fit$modes$agree) || isTRUE(fit$modes$lost > 0)) fit$trust <- not_agreed(fit$trust, fit$modes)
+    if (isFALSE(fit$modes$agree) || isTRUE(fit$modes$lost > 0))
+      fit$trust <- not_agreed(fit$trust, fit$modes)
     fit
   }, fits, best)
   model$fit <- joined_fit(stats::setNames(fits, names(model$simulators)))
@@ -324,7 +340,8 @@ best_runs <- function(model) {
   unit <- to_unit(model$runs$z[at, , drop = FALSE], model$space)
   Map(function(own, rows) {
     parameters <- model$parameters[own]
-    list(values = unit_to_values(unit[, own, drop = FALSE], parameters), output = model$runs$outputs[rows, at])
+    list(values = unit_to_values(unit[, own, drop = FALSE], parameters),
+         output = model$runs$outputs[rows, at])
   }, model$own, model$rows)
 }
 
@@ -334,15 +351,18 @@ not_checked <- function() {
 
 # Of searches from several starts no two led to one mode: there may be a better one.
 not_agreed <- function(trust, modes) {
-  why <- if (isTRUE(modes$lost > 0)) sprintf("no draws lie at %d of the modes that searches found", modes$lost)
-         else if (modes$searches < 2) "the budget allowed a single search, so that no other confirms its mode"
+  why <- if (isTRUE(modes$lost > 0))
+           sprintf("no draws lie at %d of the modes that searches found", modes$lost)
+         else if (modes$searches < 2)
+           "the budget allowed a single search, so that no other confirms its mode"
          else sprintf("no two of %d searches led to one mode", modes$searches)
-  list(trusted = FALSE, verdict = paste0(c(if (!trust$trusted) trust$verdict, paste("not trusted:", why)),
-                                         collapse = "; "))
+  list(trusted = FALSE, verdict = paste0(
+    c(if (!trust$trusted) trust$verdict, paste("not trusted:", why)), collapse = "; "))
 }
 
-# Whether a second search ended in the region of the posterior, as seen in the end; and how many ended at a place as
-# probable as the draws of the posterior that were run, but without draws: a mode that was lost.
+# Whether a second search ended in the region of the posterior, as seen in the end; and how many
+# ended at a place as probable as the draws of the posterior that were run, but without draws: a
+# mode that was lost.
 confirmed_modes <- function(model, modes, fits) {
   modes$agree <- modes$agree || sum(straight_distance(model)[modes$ends] <= 1) > 1
   z <- t(from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$space))
@@ -362,8 +382,9 @@ confirmed_modes <- function(model, modes, fits) {
 values_under <- function(model, fits, at) {
   draws <- even_draws(fits[[1]], rules$search_draws)
   each <- Map(function(fit, rows) {
-    log_l <- run_log_likelihood(fit, rep(draws, length(at)),
-                                model$runs$outputs[rows, rep(at, each = length(draws)), drop = FALSE], 1)
+    log_l <- run_log_likelihood(
+      fit, rep(draws, length(at)),
+      model$runs$outputs[rows, rep(at, each = length(draws)), drop = FALSE], 1)
     apply(matrix(log_l, length(draws)), 2, log_mean_exp)
   }, fits, model$rows)
   Reduce(`+`, each) - 0.5 * rowSums(model$runs$z[at, !model$space$flat, drop = FALSE]^2)
@@ -374,6 +395,7 @@ calibrate_model <- function(model, context) {
   found <- find_modes(model, context)
   model <- with_modes(found$model, found$modes, context$seed)
   model$modes <- list(agree = found$agree, searches = length(found$modes),
-                      ends = vapply(found$modes, `[[`, 0, "at"), covariances = lapply(found$modes, `[[`, "covariance"))
+                      ends = vapply(found$modes, `[[`, 0, "at"),
+                      covariances = lapply(found$modes, `[[`, "covariance"))
   verify_model(model, context)
 }

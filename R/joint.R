@@ -1,34 +1,37 @@
-# Several records at once: targets of one simulator, or objects that share parameters. Each record has its own error,
-# its own discrepancy and, if there are several, its own simulator; parameters of the same name are one parameter.
+# Several records at once: targets of one simulator, or objects that share parameters. Each record
+# has its own error, its own discrepancy and, if there are several, its own simulator; parameters of
+# the same name are one parameter.
 
 #' Calibrate several records together
 #'
-#' Two or more measured series, each with its own noise, error and discrepancy, and one set of parameters: temperature
-#' and heat flux of one room, two rooms, two houses with the same walls. Given the parameters the records are
-#' independent; parameters of the same name are one parameter with one prior, others belong to the records whose
-#' simulators have them, or that go by another name ([rename_parameters()]). Emulators are trained and checked by runs
-#' for each record, and refined where the joint posterior lies, as [calibrate_refined()] does for one.
+#' Two or more measured series, each with its own noise, error and discrepancy, and one set of
+#' parameters: temperature and heat flux of one room, two rooms, two houses with the same walls.
+#' Given the parameters the records are independent; parameters of the same name are one parameter
+#' with one prior, others belong to the records whose simulators have them, or that go by another
+#' name ([rename_parameters()]). Emulators are trained and checked by runs for each record, and
+#' refined where the joint posterior lies, as [calibrate_refined()] does for one.
 #'
-#' @param simulators Named list of simulators, one for each record. Several outputs of one function are
-#'   [outputs_of()] it; the heat flux into a wall of a zone is [zone_flux()].
+#' @param simulators Named list of simulators, one for each record. Several outputs of one function
+#'   are [outputs_of()] it; the heat flux into a wall of a zone is [zone_flux()].
 #' @param measurements Named list of [measurements()], with the same names.
-#' @param runs `simulate_jointly()`: runs of each simulator, all of one design. `calibrate_jointly()`: as in
-#'   [calibrate_refined()], for each record.
-#' @param ensembles Named list of ensembles: those of `simulate_jointly()`, or of [ensemble()] for runs that were made
-#'   elsewhere (which are checked, but not refined).
+#' @param runs `simulate_jointly()`: runs of each simulator, all of one design.
+#'   `calibrate_jointly()`: as in [calibrate_refined()], for each record.
+#' @param ensembles Named list of ensembles: those of `simulate_jointly()`, or of [ensemble()] for
+#'   runs that were made elsewhere (which are checked, but not refined).
 #' @inheritParams calibrate_refined
-#' @return `simulate_jointly()`: a named list of ensembles. `calibrate_jointly()`: an object of class `amiss_joint`:
-#'   `records`, a named list of calibrations ([calibrate()]) whose draws are those of the joint posterior, for
-#'   [discrepancy()], `predict()`, `plot()` and all else that concerns one record; `values` and `weights`, draws of all
-#'   parameters; `log_evidence`, `standard_error`, `interval`: the evidence, a density of all records; `trust`;
-#'   `rounds` and `runs_made` as [calibrate_refined()] has them. `coef()`, `confint()`, `vcov()`, `tidy()`,
+#' @return `simulate_jointly()`: a named list of ensembles. `calibrate_jointly()`: an object of
+#'   class `amiss_joint`: `records`, a named list of calibrations ([calibrate()]) whose draws are
+#'   those of the joint posterior, for [discrepancy()], `predict()`, `plot()` and all else that
+#'   concerns one record; `values` and `weights`, draws of all parameters; `log_evidence`,
+#'   `standard_error`, `interval`: the evidence, a density of all records; `trust`; `rounds` and
+#'   `runs_made` as [calibrate_refined()] has them. `coef()`, `confint()`, `vcov()`, `tidy()`,
 #'   `as.data.frame()`, `predict()` (a list by record) and [bayes_factor()] work on it.
-#' @section Errors: `amiss_error_input` if names differ, a parameter has two priors, or fewer than two records are
-#'   given.
-#' @source The joint posterior is that of [calibrate()] with the product of the records' likelihoods;
-#'   `vignette("algorithm", "amiss")`, *Several records*.
-#' @seealso [attribute_discrepancy()] tells which conditions drive the discrepancy of each record, and of all;
-#'   [upgrade_model()] takes several records as well.
+#' @section Errors: `amiss_error_input` if names differ, a parameter has two priors, or fewer than
+#'   two records are given.
+#' @source The joint posterior is that of [calibrate()] with the product of the records'
+#'   likelihoods; `vignette("algorithm", "amiss")`, *Several records*.
+#' @seealso [attribute_discrepancy()] tells which conditions drive the discrepancy of each record,
+#'   and of all; [upgrade_model()] takes several records as well.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
@@ -51,16 +54,19 @@
 calibrate_jointly <- function(ensembles, measurements, rounds = rules$verify_rounds, runs = NULL,
                               control = NULL, seed = NULL, threads = 1, quiet = FALSE) {
   hush(quiet)
-  check_records(ensembles, measurements, "ensembles", function(x) check_object(x, "amiss_ensemble", "ensembles"))
+  check_records(ensembles, measurements, "ensembles",
+                function(x) check_object(x, "amiss_ensemble", "ensembles"))
   check_one_prior(lapply(ensembles, `[[`, "parameters"))
   measurements <- measurements[names(ensembles)]
   control <- check_refining(measurements, rounds, runs, control)
-  calibrate_ensembles(ensembles, measurements, rounds, runs, control, pick_seed(seed), check_threads(threads))
+  calibrate_ensembles(ensembles, measurements, rounds, runs, control, pick_seed(seed),
+                      check_threads(threads))
 }
 
 #' @rdname calibrate_jointly
 #' @export
-simulate_jointly <- function(simulators, measurements, runs = 150, seed = NULL, threads = 1, quiet = FALSE) {
+simulate_jointly <- function(simulators, measurements, runs = 150, seed = NULL, threads = 1,
+                             quiet = FALSE) {
   hush(quiet)
   check_records(simulators, measurements, "simulators", check_simulator)
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")
@@ -79,12 +85,14 @@ simulate_jointly <- function(simulators, measurements, runs = 150, seed = NULL, 
   colnames(unit) <- names(all)
   Map(function(simulator, parameters, m) {
     if (!length(parameters)) {
-      abort_input("The simulator {.val {simulator$name}} has no free parameter; its record says nothing of any.")
+      abort_input(paste("The simulator {.val {simulator$name}} has no free parameter; its record",
+                        "says nothing of any."))
     }
     own <- unname(unit[, names(parameters), drop = FALSE])
     values <- unit_to_values(own, parameters)
-    new_ensemble(parameters, own, values, simulate_measured(simulator, values, m, "calibrate", threads), simulator,
-                 seed, hours = row_hours(m, "calibrate"))
+    new_ensemble(parameters, own, values,
+                 simulate_measured(simulator, values, m, "calibrate", threads), simulator, seed,
+                 hours = row_hours(m, "calibrate"))
   }, simulators, each, measurements[names(simulators)])
 }
 
@@ -92,26 +100,30 @@ check_records <- function(x, measurements, name, check_one, least = 2, call = rl
   check_input(checkmate::check_list(x, min.len = least, names = "unique"), name,
               "Give a named list, one element for each record.", call = call)
   for (one in x) check_one(one)
-  check_input(checkmate::check_list(measurements, min.len = least, names = "unique"), "measurements",
-              "Give a named list, one element for each record.", call = call)
+  check_input(checkmate::check_list(measurements, min.len = least, names = "unique"),
+              "measurements", "Give a named list, one element for each record.", call = call)
   for (m in measurements) check_object(m, "amiss_measurements", "measurements", call = call)
   if (!setequal(names(x), names(measurements))) {
-    abort_input(c("{.arg {name}} are of {.val {names(x)}}, {.arg measurements} of {.val {names(measurements)}}.",
+    abort_input(c(paste("{.arg {name}} are of {.val {names(x)}}, {.arg measurements} of",
+                        "{.val {names(measurements)}}."),
                   i = "Give one of each for every record, under the same name."), call = call)
   }
 }
 
 #' @export
 print.amiss_joint <- function(x, ...) on_stdout(x, {
-  cli::cli_text("{.strong Joint calibration} of {length(x$records)} records: {.val {names(x$records)}}")
-  cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)} [{round(x$interval[1] / log(10), 2)},",
-                      "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
+  cli::cli_text(
+    "{.strong Joint calibration} of {length(x$records)} records: {.val {names(x$records)}}")
+  cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)}",
+                      "[{round(x$interval[1] / log(10), 2)}, {round(x$interval[2] / log(10), 2)}],",
+                      "{x$trust$verdict}"))
   say_parameters(x, 4)
   for (name in names(x$records)) {
     fit <- x$records[[name]]
     cli::cli_bullets(c("*" = "{name} ({length(fit$rows)} rows): {fit$check$verdict}"))
   }
-  cli::cli_bullets(c(">" = "next: {.fun attribute_discrepancy}, {.fun upgrade_model}, or {.code $records} one by one"))
+  cli::cli_bullets(c(">" = paste("next: {.fun attribute_discrepancy}, {.fun upgrade_model}, or",
+                                 "{.code $records} one by one")))
 })
 
 #' @export
@@ -125,7 +137,8 @@ summary.amiss_joint <- function(object, ...) {
 coef.amiss_joint <- function(object, ...) coef.amiss_fit(object, ...)
 
 #' @export
-confint.amiss_joint <- function(object, parm = NULL, level = 0.95, ...) confint.amiss_fit(object, parm, level, ...)
+confint.amiss_joint <- function(object, parm = NULL, level = 0.95, ...)
+  confint.amiss_fit(object, parm, level, ...)
 
 #' @export
 vcov.amiss_joint <- function(object, ...) vcov.amiss_fit(object, ...)
@@ -134,7 +147,8 @@ vcov.amiss_joint <- function(object, ...) vcov.amiss_fit(object, ...)
 tidy.amiss_joint <- function(x, conf.level = 0.95, ...) tidy.amiss_fit(x, conf.level, ...)
 
 #' @export
-as.data.frame.amiss_joint <- function(x, row.names = NULL, optional = FALSE, draws = nrow(x$values), ...) {
+as.data.frame.amiss_joint <- function(x, row.names = NULL, optional = FALSE,
+                                      draws = nrow(x$values), ...) {
   as.data.frame.amiss_fit(x, row.names, optional, draws, ...)
 }
 
@@ -177,10 +191,11 @@ glance.amiss_joint <- function(x, ...) {
   each <- lapply(unname(x$records), generics::glance)
   largest <- function(column) max(vapply(each, function(g) as.numeric(g[[column]]), 0))
   left <- left_by_simulation(x)
-  data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3], trusted = x$trust$trusted,
-             emulator_error = x$check$ratio %||% NA_real_,
-             sigma = sqrt(sum(left^2) / max(1, length(left) - length(x$parameters))), nobs = stats::nobs(x),
-             vectors = largest("vectors"), runs = largest("runs"), records = length(x$records))
+  data.frame(log10_evidence = decades[1], lower95 = decades[2], upper95 = decades[3],
+             trusted = x$trust$trusted, emulator_error = x$check$ratio %||% NA_real_,
+             sigma = sqrt(sum(left^2) / max(1, length(left) - length(x$parameters))),
+             nobs = stats::nobs(x), vectors = largest("vectors"), runs = largest("runs"),
+             records = length(x$records))
 }
 
 # Records need not share conditions nor clocks: a list by record.
@@ -196,10 +211,12 @@ augment.amiss_joint <- function(x, data = NULL, newdata = NULL, ...) {
 as.matrix.amiss_joint <- function(x, draws = nrow(x$values), ...) as.matrix.amiss_fit(x, draws, ...)
 
 #' @exportS3Method posterior::as_draws_matrix
-as_draws_matrix.amiss_joint <- function(x, draws = nrow(x$values), ...) as_draws_matrix.amiss_fit(x, draws, ...)
+as_draws_matrix.amiss_joint <- function(x, draws = nrow(x$values), ...)
+  as_draws_matrix.amiss_fit(x, draws, ...)
 
 #' @exportS3Method posterior::as_draws_df
-as_draws_df.amiss_joint <- function(x, draws = nrow(x$values), ...) as_draws_df.amiss_fit(x, draws, ...)
+as_draws_df.amiss_joint <- function(x, draws = nrow(x$values), ...)
+  as_draws_df.amiss_fit(x, draws, ...)
 
 #' @exportS3Method posterior::as_draws
 as_draws.amiss_joint <- as_draws_df.amiss_joint
@@ -208,10 +225,12 @@ as_draws.amiss_joint <- as_draws_df.amiss_joint
 predict.amiss_joint <- function(object, newdata = NULL, ...) {
   check_whole(object, "object")
   if (!is.null(newdata)) {
-    check_input(checkmate::check_list(newdata, names = "unique"), "newdata", "Give a list by record.")
+    check_input(checkmate::check_list(newdata, names = "unique"), "newdata",
+                "Give a list by record.")
     unknown <- setdiff(names(newdata), names(object$records))
     if (length(unknown)) {
-      abort_input("{.arg newdata} names {.val {unknown}}; the records are {.val {names(object$records)}}.")
+      abort_input(
+        "{.arg newdata} names {.val {unknown}}; the records are {.val {names(object$records)}}.")
     }
   }
   lapply(stats::setNames(nm = names(newdata) %||% names(object$records)), function(name) {
@@ -222,7 +241,8 @@ predict.amiss_joint <- function(object, newdata = NULL, ...) {
 #' @export
 calibrated_record.amiss_joint <- function(fit) lapply(fit$records, calibrated_record)
 
-# Which conditions drive the discrepancies: of each record, and the same conditions in all that have them.
+# Which conditions drive the discrepancies: of each record, and the same conditions in all that have
+# them.
 #' @export
 attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, threads = 1) {
   check_whole(fit, "fit")
@@ -237,20 +257,24 @@ attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, 
             class = "amiss_joint_attribution")
 }
 
-# list(table, groups): a row for each condition that any record has, with the evidence lost if it is dropped from all
-# discrepancies, and the least p-value among the records, times their number (Bonferroni); and the same of groups that
-# some record cannot tell apart, where the records together cannot either.
+# list(table, groups): a row for each condition that any record has, with the evidence lost if it is
+# dropped from all discrepancies, and the least p-value among the records, times their number
+# (Bonferroni); and the same of groups that some record cannot tell apart, where the records
+# together cannot either.
 attributed_together <- function(fits, each, control, seed, threads) {
   records <- engine_records(fits)
   draws <- engine_draws(fits)
-  filled <- fill_attribution_control(control, fits[[1]]$control$ais, length(fits[[1]]$measurements$conditions))
+  filled <- fill_attribution_control(control, fits[[1]]$control$ais,
+                                     length(fits[[1]]$measurements$conditions))
   # `own`: of each record that has them, its row or group of the same conditions.
   dropped_from_all <- function(conditions, own) {
-    at <- lapply(unname(fits), function(fit) which(fit$measurements$conditions %in% conditions) - 1L)
+    at <- lapply(unname(fits),
+                 function(fit) which(fit$measurements$conditions %in% conditions) - 1L)
     dropped <- staged("attributing the discrepancies together", call_engine(
       drop_conditions_(records, draws, at, filled$ais, engine_context(seed, threads))))
     p <- min(1, sum(lengths(at) > 0) * min(1, vapply(own, `[[`, 0, "p_value")))
-    list(log10_bf_dropped = dropped$lost / log(10), standard_error = dropped$standard_error / log(10), p_value = p,
+    list(log10_bf_dropped = dropped$lost / log(10),
+         standard_error = dropped$standard_error / log(10), p_value = p,
          significant = dropped$lost / log(10) >= filled$least_log10_bf && p <= filled$level,
          trusted = dropped$trusted)
   }
@@ -278,7 +302,8 @@ attributed_together <- function(fits, each, control, seed, threads) {
 
 #' @export
 print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
-  cli::cli_text("{.strong Attribution} of the discrepancies of {.val {names(x$records)}}, together:")
+  cli::cli_text(
+    "{.strong Attribution} of the discrepancies of {.val {names(x$records)}}, together:")
   say_table(x$table[c("boundary", "log10_bf_dropped", "p_value", "significant", "records")])
   for (name in names(x$records)) {
     named <- significant_conditions(x$records[[name]]$table)
@@ -292,6 +317,7 @@ print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
 tidy.amiss_joint_attribution <- function(x, ...) {
   check_whole(x, "x")
   rlang::check_dots_empty()
-  each <- Map(function(name, attribution) cbind(record = name, attribution$table), names(x$records), x$records)
+  each <- Map(function(name, attribution) cbind(record = name, attribution$table), names(x$records),
+              x$records)
   do.call(rbind, unname(each))
 }

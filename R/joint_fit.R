@@ -6,8 +6,10 @@ check_one_prior <- function(each, call = rlang::caller_env()) {
   for (name in unique(names(all)[duplicated(names(all))])) {
     priors <- vapply(all[names(all) == name], function(p) format(p$prior), "")
     if (length(unique(priors)) > 1) {
-      abort_input(c("The parameter {.val {name}} has different priors: {.val {unique(unname(priors))}}.",
-                    i = "Parameters of one name are one parameter: give it one prior, or two names."), call = call)
+      abort_input(
+        c("The parameter {.val {name}} has different priors: {.val {unique(unname(priors))}}.",
+          i = "Parameters of one name are one parameter: give it one prior, or two names."),
+        call = call)
     }
   }
 }
@@ -25,25 +27,31 @@ new_joint <- function(fits) {
   first <- fits[[1]]
   untrusted <- Filter(function(name) !fits[[name]]$trust$trusted, names(fits))
   verdict <- if (!length(untrusted)) first$trust$verdict else {
-    paste(vapply(untrusted, function(name) paste0(name, ": ", fits[[name]]$trust$verdict), ""), collapse = "; ")
+    paste(vapply(untrusted, function(name) paste0(name, ": ", fits[[name]]$trust$verdict), ""),
+          collapse = "; ")
   }
   posterior <- first$posterior[setdiff(names(first$posterior), c("setting", "variance", "t"))]
   units <- do.call(cbind, unname(lapply(fits, posterior_unit)))
   named <- unlist(lapply(fits, function(fit) names(fit$emulator$parameters)))
   posterior$unit <- unname(units[, match(names(parameters), named), drop = FALSE])
-  structure(list(format_version = format_version, records = lapply(fits, as_part), parameters = parameters,
-                 values = values, weights = first$weights, posterior = posterior, log_evidence = first$log_evidence,
-                 standard_error = first$standard_error, interval = first$interval, check = joint_check(fits),
-                 trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
-                 runs_made = first$runs_made, modes = first$modes, seed = first$seed), class = "amiss_joint")
+  structure(
+    list(format_version = format_version, records = lapply(fits, as_part), parameters = parameters,
+         values = values, weights = first$weights, posterior = posterior,
+         log_evidence = first$log_evidence, standard_error = first$standard_error,
+         interval = first$interval, check = joint_check(fits),
+         trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
+         runs_made = first$runs_made, modes = first$modes, seed = first$seed),
+    class = "amiss_joint")
 }
 
-# What the checks say of all records: passed where each has, with the largest error in units of the noise.
+# What the checks say of all records: passed where each has, with the largest error in units of the
+# noise.
 joint_check <- function(fits) {
   checks <- Filter(Negate(is.null), lapply(fits, `[[`, "check"))
   if (!length(checks)) return(NULL)
   list(ratio = max(vapply(checks, `[[`, 0, "ratio")), effective = checks[[1]]$effective,
-       border = max(vapply(checks, `[[`, 0, "border")), passed = all(vapply(checks, `[[`, NA, "passed")),
+       border = max(vapply(checks, `[[`, 0, "border")),
+       passed = all(vapply(checks, `[[`, NA, "passed")),
        verdict = paste0(names(checks), ": ", vapply(checks, `[[`, "", "verdict"), collapse = "; "))
 }
 
@@ -57,7 +65,8 @@ left_by_simulation <- function(fit) {
   unlist(lapply(unname(fits), function(one) left_at_best(one) / one$measurements$noise_sd))
 }
 
-# What the simulation leaves of the record at its best: at the run of least squares, if there is one.
+# What the simulation leaves of the record at its best: at the run of least squares, if there is
+# one.
 left_at_best <- function(fit) {
   if (is.null(fit$best)) left_by_mean(fit) else fit$measurements$y[fit$rows] - fit$best$output
 }

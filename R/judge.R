@@ -1,68 +1,76 @@
-# Each adopted mechanism judged by itself: named, likely, or a stand-in for something that the catalogue does not
-# hold. What speaks against a mechanism is a doubt: an id, a test that gives its sentence or nothing, and the reason
-# why it counts.
+# Each adopted mechanism judged by itself: named, likely, or a stand-in for something that the
+# catalogue does not hold. What speaks against a mechanism is a doubt: an id, a test that gives its
+# sentence or nothing, and the reason why it counts.
 
 doubt <- function(says, reason) list(says = says, reason = reason)
 
-# Tests of a case: the mechanism's model and its parent, its row and those of its rivals, and what judge_models()
-# knows of all models.
-doubts <- list(
-  record = doubt(function(case) record_doubt_words(case$faults), "a fault of the record looks like a cause"),
-  describes = doubt(function(case) {
-    if (describes(case$entry)) "it describes what is missing and does not explain it"
-  }, "a response is no cause"),
-  rivals = doubt(function(case) {
-    if (case$others > rules$rival_probability) "other causes are possible"
-  }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
-  untried = doubt(function(case) {
-    twins <- untried_twins(case$parent, case$entry, case$catalogue)
-    if (length(twins)) {
-      sprintf("the error answers to %s as well, which this record cannot tell from %s and no mechanism was given for",
-              listed(twins), listed(case$entry$boundary, "or"))
-    }
-  }, "a place or driver that nobody thought of is no less likely"),
-  untrusted = doubt(function(case) {
-    if (!case$parent$fit$trust$trusted || !case$model$fit$trust$trusted) "the numbers behind it are not trusted"
-  }, "runs of the simulator refute an emulator, or searches do not agree"),
-  steps = doubt(function(case) {
-    step_doubt(case$parent, case$model, case$new, case$row$log10_bf, case$measurements)
-  }, "coarse steps of a simulator look like a cause"),
-  no_gain = doubt(function(case) {
-    if (case$no_gain) "held-out data do not improve"
-  }, "what fits alone does not predict"),
-  raises_error = doubt(function(case) risen_words(case$parent, case$model),
-                       "what is gained, the discrepancy gains"),
-  still_responds = doubt(function(case) {
-    if (still_answers(case$parent, case$model, case$entry$boundary)) "the error still responds to what drives it"
-  }, "the true mechanism takes the response away"),
-  only_beside = doubt(function(case) only_beside(case$models, case$confounded, case$candidates),
-                      "two that imitate a third together look like this"),
-  edge = doubt(function(case) {
-    if (any(edge_of_prior(case$model$fit)[case$new])) "its value lies at the edge of what was thought possible"
-  }, "it may make up for something else"),
-  remains = doubt(function(case) {
-    if (case$remains) "a good part of the error remains"
-  }, "the mechanism that made the error leaves nothing"),
-  coverage = doubt(function(case) {
-    if (isTRUE(case$inside < rules$least_inside)) {
-      sprintf("its 95 %% band holds only %s of the data held out", percent(case$inside))
-    }
-  }, "a band that misses a fifth of new data is wrong"),
-  slow = doubt(function(case) {
-    if (case$drift && acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
-      "anything that changes slowly would explain the error as well"
-    }
-  }, "a parabola in time does as well, and so does the mechanism"),
-  drift = doubt(function(case) {
-    if (case$drift && !acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
-      "a drifting sensor would explain the error as well"
-    }
-  }, "a parabola in time does as well"))
+# Tests of a case: the mechanism's model and its parent, its row and those of its rivals, and what
+# judge_models() knows of all models.
+doubts <- list(record = doubt(function(case) record_doubt_words(case$faults),
+                              "a fault of the record looks like a cause"),
+               describes = doubt(function(case) {
+                 if (describes(case$entry)) "it describes what is missing and does not explain it"
+               }, "a response is no cause"),
+               rivals = doubt(function(case) {
+                 if (case$others > rules$rival_probability) "other causes are possible"
+               }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
+               untried = doubt(function(case) {
+                 twins <- untried_twins(case$parent, case$entry, case$catalogue)
+                 if (length(twins)) {
+                   sprintf(paste("the error answers to %s as well, which this record cannot tell",
+                                 "from %s and no mechanism was given for"),
+                           listed(twins), listed(case$entry$boundary, "or"))
+                 }
+               }, "a place or driver that nobody thought of is no less likely"),
+               untrusted = doubt(function(case) {
+                 if (!case$parent$fit$trust$trusted || !case$model$fit$trust$trusted)
+                   "the numbers behind it are not trusted"
+               }, "runs of the simulator refute an emulator, or searches do not agree"),
+               steps = doubt(function(case) {
+                 step_doubt(case$parent, case$model, case$new, case$row$log10_bf, case$measurements)
+               }, "coarse steps of a simulator look like a cause"),
+               no_gain = doubt(function(case) {
+                 if (case$no_gain) "held-out data do not improve"
+               }, "what fits alone does not predict"),
+               raises_error = doubt(function(case) risen_words(case$parent, case$model),
+                                    "what is gained, the discrepancy gains"),
+               still_responds = doubt(function(case) {
+                 if (still_answers(case$parent, case$model, case$entry$boundary))
+                   "the error still responds to what drives it"
+               }, "the true mechanism takes the response away"),
+               only_beside = doubt(function(case) only_beside(case$models, case$confounded,
+                                                              case$candidates),
+                                   "two that imitate a third together look like this"),
+               edge = doubt(function(case) {
+                 if (any(edge_of_prior(case$model$fit)[case$new]))
+                   "its value lies at the edge of what was thought possible"
+               }, "it may make up for something else"),
+               remains = doubt(function(case) {
+                 if (case$remains) "a good part of the error remains"
+               }, "the mechanism that made the error leaves nothing"),
+               coverage = doubt(function(case) {
+                 if (isTRUE(case$inside < rules$least_inside)) {
+                   sprintf("its 95 %% band holds only %s of the data held out",
+                           percent(case$inside))
+                 }
+               }, "a band that misses a fifth of new data is wrong"),
+               slow = doubt(function(case) {
+                 if (case$drift && acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
+                   "anything that changes slowly would explain the error as well"
+                 }
+               }, "a parabola in time does as well, and so does the mechanism"),
+               drift = doubt(function(case) {
+                 if (case$drift && !acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
+                   "a drifting sensor would explain the error as well"
+                 }
+               }, "a parabola in time does as well"))
 
-# Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a mechanism, and `steps`
-# (step_effect() of each record) of all, and `suspects` of the first (record_suspects()). A mechanism is a stand-in if
-# held-out data do not improve; it is named if nothing speaks against it, and likely otherwise.
-judge_models <- function(models, candidates, catalogue, measurements, control, threads, runs = Inf) {
+# Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a
+# mechanism, and `steps` (step_effect() of each record) of all, and `suspects` of the first
+# (record_suspects()). A mechanism is a stand-in if held-out data do not improve; it is named if
+# nothing speaks against it, and likely otherwise.
+judge_models <- function(models, candidates, catalogue, measurements, control, threads,
+                         runs = Inf) {
   models <- lapply(models, function(model) {
     model$steps <- lapply(record_fits(model$fit), step_effect, threads)
     model
@@ -85,11 +93,13 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads) {
   trials <- candidates[candidates$from == parent$name, ]
   row <- trials[trials$mechanism == model$mechanism, ]
   new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
-  # What was adopted later is no other cause: with both, the evidence is decisively above that of either alone.
+  # What was adopted later is no other cause: with both, the evidence is decisively above that of
+  # either alone.
   later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
   gain <- held_out_gain(parent, model)
   list(model = model, parent = parent, models = models[seq_len(k)], row = row, new = new,
-       entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain, no_gain = isFALSE(gain$improves),
+       entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain,
+       no_gain = isFALSE(gain$improves),
        others = 1 - row$probability - sum(trials$probability[trials$mechanism %in% later]),
        confounded = confounded_parameters(model$fit, new),
        drift = k == 2 && drift_rivals(models, control, threads))
@@ -99,7 +109,8 @@ judged_model <- function(case) {
   model <- case$model
   model$held_out_gain <- case$gain
   for (name in names(model$records)) {
-    model$records[[name]]$held_out_gain <- held_out_gain(record_model(case$parent, name), record_model(model, name))
+    model$records[[name]]$held_out_gain <- held_out_gain(record_model(case$parent, name),
+                                                         record_model(model, name))
   }
   model$confounded_with <- case$confounded
   model$doubts <- unlist(lapply(doubts, function(doubt) doubt$says(case)))
@@ -107,19 +118,21 @@ judged_model <- function(case) {
   model
 }
 
-# Where the simulation's error in calibration rose, in words: over all, or in some of several records.
+# Where the simulation's error in calibration rose, in words: over all, or in some of several
+# records.
 risen_words <- function(parent, model) {
   rises <- function(parent, model) {
     model$scores$calibrate[["rmse"]] > rules$risen_error * parent$scores$calibrate[["rmse"]]
   }
   if (rises(parent, model)) return("the error in calibration rose with it")
-  where <- Filter(function(name) rises(parent$records[[name]], model$records[[name]]), names(model$records))
+  where <- Filter(function(name) rises(parent$records[[name]], model$records[[name]]),
+                  names(model$records))
   if (length(where)) paste("the error in calibration rose with it in", listed(where))
 }
 
-# By how much the mean square of the error held out falls, and its standard error, from sums over days (or eighths of
-# a short record): errors within a day hang together, those of several records too. Of several the error is in units of
-# each one's noise.
+# By how much the mean square of the error held out falls, and its standard error, from sums over
+# days (or eighths of a short record): errors within a day hang together, those of several records
+# too. Of several the error is in units of each one's noise.
 held_out_gain <- function(parent, model) {
   before <- parent$prediction[parent$prediction$use == "validate", ]
   after <- model$prediction[model$prediction$use == "validate", ]
@@ -127,23 +140,27 @@ held_out_gain <- function(parent, model) {
   fall <- (before$observed - before$mean)^2 - (after$observed - after$mean)^2
   n <- length(fall)
   predicted <- Filter(function(fit) "validate" %in% predictable(fit), record_fits(model$fit))
-  hours <- lapply(predicted, function(fit) fit$measurements$hours[used_rows(fit$measurements, "validate")])
+  hours <- lapply(predicted,
+                  function(fit) fit$measurements$hours[used_rows(fit$measurements, "validate")])
   block <- floor((unlist(hours) - min(unlist(hours))) / 24)
-  if (length(unique(block)) < 8) block <- unlist(lapply(lengths(hours), function(n) floor(8 * (seq_len(n) - 1) / n)))
+  if (length(unique(block)) < 8)
+    block <- unlist(lapply(lengths(hours), function(n) floor(8 * (seq_len(n) - 1) / n)))
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
 }
 
-# Conditions of which no mechanism of the catalogue is driven, and which the error before cannot tell from those that
-# drive this one.
+# Conditions of which no mechanism of the catalogue is driven, and which the error before cannot
+# tell from those that drive this one.
 untried_twins <- function(parent, entry, catalogue) {
-  same <- Filter(function(g) g$significant && any(g$conditions %in% entry$boundary), parent$attribution$groups)
+  same <- Filter(function(g) g$significant && any(g$conditions %in% entry$boundary),
+                 parent$attribution$groups)
   driven <- unlist(lapply(unclass(catalogue), `[[`, "boundary"))
   setdiff(unlist(lapply(same, `[[`, "conditions")), driven)
 }
 
-# The condition that drives a mechanism answered before and does so still, with more than half of its evidence.
+# The condition that drives a mechanism answered before and does so still, with more than half of
+# its evidence.
 still_answers <- function(parent, model, boundary) {
   strength <- function(m) {
     table <- m$attribution$table
@@ -154,8 +171,8 @@ still_answers <- function(parent, model, boundary) {
   before > 0 && strength(model) > 0.5 * before
 }
 
-# Parameters of the model that are correlated beyond 0.4 with those that the mechanism brought: another part of the
-# model that could do the same.
+# Parameters of the model that are correlated beyond 0.4 with those that the mechanism brought:
+# another part of the model that could do the same.
 confounded_parameters <- function(fit, new) {
   others <- setdiff(colnames(fit$values), new)
   if (!length(new) || !length(others)) return(character())
@@ -164,23 +181,26 @@ confounded_parameters <- function(fit, new) {
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > 0.4]
 }
 
-# In words, where the last of `models` has no evidence on the base model and trades off against what was adopted before
-# it: two that imitate a third together look like this.
+# In words, where the last of `models` has no evidence on the base model and trades off against what
+# was adopted before it: two that imitate a third together look like this.
 only_beside <- function(models, confounded, candidates) {
   mechanism <- models[[length(models)]]$mechanism
-  alone <- candidates$log10_bf[candidates$from == models[[1]]$name & candidates$mechanism == mechanism]
+  alone <- candidates$log10_bf[candidates$from == models[[1]]$name &
+                               candidates$mechanism == mechanism]
   before <- models[-c(1, length(models))]
   if (!length(before) || !isTRUE(alone < 0)) return(NULL)
   known <- names(drawn_parameters(models[[1]]$fit))
-  brought <- lapply(models[-length(models)], function(m) setdiff(names(drawn_parameters(m$fit)), known))
+  brought <- lapply(models[-length(models)],
+                    function(m) setdiff(names(drawn_parameters(m$fit)), known))
   beside <- before[mapply(function(now, then) any(setdiff(now, then) %in% confounded), brought[-1],
                           brought[-length(brought)])]
   if (length(beside))
-    sprintf("it has evidence only beside %s, with which it trades off", listed(vapply(beside, `[[`, "", "mechanism")))
+    sprintf("it has evidence only beside %s, with which it trades off",
+            listed(vapply(beside, `[[`, "", "mechanism")))
 }
 
-# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth is left. The
-# mechanism that made the error leaves nothing; one that imitates it does.
+# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth
+# is left. The mechanism that made the error leaves nothing; one that imitates it does.
 much_remains <- function(models, measurements) {
   ends <- lapply(models[c(1, length(models))], remaining_error, measurements)
   excess <- vapply(ends, function(e) e$ratio^2 - 1, 0)

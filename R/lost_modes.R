@@ -1,8 +1,9 @@
-# Modes that a sampler has lost: climbs from points of the prior that do not lead to its draws, and the mass of the
-# peaks they reach against the draws there. A mode that was lost is added to the draws by an importance sample. In
-# normal quantiles x of the parameters, whose prior is N(0, I).
+# Modes that a sampler has lost: climbs from points of the prior that do not lead to its draws, and
+# the mass of the peaks they reach against the draws there. A mode that was lost is added to the
+# draws by an importance sample. In normal quantiles x of the parameters, whose prior is N(0, I).
 
-# result: of the engine's sampler, with its draws in rows (`unit`); log_likelihood: of the rows of a matrix x.
+# result: of the engine's sampler, with its draws in rows (`unit`); log_likelihood: of the rows of a
+# matrix x.
 with_lost_modes <- function(result, log_likelihood, seed) {
   result$x <- to_normal(result$unit)
   p <- ncol(result$x)
@@ -11,7 +12,8 @@ with_lost_modes <- function(result, log_likelihood, seed) {
   aside <- leads_elsewhere(density, starts, result, seed)
   result$evaluations <- result$evaluations + 2 * rules$mode_starts
   if (length(aside$values)) {
-    reached <- climb(density, aside$x[apart_from_better(aside$x, aside$values), , drop = FALSE], seed)
+    reached <- climb(density, aside$x[apart_from_better(aside$x, aside$values), , drop = FALSE],
+                     seed)
     result$evaluations <- result$evaluations + reached$evaluations
     for (k in seq_along(reached$value)) {
       peak <- peak_at(density, reached$x[k, ], reached$value[k])
@@ -23,8 +25,8 @@ with_lost_modes <- function(result, log_likelihood, seed) {
   result
 }
 
-# Starts from which a tenth of the way to the nearest of some draws leads down. If the logarithm of a density is
-# concave, only those do that lie higher than the draw.
+# Starts from which a tenth of the way to the nearest of some draws leads down. If the logarithm of
+# a density is concave, only those do that lie higher than the draw.
 leads_elsewhere <- function(density, starts, result, seed) {
   drawn <- with_seed(seed, sample.int(nrow(result$x), 50, replace = TRUE, prob = result$weights))
   draws <- result$x[drawn, , drop = FALSE]
@@ -40,7 +42,8 @@ climb_children <- 8
 mode_draws <- 1000
 mode_dof <- 8
 
-# Those that lie farthest from any better one: peaks, whatever their height (Rodriguez and Laio 2014).
+# Those that lie farthest from any better one: peaks, whatever their height (Rodriguez and Laio
+# 2014).
 apart_from_better <- function(x, values) {
   distance <- as.matrix(stats::dist(x))
   apart <- vapply(seq_along(values), function(i) {
@@ -50,8 +53,9 @@ apart_from_better <- function(x, values) {
   utils::head(order(-apart, -values), rules$mode_climbs)
 }
 
-# All starts climb at once, so that the likelihood is asked for many points at a time: each makes random children and
-# moves to the best of them if it is better; its step follows its success (Rechenberg 1973).
+# All starts climb at once, so that the likelihood is asked for many points at a time: each makes
+# random children and moves to the best of them if it is better; its step follows its success
+# (Rechenberg 1973).
 climb <- function(density, x, seed) {
   p <- ncol(x)
   n <- nrow(x)
@@ -74,8 +78,8 @@ climb <- function(density, x, seed) {
   list(x = x, value = value, evaluations = n * (1 + generations * climb_children))
 }
 
-# The height, the curvature and the mass of a peak by differences, over ways on which the density falls by half a nat;
-# `converged` if its tangent promises no more.
+# The height, the curvature and the mass of a peak by differences, over ways on which the density
+# falls by half a nat; `converged` if its tangent promises no more.
 peak_at <- function(density, x, value) {
   p <- length(x)
   at <- function(ways) density(ways + rep(x, each = nrow(ways)))
@@ -99,7 +103,8 @@ peak_at <- function(density, x, value) {
     ways[cbind(seq_len(ncol(pairs)), pairs[2, ])] <- step[pairs[2, ]]
     both <- at(ways)
     opposite <- at(-ways)
-    cross <- -(both + opposite - up[pairs[1, ]] - up[pairs[2, ]] - down[pairs[1, ]] - down[pairs[2, ]] + 2 * value) / 2
+    cross <- -(both + opposite - up[pairs[1, ]] - up[pairs[2, ]] - down[pairs[1, ]] -
+               down[pairs[2, ]] + 2 * value) / 2
     hessian[t(pairs)] <- cross
     hessian[t(pairs[2:1, , drop = FALSE])] <- cross
   }
@@ -107,7 +112,8 @@ peak_at <- function(density, x, value) {
   root <- if (all(is.finite(hessian))) tryCatch(chol(hessian), error = function(e) NULL)
   converged <- !is.null(root) && sum(backsolve(root, gradient, transpose = TRUE)^2) < 1
   list(x = x, step = step, root = root, converged = converged, evaluations = evaluations,
-       log_mass = if (converged) value + 0.5 * p * log(2 * pi) + sum(log(step)) - sum(log(diag(root))))
+       log_mass = if (converged)
+                    value + 0.5 * p * log(2 * pi) + sum(log(step)) - sum(log(diag(root))))
 }
 
 # Whether a peak holds a part of the posterior that the draws lack.
@@ -118,17 +124,20 @@ misses <- function(result, peak) {
 }
 
 # The ellipsoid of a peak, which holds all but a thousandth of a normal one.
-is_at <- function(peak, x) colSums((peak$root %*% ((t(x) - peak$x) / peak$step))^2) < 4 * (ncol(x) + 4)
+is_at <- function(peak, x)
+  colSums((peak$root %*% ((t(x) - peak$x) / peak$step))^2) < 4 * (ncol(x) + 4)
 
-# The evidence inside the ellipsoid of the peak, by an importance sample from a Student t distribution, beside that
-# outside, of the draws there are.
+# The evidence inside the ellipsoid of the peak, by an importance sample from a Student t
+# distribution, beside that outside, of the draws there are.
 add_mode <- function(result, density, peak, seed) {
   p <- length(peak$x)
   n <- mode_draws
-  way <- with_seed(seed, matrix(stats::rnorm(n * p), p) * rep(sqrt(mode_dof / stats::rchisq(n, mode_dof)), each = p))
+  way <- with_seed(seed, matrix(stats::rnorm(n * p),
+                                p) * rep(sqrt(mode_dof / stats::rchisq(n, mode_dof)), each = p))
   x <- t(peak$x + peak$step * backsolve(peak$root, way))
   log_t <- lgamma((mode_dof + p) / 2) - lgamma(mode_dof / 2) - 0.5 * p * log(mode_dof * pi) +
-    sum(log(diag(peak$root))) - sum(log(peak$step)) - 0.5 * (mode_dof + p) * log1p(colSums(way^2) / mode_dof)
+    sum(log(diag(peak$root))) - sum(log(peak$step)) -
+    0.5 * (mode_dof + p) * log1p(colSums(way^2) / mode_dof)
   height <- density(x)
   log_weight <- ifelse(is_at(peak, x), height - log_t, -Inf)
   inside <- log_mean_exp(log_weight)
@@ -136,7 +145,8 @@ add_mode <- function(result, density, peak, seed) {
   result$evaluations <- result$evaluations + n
   kept <- !is_at(peak, result$x)
   outside <- sum(result$weights[kept])
-  # The ellipsoid of a curved ridge holds less than its curvature says, and a few draws all of the weight.
+  # The ellipsoid of a curved ridge holds less than its curvature says, and a few draws all of the
+  # weight.
   share <- min(1, exp(inside - result$log_evidence))
   is_lost <- share > rules$lost_share && 1 - outside < share / 10 && 1 / sum(own^2) > n / 10
   if (!isTRUE(is_lost)) return(result)
@@ -147,7 +157,8 @@ add_mode <- function(result, density, peak, seed) {
   result$weights <- c(share[1] * result$weights[kept] / outside, share[2] * own)
   result$unit <- rbind(result$unit[kept, , drop = FALSE], unname(stats::pnorm(x)))
   result$x <- rbind(result$x[kept, , drop = FALSE], unname(x))
-  result$log_likelihood <- c(result$log_likelihood[kept], height + 0.5 * rowSums(x^2) + 0.5 * p * log(2 * pi))
+  result$log_likelihood <- c(result$log_likelihood[kept],
+                             height + 0.5 * rowSums(x^2) + 0.5 * p * log(2 * pi))
   result$log_evidence <- log_evidence
   result$standard_error <- error
   result$interval <- log_evidence + c(-1.96, 1.96) * error

@@ -1,5 +1,5 @@
-# A model of the loop as the result has it: its calibration, what its error responds to, its prediction of
-# the record and its scores.
+# A model of the loop as the result has it: its calibration, what its error responds to, its
+# prediction of the record and its scores.
 
 measured_model <- function(model, context) {
   attribution <- attribute_discrepancy(model$fit, context$control$attribution, seed = context$seed,
@@ -8,8 +8,8 @@ measured_model <- function(model, context) {
          attribution = attribution), predicted_record(model, context))
 }
 
-# list(prediction, scores), of several records in units of each one's noise, with `records`, the same of each
-# as it is. Runs of the check serve for it, so that no further ones are made.
+# list(prediction, scores), of several records in units of each one's noise, with `records`, the
+# same of each as it is. Runs of the check serve for it, so that no further ones are made.
 predicted_record <- function(model, context) {
   fits <- record_fits(model$fit)
   each <- lapply(seq_along(fits), function(k) {
@@ -23,7 +23,8 @@ predicted_record <- function(model, context) {
   scaled <- c("observed", "mean", "lower95", "upper95", "crps")
   in_noise <- Map(function(name, one) {
     noise_sd <- model$fit$records[[name]]$measurements$noise_sd
-    data.frame(record = name, one$prediction[c("use", "segment")], one$prediction[scaled] / noise_sd)
+    data.frame(record = name, one$prediction[c("use", "segment")],
+               one$prediction[scaled] / noise_sd)
   }, names(each), each)
   together <- do.call(rbind, unname(in_noise))
   list(prediction = together, scores = prediction_scores(together), records = each)
@@ -46,5 +47,6 @@ prediction_by_runs <- function(model, fit, k) {
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
   if (all(is.finite(best))) runs <- about_best(runs[, -1, drop = FALSE], best)
   rows <- sort(c(record$rows, record$held))
-  with_seed(fit$seed, summarise_prediction(record$measurements, rows, runs, error_sd(fit), "prediction", 0.95))
+  with_seed(fit$seed, summarise_prediction(record$measurements, rows, runs, error_sd(fit),
+                                           "prediction", 0.95))
 }

@@ -1,42 +1,47 @@
 #' Measurements: the target, the boundary conditions and what each row is for
 #'
-#' Checks a table of measurements and prepares it for all later stages: the record is cut into segments wherever time is
-#' broken, averaged to a coarser step if asked (blocks follow the UTC clock), and each row is given its use:
-#' calibration, validation or warm-up. Time stamps mark the end of each interval: where yours mark the beginning, add a
-#' step first.
+#' Checks a table of measurements and prepares it for all later stages: the record is cut into
+#' segments wherever time is broken, averaged to a coarser step if asked (blocks follow the UTC
+#' clock), and each row is given its use: calibration, validation or warm-up. Time stamps mark the
+#' end of each interval: where yours mark the beginning, add a step first.
 #'
 #' # Time
 #'
-#' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text in one
-#' format: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without), `30.08.2013 00:10`,
-#' `30/08/2013 00:10` or `08/30/2013 12:10 AM` (where the whole column tells day from month), the stamps of EnergyPlus
-#' (` 01/21  24:00:00`, hours of a year that is not known), numbers. Midnight may be `24:00:00`. A `Date` is its
-#' beginning, 00:00 UTC: for daily values that are dated by their day give `date + 1`.
+#' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text in
+#' one format: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without),
+#' `30.08.2013 00:10`, `30/08/2013 00:10` or `08/30/2013 12:10 AM` (where the whole column tells day
+#' from month), the stamps of EnergyPlus (` 01/21 24:00:00`, hours of a year that is not known),
+#' numbers. Midnight may be `24:00:00`. A `Date` is its beginning, 00:00 UTC: for daily values that
+#' are dated by their day give `date + 1`.
 #'
-#' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Unix time, digits of a date such as 201308300010,
-#' and days that Excel, MATLAB or astronomers count are recognised, with a message, if they cannot be hours. Numbers
-#' that could be several things are an error that names the `time_format` of each: daily digits of two-digit years,
-#' whole days of Excel, steps of 5, 10, 60 or 600, a column called `day` or `seconds`. What stays open is an error, and
-#' `time_format` settles it.
+#' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Unix time, digits of a date
+#' such as 201308300010, and days that Excel, MATLAB or astronomers count are recognised, with a
+#' message, if they cannot be hours. Numbers that could be several things are an error that names
+#' the `time_format` of each: daily digits of two-digit years, whole days of Excel, steps of 5, 10,
+#' 60 or 600, a column called `day` or `seconds`. What stays open is an error, and `time_format`
+#' settles it.
 #'
-#' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when daylight saving ends,
-#' the column's order tells the first from the second; a time that its beginning leaves out is an error. Text that steps
-#' as the clocks of a common zone do on such a day is not read as UTC unless `time_zone = "UTC"` says so.
+#' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when
+#' daylight saving ends, the column's order tells the first from the second; a time that its
+#' beginning leaves out is an error. Text that steps as the clocks of a common zone do on such a day
+#' is not read as UTC unless `time_zone = "UTC"` says so.
 #'
-#' The record keeps time as `POSIXct`, with the clock of `time_zone`, or as hours where no date is known; simulators and
-#' figures are given that.
+#' The record keeps time as `POSIXct`, with the clock of `time_zone`, or as hours where no date is
+#' known; simulators and figures are given that.
 #'
 #' # Gaps
 #'
-#' Rows whose target is `NA` drive the simulator and are left out of the comparison; so is an average that holds one.
-#' A lost row does not break the record: its drivers are interpolated linearly. So are those of longer gaps, and values
-#' that a driver lacks, up to `fill_gaps` hours. Where more is lost the record is cut. Stamps that stray by up to a
-#' quarter of a step are taken at the nearest of equal steps; rows at none, up to a tenth of all, are left out. Each of
-#' these is told.
+#' Rows whose target is `NA` drive the simulator and are left out of the comparison; so is an
+#' average that holds one. A lost row does not break the record: its drivers are interpolated
+#' linearly. So are those of longer gaps, and values that a driver lacks, up to `fill_gaps` hours.
+#' Where more is lost the record is cut. Stamps that stray by up to a quarter of a step are taken at
+#' the nearest of equal steps; rows at none, up to a tenth of all, are left out. Each of these is
+#' told.
 #'
 #' # Faults of a record
 #'
-#' Some values cannot be measurements. Codes for a missing value are refused (`missing`). Other faults are findings:
+#' Some values cannot be measurements. Codes for a missing value are refused (`missing`). Other
+#' faults are findings:
 #'
 #' * values far outside all others,
 #' * a target at the end of its sensor's range (`range`),
@@ -47,46 +52,52 @@
 #' * a counter that rises and is reset,
 #' * a condition that is constant in calibration but not in the held-out rows.
 #'
-#' Zeros, columns of few levels (switches, schedules) and the ends of what drives are no faults. [upgrade_model()] adds
-#' what its base model shows: clocks that differ, a start that is not forgotten, a step of the sensor. While a finding
-#' stands, a mechanism is *likely* at most.
+#' Zeros, columns of few levels (switches, schedules) and the ends of what drives are no faults.
+#' [upgrade_model()] adds what its base model shows: clocks that differ, a start that is not
+#' forgotten, a step of the sensor. While a finding stands, a mechanism is *likely* at most.
 #'
-#' @param data A data frame, or a series of class `zoo`, `xts`, `ts` or `tsibble`; every numeric column may drive the
-#'   simulator. A `ts` of 24 values a cycle, or a multiple of that, counts days.
+#' @param data A data frame, or a series of class `zoo`, `xts`, `ts` or `tsibble`; every numeric
+#'   column may drive the simulator. A `ts` of 24 values a cycle, or a multiple of that, counts
+#'   days.
 #' @param time Name of the time column; a series that knows its own needs none.
 #' @param target Name of the measured target.
-#' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws + circular(Wd)` or their
-#'   names. A circular quantity (degrees) enters as sine and cosine, one that is `TRUE` or `FALSE` as 1 or 0.
-#' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's unit; or
-#'   `"bootstrap"` or [bootstrap_noise()], which estimate it from the readings inside each average. If not given, the
-#'   standard error of the averages is taken. Both need `average`.
+#' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws +
+#'   circular(Wd)` or their names. A circular quantity (degrees) enters as sine and cosine, one that
+#'   is `TRUE` or `FALSE` as 1 or 0.
+#' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's
+#'   unit; or `"bootstrap"` or [bootstrap_noise()], which estimate it from the readings inside each
+#'   average. If not given, the standard error of the averages is taken. Both need `average`.
 #' @param average Width of the averages in hours; `NULL` keeps the step of the data.
-#' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that say which rows
-#'   calibrate and which validate. Without both all rows calibrate; without `calibrate`, all but those that validate;
-#'   without `validate`, none validate. At least 20 rows must calibrate. Rows of neither use still drive the simulator.
-#'   In text the record's time may be called `time`. Texts in quotes are compared with times as times, in the format of
-#'   their column or as ISO 8601 and in `time_zone` (`"time >= '2013-09-02'"`), with numbers as numbers.
-#' @param warmup Hours at the start of each segment that are left out, so that the simulator's unknown initial
-#'   state is forgotten.
+#' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that
+#'   say which rows calibrate and which validate. Without both all rows calibrate; without
+#'   `calibrate`, all but those that validate; without `validate`, none validate. At least 20 rows
+#'   must calibrate. Rows of neither use still drive the simulator. In text the record's time may be
+#'   called `time`. Texts in quotes are compared with times as times, in the format of their column
+#'   or as ISO 8601 and in `time_zone` (`"time >= '2013-09-02'"`), with numbers as numbers.
+#' @param warmup Hours at the start of each segment that are left out, so that the simulator's
+#'   unknown initial state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
-#' @param time_format What the time column holds, if it does not tell itself: of text `"dmy"` or `"mdy"`; of numbers
-#'   `"seconds"`, `"minutes"`, `"hours"`, `"days"` (`warmup`, `average` and `fill_gaps` stay in hours: 5 s are
-#'   `5 / 3600`), `"unix"` (since 1970, in seconds, milliseconds, microseconds or nanoseconds), or days counted from a
-#'   date: `"excel"` (41516 is 30 August 2013), `"matlab"`, `"julian"`, `"mjd"` (modified Julian), `"unix_days"` (since
-#'   1970); of either a format of [strptime()] (`"%Y%m%d%H"`).
-#' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in: `"UTC"`, or a name
-#'   such as `"Europe/Berlin"`.
-#' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight lines, circular
-#'   boundary conditions by way of sine and cosine.
-#' @param missing Values that stand for a missing one, such as `c(-9999, 85)`: they become `NA` in every column. `NA`
-#'   says that no value does. Otherwise, codes in the target or in a boundary condition are refused.
-#' @param range Lower and upper end of the range of the target's sensor. Rows at an end, or beyond, are left out of the
-#'   comparison.
-#' @return An object of class `amiss_measurements`. Of each row, after averaging, `time`, `hours`, the target `y` and
-#'   `use` (`"calibrate"`, `"validate"`, `"warmup"` or `"none"`); the calibration rows are those of the first use
-#'   whose `y` is not `NA`. `noise` says how `noise_sd` came about (`method`, and
-#'   `per_step`, the value of each average, where it was estimated). `findings` is a data frame with a row for each
-#'   fault of the record: `id`, `column`, `rows`, `value`, and what it `says`.
+#' @param time_format What the time column holds, if it does not tell itself: of text `"dmy"` or
+#'   `"mdy"`; of numbers `"seconds"`, `"minutes"`, `"hours"`, `"days"` (`warmup`, `average` and
+#'   `fill_gaps` stay in hours: 5 s are `5 / 3600`), `"unix"` (since 1970, in seconds, milliseconds,
+#'   microseconds or nanoseconds), or days counted from a date: `"excel"` (41516 is 30 August 2013),
+#'   `"matlab"`, `"julian"`, `"mjd"` (modified Julian), `"unix_days"` (since 1970); of either a
+#'   format of [strptime()] (`"%Y%m%d%H"`).
+#' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in:
+#'   `"UTC"`, or a name such as `"Europe/Berlin"`.
+#' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight
+#'   lines, circular boundary conditions by way of sine and cosine.
+#' @param missing Values that stand for a missing one, such as `c(-9999, 85)`: they become `NA` in
+#'   every column. `NA` says that no value does. Otherwise, codes in the target or in a boundary
+#'   condition are refused.
+#' @param range Lower and upper end of the range of the target's sensor. Rows at an end, or beyond,
+#'   are left out of the comparison.
+#' @return An object of class `amiss_measurements`. Of each row, after averaging, `time`, `hours`,
+#'   the target `y` and `use` (`"calibrate"`, `"validate"`, `"warmup"` or `"none"`); the calibration
+#'   rows are those of the first use whose `y` is not `NA`. `noise` says how `noise_sd` came about
+#'   (`method`, and `per_step`, the value of each average, where it was estimated). `findings` is a
+#'   data frame with a row for each fault of the record: `id`, `column`, `rows`, `value`, and what
+#'   it `says`.
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6)
@@ -98,9 +109,10 @@
 #' measurements(table[-30, ], time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1,
 #'              time_zone = "Europe/Berlin", fill_gaps = 2)
 #' @export
-measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, average = NULL, calibrate = NULL,
-                         validate = NULL, warmup = 0, name = target, unit = "", time_format = NULL, time_zone = NULL,
-                         fill_gaps = 0, missing = NULL, range = NULL) {
+measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, average = NULL,
+                         calibrate = NULL, validate = NULL, warmup = 0, name = target, unit = "",
+                         time_format = NULL, time_zone = NULL, fill_gaps = 0, missing = NULL,
+                         range = NULL) {
   table <- time_table(data, time, time_format)
   data <- table$data
   time <- table$time
@@ -113,8 +125,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   check_marks(missing, range)
   require_columns(data, c(time, target, terms$name))
   if (any(terms$name %in% c(time, target))) {
-    abort_input(
-      c("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary condition: it is the target or the time.",
+    abort_input(c(paste("{.val {intersect(terms$name, c(time, target))}} cannot be a boundary",
+                        "condition: it is the target or the time."),
                   i = "Leave it out of {.arg boundary}."))
   }
   reading <- time_reading(data[[time]], time, table$format, time_zone)
@@ -130,18 +142,19 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   drivers <- as.matrix(data[numeric_columns])
   y <- as.numeric(data[[target]])
   if (any(is.infinite(y))) {
-    abort_input(c(paste("Target {.val {target}} has {sum(is.infinite(y))} infinite value{?s}; the first is in row",
-                        "{which(is.infinite(y))[1]}."),
+    abort_input(c(paste("Target {.val {target}} has {sum(is.infinite(y))} infinite value{?s}; the",
+                        "first is in row {which(is.infinite(y))[1]}."),
                   i = "Mark a missing value as NA: it is then left out."))
   }
   calibrate <- chosen_rows(calibrate, columns_known, clock, "calibrate")
   validate <- chosen_rows(validate, columns_known, clock, "validate")
-  calibrate <- rows_flag(calibrate, nrow(data), "calibrate", default = is.null(validate) | !isTRUE(any(validate)))
+  calibrate <- rows_flag(calibrate, nrow(data), "calibrate",
+                         default = is.null(validate) | !isTRUE(any(validate)))
   if (is.null(calibrate)) calibrate <- !validate
   validate <- rows_flag(validate, nrow(data), "validate", default = FALSE)
   if (any(calibrate & validate)) {
-    abort_input(c(paste("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and validate{?s/}; the first is row",
-                        "{which(calibrate & validate)[1]}."),
+    abort_input(c(paste("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and",
+                        "validate{?s/}; the first is row {which(calibrate & validate)[1]}."),
                   i = "Validation rows must not be seen by the calibration."))
   }
   used_for <- ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none"))
@@ -157,40 +170,43 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   into_segment <- grid$hours - stats::ave(grid$hours, grid$segment, FUN = min) + grid$step
   use <- ifelse(into_segment <= warmup + 1e-9, "warmup", used_for)
 
-  raw <- list(time = stamps, hours = grid$hours, step_h = grid$step, segment = grid$segment, use = use, y = y[grid$row],
-              drivers = drivers)
+  raw <- list(time = stamps, hours = grid$hours, step_h = grid$step, segment = grid$segment,
+              use = use, y = y[grid$row], drivers = drivers)
   # Sine and cosine are taken before averages: the mean of 350 and 10 degrees is not 180.
   columns <- boundary_columns(drivers, terms)
   coarse <- average_rows(raw, average, columns$values)
   x <- c(list(values = coarse$boundary), columns[c("names", "condition")])
   if (sum(coarse$use == "calibrate" & !is.na(coarse$y)) < 20) {
-    abort_input(c(paste("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left for calibration after",
-                        "averaging and warm-up; at least 20 are needed."),
+    abort_input(c(paste("Only {sum(coarse$use == 'calibrate' & !is.na(coarse$y))} rows are left",
+                        "for calibration after averaging and warm-up; at least 20 are needed."),
                   i = "Check {.arg calibrate}, {.arg warmup} ({warmup} h) and {.arg average}."))
   }
   if (warmup > 0 && !any(use == "warmup")) {
-    warn_input(c("{.arg warmup} is {warmup} h, shorter than a step of {signif(grid$step, 4)} h: no row warms up.",
-                 i = "Give it in hours."))
+    warn_input(c(paste("{.arg warmup} is {warmup} h, shorter than a step of {signif(grid$step, 4)}",
+                       "h: no row warms up."), i = "Give it in hours."))
   }
   constant <- constant_conditions(x, coarse$use == "calibrate")
   if (length(constant)) {
-    warn_input(c(paste("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do} not vary over the",
-                       "calibration rows and {?is/are} left out of the analysis."),
+    warn_input(c(paste("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do}",
+                       "not vary over the calibration rows and {?is/are} left out of the",
+                       "analysis."),
                  i = "A condition that is constant cannot be told from the mean."))
     x <- x_keep(x, setdiff(x$names, constant))
   }
   noise <- noise_level(noise_sd, coarse, raw$y)
-  findings <- record_findings(list(columns = c(data[target], data[numeric_columns]), target = target,
-                                   conditions = terms$name, circular = circular, use = use_given,
-                                   noise_sd = noise$sd * sqrt(coarse$per_step), per_step = coarse$per_step))
-  structure(list(format_version = format_version, name = name, target = target, unit = unit, noise_sd = noise$sd,
-                 noise = noise[-1], raw = raw, per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time,
-                 hours = coarse$hours,
-                 segment = coarse$segment, use = coarse$use, y = coarse$y, standard_error = coarse$standard_error,
-                 block = coarse$block, boundary = x$values, condition = x$condition, conditions = x$names,
-                 time_format = reading$format, time_zone = time_zone, constant = constant, findings = findings,
-                 faulty = faulty_steps(findings, target, coarse$block, grid$row), missing = missing, range = range),
-            class = "amiss_measurements")
+  findings <- record_findings(list(columns = c(data[target], data[numeric_columns]),
+                                   target = target, conditions = terms$name, circular = circular,
+                                   use = use_given, noise_sd = noise$sd * sqrt(coarse$per_step),
+                                   per_step = coarse$per_step))
+  structure(list(format_version = format_version, name = name, target = target, unit = unit,
+                 noise_sd = noise$sd, noise = noise[-1], raw = raw, per_step = coarse$per_step,
+                 step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
+                 segment = coarse$segment, use = coarse$use, y = coarse$y,
+                 standard_error = coarse$standard_error, block = coarse$block, boundary = x$values,
+                 condition = x$condition, conditions = x$names, time_format = reading$format,
+                 time_zone = time_zone, constant = constant, findings = findings,
+                 faulty = faulty_steps(findings, target, coarse$block, grid$row), missing = missing,
+                 range = range), class = "amiss_measurements")
 }
 
 # Steps of the averaged record in which a reading of the target is known to be none.
@@ -206,27 +222,31 @@ circular <- function(x, ...) x
 
 boundary_terms <- function(boundary, call = rlang::caller_env()) {
   labels <- if (inherits(boundary, "formula")) formula_labels(boundary, call) else boundary
-  check_input(checkmate::check_character(labels, min.len = 1, any.missing = FALSE, unique = TRUE), "boundary",
-              "Give a formula such as {.code ~ Te + circular(Wd)}.", call = call)
+  check_input(checkmate::check_character(labels, min.len = 1, any.missing = FALSE, unique = TRUE),
+              "boundary", "Give a formula such as {.code ~ Te + circular(Wd)}.", call = call)
   is_circular <- grepl("^circular\\(.*\\)$", labels)
   names <- trimws(sub("^circular\\((.*)\\)$", "\\1", labels))
   if (inherits(boundary, "formula")) {
     computed <- names[grepl("[^`]", gsub("`[^`]*`", "", names)) & !names == make.names(names)]
     if (length(computed)) {
-      abort_input(c("{.arg boundary} names columns of the data; {.code {computed[1]}} is computed from them.",
-                    i = "Make it a column first. Only {.code circular()} marks a column, of degrees."), call = call)
+      abort_input(
+        c("{.arg boundary} names columns of the data; {.code {computed[1]}} is computed from them.",
+          i = "Make it a column first. Only {.code circular()} marks a column, of degrees."),
+        call = call)
     }
     names <- gsub("^`|`$", "", names)
   }
   list(name = names, circular = is_circular)
 }
 
-# The terms of a formula with one side. One that R cannot take apart, as with a dot, names no columns.
+# The terms of a formula with one side. One that R cannot take apart, as with a dot, names no
+# columns.
 formula_labels <- function(boundary, call) {
   terms <- tryCatch(stats::terms(boundary), error = function(e) NULL)
   if (is.null(terms) || attr(terms, "response") || !is.null(attr(terms, "offset"))) {
-    abort_input(c("{.arg boundary} = {.code {deparse1(boundary)}} does not name columns of the data.",
-                  i = "Give a formula such as {.code ~ Te + circular(Wd)}."), call = call)
+    abort_input(c(paste("{.arg boundary} = {.code {deparse1(boundary)}} does not name columns of",
+                        "the data."), i = "Give a formula such as {.code ~ Te + circular(Wd)}."),
+                call = call)
   }
   attr(terms, "term.labels")
 }
@@ -251,8 +271,8 @@ require_numeric <- function(data, columns, call = rlang::caller_env()) {
     if (is.numeric(data[[column]]) && is.null(dim(data[[column]]))) next
     values <- as.character(data[[column]])
     bad <- which(is.na(suppressWarnings(as.numeric(values))) & !is.na(values))
-    where <- if (
-      length(bad)) "row {bad[1]} holds {.val {values[bad[1]]}}" else "it is of class {.cls {class(data[[column]])}}"
+    where <- if (length(bad)) "row {bad[1]} holds {.val {values[bad[1]]}}"
+             else "it is of class {.cls {class(data[[column]])}}"
     abort_input(c(paste0("Column {.val {column}} is not numeric: ", where, "."),
                   i = "Read it as numbers, or mark missing values as NA."), call = call)
   }
@@ -264,8 +284,8 @@ tell_gaps <- function(hours, segment, used_for, row) {
   inside <- gaps[used_for[gaps] == used_for[gaps + 1]]
   tell <- function(rows, say) {
     if (!length(rows)) return(invisible())
-    say(c(paste("The record has {length(rows)} gap{?s} {where}: the first is of {round(diff(hours)[rows[1]], 1)} h",
-                "after row {row[rows[1]]}."),
+    say(c(paste("The record has {length(rows)} gap{?s} {where}: the first is of",
+                "{round(diff(hours)[rows[1]], 1)} h after row {row[rows[1]]}."),
           i = "Each part is simulated on its own, with its own warm-up."))
   }
   where <- "within the rows of one use"
@@ -276,15 +296,17 @@ tell_gaps <- function(hours, segment, used_for, row) {
 }
 
 # `row` of the data, NA for one that was lost.
-require_complete <- function(drivers, analysed, time, row = seq_along(time), call = rlang::caller_env()) {
+require_complete <- function(drivers, analysed, time, row = seq_along(time),
+                             call = rlang::caller_env()) {
   for (column in analysed) {
     bad <- which(!is.finite(drivers[, column]) & !is.na(row))
     if (length(bad)) {
-      abort_input(c(paste("Boundary condition {.val {column}} has {length(bad)} missing or infinite value{?s}; the",
-                          "first is in row {row[bad[1]]} ({format(time[bad[1]])})."),
-                    i = paste("A simulator needs every value of what drives it: fill short gaps by {.arg fill_gaps} of",
-                              "{.fun measurements}, or remove these rows as a whole.")),
-                    call = call)
+      abort_input(
+        c(paste("Boundary condition {.val {column}} has {length(bad)} missing or infinite",
+                "value{?s}; the first is in row {row[bad[1]]} ({format(time[bad[1]])})."),
+          i = paste("A simulator needs every value of what drives it: fill short gaps by",
+                    "{.arg fill_gaps} of {.fun measurements}, or remove these rows as a whole.")),
+        call = call)
     }
   }
 }
@@ -295,7 +317,8 @@ with_time <- function(data, stamps) {
   data
 }
 
-# The rows that an argument chooses: a condition of a study file, R code as text, or logical values as they are.
+# The rows that an argument chooses: a condition of a study file, R code as text, or logical values
+# as they are.
 chosen_rows <- function(rows, data, clock, what, call = rlang::caller_env()) {
   if (inherits(rows, "amiss_row_condition")) row_condition(rows$text, data, what, clock, call)
   else if (is.character(rows)) eval_rows(rows, data, what, clock, call)
@@ -303,11 +326,12 @@ chosen_rows <- function(rows, data, clock, what, call = rlang::caller_env()) {
 }
 
 eval_rows <- function(text, data, what, clock, call = rlang::caller_env()) {
-  check_input(checkmate::check_string(text, min.chars = 1), what, "One expression in the columns of the data.",
-              call = call)
+  check_input(checkmate::check_string(text, min.chars = 1), what,
+              "One expression in the columns of the data.", call = call)
   refuse <- function(e) {
     abort_input(c("{.arg {what}} = {.val {text}} cannot be evaluated: {conditionMessage(e)}.",
-                  i = "Write an expression in the columns, for example {.code phase == \"rolbs\"}."), call = call)
+                  i = paste("Write an expression in the columns, for example",
+                            "{.code phase == \"rolbs\"}.")), call = call)
   }
   scope <- list2env(comparisons(clock), parent = baseenv())
   in_zone(clock$zone %||% attr(clock$time, "tzone")[1],
@@ -324,23 +348,24 @@ in_zone <- function(zone, code) {
 }
 
 rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {
-  if (is.null(rows)) return(if (isTRUE(default)) rep(TRUE, n) else if (what == "calibrate") NULL else rep(FALSE, n))
+  if (is.null(rows))
+    return(if (isTRUE(default)) rep(TRUE, n) else if (what == "calibrate") NULL else rep(FALSE, n))
   check_input(checkmate::check_logical(rows, len = n, any.missing = FALSE), what,
               "One TRUE or FALSE for every row of the data.", call = call)
   if (!any(rows)) abort_input("{.arg {what}} picks no row.", call = call)
   rows
 }
 
-# Means over blocks of whole rows, aligned to the clock; a block must be complete and of one use and segment.
+# Means over blocks of whole rows, aligned to the clock; a block must be complete and of one use and
+# segment.
 average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
   per_step <- 1L
   if (!is.null(average)) {
     check_input(checkmate::check_number(average, lower = 1e-6, upper = 1e6), "average", call = call)
     per_step <- as.integer(round(average / raw$step_h))
     if (per_step < 1 || abs(per_step * raw$step_h - average) > 1e-6 * average) {
-      abort_input(
-        "{.arg average} = {average} h is not a whole multiple of the data's step of {signif(raw$step_h, 4)} h.",
-                  call = call)
+      abort_input(paste("{.arg average} = {average} h is not a whole multiple of the data's step",
+                        "of {signif(raw$step_h, 4)} h."), call = call)
     }
   }
   width <- per_step * raw$step_h
@@ -348,20 +373,23 @@ average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
   key <- interaction(raw$segment, clock, drop = TRUE, lex.order = TRUE)
   block <- as.integer(factor(key, levels = unique(key)))
   size <- tabulate(block)
-  uses <- tapply(raw$use, block,
-                 function(u) if (length(unique(u)) == 1) u[1] else if ("warmup" %in% u) "warmup" else "none")
+  uses <- tapply(raw$use, block, function(u) if (length(unique(u)) == 1) u[1]
+                                             else if ("warmup" %in% u) "warmup"
+                                             else "none")
   whole <- which(size == per_step)
   index <- match(block, whole)
   keep <- !is.na(index)
   mean_of <- function(v) as.numeric(rowsum(v[keep], index[keep], reorder = TRUE)) / per_step
   y <- mean_of(raw$y)
-  spread <- if (per_step > 1) sqrt(pmax(0, as.numeric(rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) / (
-    per_step - 1)) / per_step) else rep(NA_real_, length(whole))
+  spread <- if (per_step > 1) sqrt(pmax(0, as.numeric(
+    rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) / (per_step - 1)) / per_step)
+            else rep(NA_real_, length(whole))
   boundary <- rowsum(boundary[keep, , drop = FALSE], index[keep], reorder = TRUE) / per_step
   last <- which(keep)[!duplicated(index[keep], fromLast = TRUE)]
   dimnames(boundary) <- NULL
-  list(per_step = per_step, step_h = width, time = raw$time[last], hours = raw$hours[last], segment = raw$segment[last],
-       use = unname(as.character(uses[whole])), y = y, standard_error = spread, boundary = boundary, block = index)
+  list(per_step = per_step, step_h = width, time = raw$time[last], hours = raw$hours[last],
+       segment = raw$segment[last], use = unname(as.character(uses[whole])), y = y,
+       standard_error = spread, boundary = boundary, block = index)
 }
 
 boundary_columns <- function(drivers, terms) {
@@ -383,13 +411,15 @@ constant_conditions <- function(x, rows) {
 
 x_keep <- function(x, names, call = rlang::caller_env()) {
   if (!length(names))
-    abort_input("No boundary condition varies; there is nothing to attribute a discrepancy to.", call = call)
+    abort_input("No boundary condition varies; there is nothing to attribute a discrepancy to.",
+                call = call)
   columns <- x$names[x$condition] %in% names
   list(values = x$values[, columns, drop = FALSE], names = names,
        condition = match(x$names[x$condition][columns], names))
 }
 
-# The noise of the averages and how it came about: given, standard error or bootstrap; RMS over the calibration steps.
+# The noise of the averages and how it came about: given, standard error or bootstrap; RMS over the
+# calibration steps.
 noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
   if (identical(noise_sd, "bootstrap")) noise_sd <- bootstrap_noise()
   if (is.numeric(noise_sd)) {
@@ -407,18 +437,18 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
   if (coarse$per_step < needed) {
     few <- if (coarse$per_step == 1) "the data are not averaged"
            else paste("an average is of", coarse$per_step, "readings only")
-    abort_input(c(paste("{.arg noise_sd} is needed as a number: {few}, so that their scatter within a step is",
-                        "unknown."),
-                  i = paste("Give the standard deviation of the measurement error in the target's unit, or an",
-                            "{.arg average} over at least {needed} readings.")),
-                  call = call)
+    abort_input(c(paste("{.arg noise_sd} is needed as a number: {few}, so that their scatter",
+                        "within a step is unknown."),
+                  i = paste("Give the standard deviation of the measurement error in the target's",
+                            "unit, or an {.arg average} over at least {needed} readings.")),
+                call = call)
   }
-  noise <- if (is.null(noise_sd)) list(method = "standard error",
-                                       per_step = coarse$standard_error) else bootstrap_averages(y, coarse, noise_sd)
+  noise <- if (is.null(noise_sd)) list(method = "standard error", per_step = coarse$standard_error)
+           else bootstrap_averages(y, coarse, noise_sd)
   sd <- sqrt(mean(noise$per_step[coarse$use == "calibrate"]^2, na.rm = TRUE))
   if (!is.finite(sd) || sd <= 0) {
-    abort_input(c(paste("The readings do not scatter within the averages ({noise$method}: {signif(sd, 3)}), so that",
-                        "{.arg noise_sd} cannot be estimated from them."),
+    abort_input(c(paste("The readings do not scatter within the averages ({noise$method}:",
+                        "{signif(sd, 3)}), so that {.arg noise_sd} cannot be estimated from them."),
                   i = "Give the standard deviation of the measurement error."), call = call)
   }
   c(list(sd = sd), noise)
@@ -426,16 +456,18 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 
 #' Noise of averages, by bootstrapping the readings
 #'
-#' Given as `noise_sd` to [measurements()], which must `average`: the readings inside each averaging window are drawn
-#' again with replacement, and the standard deviation of the means of these draws is the noise of that average. The
-#' RMS over the calibration steps is the noise of the record. As the number of replicates grows, the plain bootstrap
-#' tends to `sqrt((n - 1) / n) * s / sqrt(n)` for n readings of standard deviation `s`.
+#' Given as `noise_sd` to [measurements()], which must `average`: the readings inside each averaging
+#' window are drawn again with replacement, and the standard deviation of the means of these draws
+#' is the noise of that average. The RMS over the calibration steps is the noise of the record. As
+#' the number of replicates grows, the plain bootstrap tends to `sqrt((n - 1) / n) * s / sqrt(n)`
+#' for n readings of standard deviation `s`.
 #'
-#' What changes inside a window counts as noise: a trend of `d` per reading adds `d^2 (n^2 - 1) / 12` to `s^2 (n - 1) /
-#' n`. `detrend` takes a straight line off each window first and bootstraps the residuals, raised by `sqrt(n / (n - 2))`
-#' for the two degrees of freedom that the line uses, so that neither a trend nor the line biases the variance. Either
-#' way the readings' errors are taken as independent: what they have in common over a window, such as an offset of the
-#' sensor, is not seen, and the noise is then larger than the estimate.
+#' What changes inside a window counts as noise: a trend of `d` per reading adds `d^2 (n^2 - 1) /
+#' 12` to `s^2 (n - 1) / n`. `detrend` takes a straight line off each window first and bootstraps
+#' the residuals, raised by `sqrt(n / (n - 2))` for the two degrees of freedom that the line uses,
+#' so that neither a trend nor the line biases the variance. Either way the readings' errors are
+#' taken as independent: what they have in common over a window, such as an offset of the sensor, is
+#' not seen, and the noise is then larger than the estimate.
 #'
 #' @param replicates Number of bootstrap draws of each window.
 #' @param detrend Take a straight line off each window first; the paper does not.
@@ -446,14 +478,14 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 #' table$Ti <- 20 + sin(1:240 / 20) + 0.1 * sin(61 * (1:240)^2)
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, average = 1,
 #'              noise_sd = bootstrap_noise(detrend = TRUE))
-#' @source Efron (1979), Bootstrap methods: another look at the jackknife, Annals of Statistics 7, 1-26; for averages of
-#'   raw data in this method: Monari (2022). Residuals: Davison and Hinkley (1997), Bootstrap methods and their
-#'   application.
+#' @source Efron (1979), Bootstrap methods: another look at the jackknife, Annals of Statistics 7,
+#'   1-26; for averages of raw data in this method: Monari (2022). Residuals: Davison and Hinkley
+#'   (1997), Bootstrap methods and their application.
 #' @export
 bootstrap_noise <- function(replicates = 1000, detrend = FALSE, seed = 1) {
   check_input(checkmate::check_int(replicates, lower = 0, upper = 1e6), "replicates")
-  if (replicates < 50)
-    abort_input("{.arg replicates} = {replicates} is too few for a standard deviation; give at least 50.")
+  if (replicates < 50) abort_input(paste("{.arg replicates} = {replicates} is too few for a",
+                                         "standard deviation; give at least 50."))
   check_input(checkmate::check_flag(detrend), "detrend")
   structure(list(replicates = as.integer(replicates), detrend = detrend, seed = pick_seed(seed)),
             class = "amiss_bootstrap_noise")
@@ -472,8 +504,9 @@ bootstrap_averages <- function(y, coarse, options) {
     drawn <- sample.int(n, n * options$replicates, replace = TRUE)
     if (anyNA(readings)) NA else stats::sd(colMeans(matrix(readings[drawn], n)))
   }))
-  c(list(method = if (options$detrend) "bootstrap of detrended readings" else "bootstrap of readings",
-         per_step = per_step, readings = n), unclass(options))
+  c(list(method = if (options$detrend) "bootstrap of detrended readings"
+                  else "bootstrap of readings", per_step = per_step, readings = n),
+    unclass(options))
 }
 
 # Rows of a use that have a measured value.
@@ -489,14 +522,16 @@ segment_starts <- function(measurements, rows) {
 print.amiss_measurements <- function(x, ...) on_stdout(x, {
   lost <- is.na(x$y) & x$use != "warmup"
   n <- table(factor(x$use[!lost], c("calibrate", "validate", "warmup")))
-  cli::cli_text(paste("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of {signif(x$step_h, 3)} h in",
-                      "{length(unique(x$segment))} segment{?s}"))
-  origin <- switch(x$noise$method, given = "",
-                   `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
-                   sprintf(" (%s, %d an average, %d times)", x$noise$method, x$noise$readings, x$noise$replicates))
-  cli::cli_bullets(
-    c("*" = "target {.field {x$target}}, noise standard deviation {signif(x$noise_sd, 3)} {x$unit}{origin}",
-                     "*" = "{n[['calibrate']]} calibrate, {n[['validate']]} validate, {n[['warmup']]} warm up",
+  cli::cli_text(paste("{.strong Measurements} {.val {x$name}}: {length(x$y)} steps of",
+                      "{signif(x$step_h, 3)} h in {length(unique(x$segment))} segment{?s}"))
+  origin <- switch(
+    x$noise$method, given = "",
+    `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
+    sprintf(" (%s, %d an average, %d times)", x$noise$method, x$noise$readings, x$noise$replicates))
+  cli::cli_bullets(c("*" = paste("target {.field {x$target}}, noise standard deviation",
+                                 "{signif(x$noise_sd, 3)} {x$unit}{origin}"),
+                     "*" = paste("{n[['calibrate']]} calibrate, {n[['validate']]} validate,",
+                                 "{n[['warmup']]} warm up"),
                      "*" = if (any(lost)) "{sum(lost)} without a measurement, left out",
                      "*" = "boundary conditions {.field {x$conditions}}"))
   said <- findings_read(x)$says
@@ -506,6 +541,7 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
 })
 
 condition_values <- function(measurements, name) {
-  columns <- measurements$boundary[, measurements$condition == match(name, measurements$conditions), drop = FALSE]
+  columns <- measurements$boundary[, measurements$condition == match(name, measurements$conditions),
+                                   drop = FALSE]
   if (ncol(columns) == 1) columns[, 1] else (atan2(columns[, 1], columns[, 2]) * 180 / pi) %% 360
 }

@@ -1,22 +1,26 @@
 #' Mechanisms and catalogues
 #'
-#' A mechanism is a named physical change to a model: the edit that makes it, the boundary conditions that drive it
-#' and one sentence for a person. A catalogue holds the mechanisms that make sense for a model.
+#' A mechanism is a named physical change to a model: the edit that makes it, the boundary
+#' conditions that drive it and one sentence for a person. A catalogue holds the mechanisms that
+#' make sense for a model.
 #'
 #' @param name Short name.
-#' @param edit Function of a simulator that returns the extended simulator, with the mechanism's parameters declared
-#'   by [free()]: an edit of a [zone()], [with_parameters()] of a function, [with_template()] of a program,
-#'   [with_fmu()] of an FMU. Of a model that is an [ensemble()] of given runs, another ensemble, of runs with the
-#'   mechanism, or a function of the present ensemble that returns one. An ensemble is tried while it has the
-#'   parameters of all that was adopted before it. A function of two arguments gets the name of the record as the
-#'   second: of several records it is called for each in turn, and may return the simulator as it is where the
-#'   mechanism does not act. Of a single record that is not given in a list it is the name of the measurements.
-#' @param boundary Names of the boundary conditions that drive the mechanism: those without which it would do nothing,
-#'   or always the same; `character()` for none. Of a mechanism that acts on a state, those that drive the state. The
-#'   order of trials, what is told of the cause and one doubt (`vignette("algorithm", "amiss")`, *Naming*) go by them;
-#'   evidence does not.
+#' @param edit Function of a simulator that returns the extended simulator, with the mechanism's
+#'   parameters declared by [free()]: an edit of a [zone()], [with_parameters()] of a function,
+#'   [with_template()] of a program, [with_fmu()] of an FMU. Of a model that is an [ensemble()] of
+#'   given runs, another ensemble, of runs with the mechanism, or a function of the present ensemble
+#'   that returns one. An ensemble is tried while it has the parameters of all that was adopted
+#'   before it. A function of two arguments gets the name of the record as the second: of several
+#'   records it is called for each in turn, and may return the simulator as it is where the
+#'   mechanism does not act. Of a single record that is not given in a list it is the name of the
+#'   measurements.
+#' @param boundary Names of the boundary conditions that drive the mechanism: those without which it
+#'   would do nothing, or always the same; `character()` for none. Of a mechanism that acts on a
+#'   state, those that drive the state. The order of trials, what is told of the cause and one doubt
+#'   (`vignette("algorithm", "amiss")`, *Naming*) go by them; evidence does not.
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
-#' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class `amiss_catalogue`.
+#' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class
+#'   `amiss_catalogue`.
 #' @examples
 #' brighter <- function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"]
 #' sun <- mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.",
@@ -36,7 +40,8 @@ mechanism <- function(name, edit, boundary, sentence) {
   }
   check_columns_named(boundary)
   check_input(checkmate::check_string(sentence, min.chars = 1), "sentence")
-  structure(list(name = name, edit = edit, boundary = boundary, sentence = sentence), class = "amiss_mechanism")
+  structure(list(name = name, edit = edit, boundary = boundary, sentence = sentence),
+            class = "amiss_mechanism")
 }
 
 #' @rdname mechanism
@@ -46,13 +51,16 @@ catalogue <- function(...) {
   mechanisms <- list(...)
   if (!all(vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))) {
     other <- which(!vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))[1]
-    abort_input(c("Every entry of a catalogue must be a mechanism; number {other} is {seen(mechanisms[[other]])}.",
-                  i = "Make each with {.fun mechanism}; of a list of them {.code do.call(catalogue, list)} makes one."))
+    abort_input(c(paste("Every entry of a catalogue must be a mechanism; number {other} is",
+                        "{seen(mechanisms[[other]])}."),
+                  i = paste("Make each with {.fun mechanism}; of a list of them",
+                            "{.code do.call(catalogue, list)} makes one.")))
   }
   for (one in mechanisms) check_whole(one, "...")
   names(mechanisms) <- vapply(mechanisms, `[[`, "", "name")
   if (anyDuplicated(names(mechanisms)))
-    abort_input("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}} stands twice in the catalogue.")
+    abort_input(paste("Mechanism {.val {names(mechanisms)[anyDuplicated(names(mechanisms))]}}",
+                      "stands twice in the catalogue."))
   structure(mechanisms, class = "amiss_catalogue")
 }
 
@@ -75,39 +83,46 @@ print.amiss_mechanism <- function(x, ...) on_stdout(x, {
 print.amiss_catalogue <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Catalogue} of {length(x)} mechanism{?s}")
   shown <- utils::head(x, 10)
-  for (entry in shown) cli::cli_bullets(c("*" = "{.strong {entry$name}} ({entry$boundary}): {entry$sentence}"))
+  for (entry in shown)
+    cli::cli_bullets(c("*" = "{.strong {entry$name}} ({entry$boundary}): {entry$sentence}"))
   if (length(x) > length(shown))
     cli::cli_bullets(c("*" = "{length(x) - length(shown)} more: {names(x)[-seq_along(shown)]}"))
   cli::cli_bullets(c(">" = "next: {.fun upgrade_model}"))
 })
 
 # Whether an edit asks for the name of the record beside the model.
-knows_record <- function(edit) is.function(edit) && length(setdiff(names(formals(args(edit))), "...")) == 2
+knows_record <- function(edit)
+  is.function(edit) && length(setdiff(names(formals(args(edit))), "...")) == 2
 
-# The extended simulator. An edit may replace parameters of the base model, but not drop what was adopted.
-extend <- function(simulator, mechanism, adopted = character(), record = NULL, call = rlang::caller_env()) {
+# The extended simulator. An edit may replace parameters of the base model, but not drop what was
+# adopted.
+extend <- function(simulator, mechanism, adopted = character(), record = NULL,
+                   call = rlang::caller_env()) {
   edit <- mechanism$edit
   of_record <- if (knows_record(edit)) function(simulator) edit(simulator, record) else edit
-  extended <- tryCatch(if (is.function(edit)) edited(simulator, of_record) else edit, error = function(e) {
-    abort_input(c("Mechanism {.val {mechanism$name}} cannot be applied to the model.", x = "{conditionMessage(e)}"),
-                class = "amiss_error_edit", call = call)
-  })
+  extended <- tryCatch(if (is.function(edit)) edited(simulator, of_record) else edit,
+                       error = function(e) {
+                         abort_input(c(paste("Mechanism {.val {mechanism$name}} cannot be applied",
+                                             "to the model."), x = "{conditionMessage(e)}"),
+                                     class = "amiss_error_edit", call = call)
+                       })
   if (!inherits(extended, class(simulator)[1])) {
-    abort_input(c(paste("Mechanism {.val {mechanism$name}} returned an object of class {.cls {class(extended)}}, not",
-                        "a simulator."),
-                  i = "The model that it extends is of class {.cls {class(simulator)}}."), call = call)
+    abort_input(c(paste("Mechanism {.val {mechanism$name}} returned an object of class",
+                        "{.cls {class(extended)}}, not a simulator."),
+                  i = "The model that it extends is of class {.cls {class(simulator)}}."),
+                call = call)
   }
   if (!is.null(simulator$held_out) && is.null(extended$held_out)) {
-    abort_input(c(paste("The runs of mechanism {.val {mechanism$name}} are not known at the validation rows, those of",
-                        "the model are."),
+    abort_input(c(paste("The runs of mechanism {.val {mechanism$name}} are not known at the",
+                        "validation rows, those of the model are."),
                   i = "Give {.fun ensemble} its runs there too."), call = call)
   }
   lost <- setdiff(adopted, names(free_parameters(extended)))
   if (length(lost)) {
-    abort_input(c(paste("Mechanism {.val {mechanism$name}} drops {cli::qty(lost)}the parameter{?s} {.val {lost}} of a",
-                        "mechanism that was adopted before."),
-                  i = "Let its {.code edit} extend the model that it is given, instead of making it anew."),
-                  call = call)
+    abort_input(c(paste("Mechanism {.val {mechanism$name}} drops {cli::qty(lost)}the",
+                        "parameter{?s} {.val {lost}} of a mechanism that was adopted before."),
+                  i = paste("Let its {.code edit} extend the model that it is given, instead of",
+                            "making it anew.")), call = call)
   }
   extended
 }
@@ -122,9 +137,11 @@ warn_absent_drivers <- function(catalogue, measurements) {
   for (entry in catalogue) {
     absent <- setdiff(entry$boundary, measurements$conditions)
     if (!length(absent)) next
-    warn_input(c(paste("Mechanism {.val {entry$name}} is driven by {.val {absent}}, which {?is/are} not among the",
-                       "boundary conditions analysed ({.val {measurements$conditions}})."),
-                 i = paste("{cli::qty(absent)}Name {?it/them} in {.arg boundary} of {.fun measurements},",
-                           "so that the discrepancy can answer to {?it/them}.")))
+    warn_input(c(paste("Mechanism {.val {entry$name}} is driven by {.val {absent}}, which",
+                       "{?is/are} not among the boundary conditions analysed",
+                       "({.val {measurements$conditions}})."),
+                 i = paste("{cli::qty(absent)}Name {?it/them} in {.arg boundary} of",
+                           "{.fun measurements}, so that the discrepancy can answer to",
+                           "{?it/them}.")))
   }
 }

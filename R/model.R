@@ -1,6 +1,6 @@
-# A model of the loop as a value: what it simulates, the runs that are known of it, and what has been
-# found out. One record is a list of one; parameters of the same name are one parameter. Points z are
-# those of coordinates.R. Outputs of all records stand below each other in one matrix.
+# A model of the loop as a value: what it simulates, the runs that are known of it, and what has
+# been found out. One record is a list of one; parameters of the same name are one parameter. Points
+# z are those of coordinates.R. Outputs of all records stand below each other in one matrix.
 
 # What the loop needs of a record, once.
 loop_record <- function(measurements, control, call = rlang::caller_env()) {
@@ -25,7 +25,8 @@ new_model <- function(simulators, records, name = "base", parent = NULL, mechani
   space <- coordinates_of(parameters)
   sizes <- vapply(records, function(record) length(record$rows), 0L)
   held <- vapply(records, function(record) length(record$held), 0L)
-  blocks <- function(sizes) split(seq_len(sum(sizes)), factor(rep(seq_along(sizes), sizes), seq_along(sizes)))
+  blocks <- function(sizes)
+    split(seq_len(sum(sizes)), factor(rep(seq_along(sizes), sizes), seq_along(sizes)))
   list(name = name, parent = parent, mechanism = mechanism, simulators = simulators,
        records = records, parameters = parameters, space = space,
        own = lapply(each, function(p) match(names(p), names(parameters))),
@@ -83,12 +84,13 @@ over_noise <- function(model, difference) sqrt(colMeans((cbind(difference) / mod
 
 last_model <- function(models) models[[length(models)]]
 
-# The runs of a model are runs of its extension where the mechanism is switched off: at `off`, of the
-# parameters that are new.
+# The runs of a model are runs of its extension where the mechanism is switched off: at `off`, of
+# the parameters that are new.
 inherit_runs <- function(model, present, off) {
   runs <- present$runs
   old <- names(present$parameters)
-  z <- matrix(0, nrow(runs$z), length(model$parameters), dimnames = list(NULL, names(model$parameters)))
+  z <- matrix(0, nrow(runs$z), length(model$parameters),
+              dimnames = list(NULL, names(model$parameters)))
   z[, old] <- runs$z
   z[, names(off)] <- rep(off, each = nrow(z))
   model$runs <- bind_runs(list(z = z, outputs = runs$outputs, held = runs$held), model$runs)

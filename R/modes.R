@@ -1,5 +1,5 @@
-# The modes of a model's parameters: what searches from several starts lead to, whether they agree, and
-# the region that holds them.
+# The modes of a model's parameters: what searches from several starts lead to, whether they agree,
+# and the region that holds them.
 
 # list(model, modes, agree): the base model after scouts and searches, the best mode first.
 find_modes <- function(model, context) {
@@ -20,8 +20,9 @@ find_modes <- function(model, context) {
   list(model = model, modes = modes, agree = length(modes) > 1 && ranked$agree)
 }
 
-# The first search begins with slopes by regression on the runs over the priors. The next ones are there to find other
-# modes: slopes over the priors would lead them back, so that theirs are taken where they begin.
+# The first search begins with slopes by regression on the runs over the priors. The next ones are
+# there to find other modes: slopes over the priors would lead them back, so that theirs are taken
+# where they begin.
 begun_from <- function(model, start, locally, context) {
   if (locally) {
     found <- difference_slopes(model, start, context)
@@ -34,12 +35,14 @@ begun_from <- function(model, start, locally, context) {
 # Runs over the priors, as many as it takes to begin; those that are known count.
 with_scouts <- function(model, context) {
   p <- length(model$parameters)
-  n <- max(0, (model$scouts %||% (rules$scouts_base + rules$scouts_parameter * p)) - nrow(model$runs$z))
+  n <- max(
+    0, (model$scouts %||% (rules$scouts_base + rules$scouts_parameter * p)) - nrow(model$runs$z))
   if (n == 0) return(model)
   unit <- with_seed(context$seed, lhs::randomLHS(n, p))
   model <- with_runs(model, from_unit(unit, model$space), context)$model
   check_some_succeeded(model)
-  for (rows in model$rows) check_runs_change(model$runs$outputs[rows, succeeded(model), drop = FALSE])
+  for (rows in model$rows)
+    check_runs_change(model$runs$outputs[rows, succeeded(model), drop = FALSE])
   model
 }
 
@@ -51,18 +54,19 @@ check_some_succeeded <- function(model, call = rlang::caller_env()) {
   abort_input(c("{length(failed)} of {n} runs over the priors hold values that are not finite.",
                 x = paste("The first is run {failed[1]} at",
                           "{point_words(unit_to_values(unit, model$parameters))}."),
-                i = paste("Find out why the simulator fails there, or narrow the priors. If every run",
-                          "fails, look for a mistake in the simulator first.")), call = call)
+                i = paste("Find out why the simulator fails there, or narrow the priors. If every",
+                          "run fails, look for a mistake in the simulator first.")), call = call)
 }
 
-# Where searches begin: the run nearest to the record; the nearest of the half that lies farther from
-# it; and so on, each time of the half that lies farther from all before.
+# Where searches begin: the run nearest to the record; the nearest of the half that lies farther
+# from it; and so on, each time of the half that lies farther from all before.
 start_runs <- function(model, starts = NULL) {
   misfit <- colMeans(((model$runs$outputs - model$target) / model$noise)^2)
   misfit[!succeeded(model)] <- Inf
   starts <- starts %||% which.min(misfit)
   for (k in seq_len(min(rules$most_starts, sum(is.finite(misfit))) - 1)) {
-    apart <- apply(model$runs$z, 1, function(z) min(colSums((t(model$runs$z[starts, , drop = FALSE]) - z)^2)))
+    apart <- apply(model$runs$z, 1,
+                   function(z) min(colSums((t(model$runs$z[starts, , drop = FALSE]) - z)^2)))
     far <- is.finite(misfit) & apart >= stats::median(apart[is.finite(misfit)]) & apart > 0
     if (!any(far)) break
     starts <- c(starts, which(far)[which.min(misfit[far])])
@@ -70,8 +74,8 @@ start_runs <- function(model, starts = NULL) {
   starts
 }
 
-# The modes by their values, which are compared by the draws of all of them, the best first; `agree` if
-# another search ended at the mode of the best.
+# The modes by their values, which are compared by the draws of all of them, the best first; `agree`
+# if another search ended at the mode of the best.
 ranked_modes <- function(model, modes, context) {
   at <- vapply(modes, `[[`, 0, "at")
   each <- vapply(modes, function(mode) values_at(model, at, mode$history, mode$moves, context), at)
@@ -86,8 +90,8 @@ ranked_modes <- function(model, modes, context) {
   list(model = model, modes = modes, agree = FALSE)
 }
 
-# Of one height, near each other as both see it, or without a valley between them: a ridge is one mode, and the region
-# holds all modes of one height. list(model, yes).
+# Of one height, near each other as both see it, or without a valley between them: a ridge is one
+# mode, and the region holds all modes of one height. list(model, yes).
 is_same_mode <- function(model, one, other, context) {
   if (one$value - other$value < rules$same_height) return(list(model = model, yes = TRUE))
   apart <- model$runs$z[other$at, ] - model$runs$z[one$at, ]

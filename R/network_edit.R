@@ -23,7 +23,8 @@ change_component.amiss_network <- function(model, name, ...) {
   if (identical(name, "network")) {
     known <- c("output", "before", "hold", "interpolation", "output_at", "start_hours", "name")
     check_field_names(changes, known, "network", call)
-    return(do.call(network, c(unname(model$components), replace_fields(unclass(model)[known], changes))))
+    return(
+      do.call(network, c(unname(model$components), replace_fields(unclass(model)[known], changes))))
   }
   old <- find_part(model, name, call)
   check_field_names(changes, names(network_fields[[old$type]]), describe_part(old), call)
@@ -37,7 +38,8 @@ find_part <- function(network, name, call) {
   known <- names(network$components)
   if (is.character(name)) check_readable(name, "name", call)
   if (!checkmate::test_choice(name, known)) {
-    abort_input(c("The network has no part {.arg name} = {seen(name)}.", i = "Its parts: {.val {known}}."), call = call)
+    abort_input(c("The network has no part {.arg name} = {seen(name)}.",
+                  i = "Its parts: {.val {known}}."), call = call)
   }
   network$components[[name]]
 }

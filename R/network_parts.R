@@ -1,15 +1,19 @@
 # The parts of a network, and the limits of each field.
 
 network_number <- function(lower = 0, open = FALSE, infinite = FALSE, optional = FALSE) {
-  list(kind = "number", lower = lower, open = open, upper = Inf, infinite = infinite, optional = optional)
+  list(kind = "number", lower = lower, open = open, upper = Inf, infinite = infinite,
+       optional = optional)
 }
 network_place <- function(optional = FALSE) list(kind = "place", optional = optional)
 
 network_fields <- list(
-  node = list(capacity = network_number(infinite = TRUE), start = network_number(-Inf, optional = TRUE)),
-  link = list(from = network_place(), to = network_place(), conductance = network_number(optional = TRUE),
+  node = list(capacity = network_number(infinite = TRUE),
+              start = network_number(-Inf, optional = TRUE)),
+  link = list(from = network_place(), to = network_place(),
+              conductance = network_number(optional = TRUE),
               resistance = network_number(open = TRUE, optional = TRUE), by = network_place(TRUE)),
-  flow = list(from = network_place(TRUE), to = network_place(TRUE), rate = network_number(), by = network_place(TRUE)),
+  flow = list(from = network_place(TRUE), to = network_place(TRUE), rate = network_number(),
+              by = network_place(TRUE)),
   gain = list(to = network_place(), driver = network_place(TRUE), factor = network_number(-Inf),
               by = network_place(TRUE)))
 
@@ -17,23 +21,25 @@ network_fields <- list(
 #'
 #' What a [network()] is composed of. Every number may be a [free()] parameter where it stands.
 #'
-#' A *place* is the name of a node or, if no node has that name, of a driver column: a temperature outside of the
-#' network. `by` names a driver column that multiplies the part: wind speed for a leak that wind drives, the opening of
-#' a valve or a window. Within a row it is constant.
+#' A *place* is the name of a node or, if no node has that name, of a driver column: a temperature
+#' outside of the network. `by` names a driver column that multiplies the part: wind speed for a
+#' leak that wind drives, the opening of a valve or a window. Within a row it is constant.
 #'
-#' @param name Name of the part. Links, flows and gains have one of their own: `"air-wall"`, `"soil-river"`,
-#'   `"Gv to air"`.
-#' @param capacity What the node holds for a unit of its state: heat capacity, volume, or 1 if the state is an amount.
-#'   `Inf`: the state stays at its `start`, as that of the ground.
+#' @param name Name of the part. Links, flows and gains have one of their own: `"air-wall"`,
+#'   `"soil-river"`, `"Gv to air"`.
+#' @param capacity What the node holds for a unit of its state: heat capacity, volume, or 1 if the
+#'   state is an amount. `Inf`: the state stays at its `start`, as that of the ground.
 #' @param start State at the start; `NULL`: see [network()].
-#' @param from,to Places. A link joins two, and its sign is that of the heat from the first to the second. A flow
-#'   carries what `from` holds to `to`; with `to = NULL` it is lost, with `from = NULL` it brings a constant amount.
-#' @param conductance,resistance One of the two: the heat that a difference of one unit drives, or its inverse.
-#' @param rate Amount that is carried each hour for a unit of the state of `from`: a flow in m3/h for concentrations,
-#'   1/h for amounts.
+#' @param from,to Places. A link joins two, and its sign is that of the heat from the first to the
+#'   second. A flow carries what `from` holds to `to`; with `to = NULL` it is lost, with `from =
+#'   NULL` it brings a constant amount.
+#' @param conductance,resistance One of the two: the heat that a difference of one unit drives, or
+#'   its inverse.
+#' @param rate Amount that is carried each hour for a unit of the state of `from`: a flow in m3/h
+#'   for concentrations, 1/h for amounts.
 #' @param driver A driver column; `NULL` for a gain that is constant.
-#' @param factor Amount an hour that one unit of the driver brings: 1 for heating in kW, `1e-3` times an aperture for
-#'   sun in W/m2.
+#' @param factor Amount an hour that one unit of the driver brings: 1 for heating in kW, `1e-3`
+#'   times an aperture for sun in W/m2.
 #' @param by A driver column that multiplies the part, or `NULL`.
 #' @return An object of class `amiss_network_part`.
 #' @examples
@@ -48,7 +54,8 @@ NULL
 new_part <- function(type, name, fields, call = rlang::caller_env()) {
   check_input(checkmate::check_string(name, min.chars = 1), "name", call = call)
   present(fields, call)
-  check_part(structure(c(list(type = type, name = name), fields), class = "amiss_network_part"), call)
+  check_part(structure(c(list(type = type, name = name), fields), class = "amiss_network_part"),
+             call)
 }
 
 #' @rdname network_parts
@@ -60,15 +67,18 @@ network_node <- function(name, capacity, start = NULL) {
 
 #' @rdname network_parts
 #' @export
-network_link <- function(from, to, conductance = NULL, resistance = NULL, by = NULL, name = paste0(from, "-", to)) {
+network_link <- function(from, to, conductance = NULL, resistance = NULL, by = NULL,
+                         name = paste0(from, "-", to)) {
   check_present(from, to)
   check_places(list(from = from, to = to))
-  new_part("link", name, list(from = from, to = to, conductance = conductance, resistance = resistance, by = by))
+  new_part("link", name,
+           list(from = from, to = to, conductance = conductance, resistance = resistance, by = by))
 }
 
 #' @rdname network_parts
 #' @export
-network_flow <- function(from, to, rate, by = NULL, name = paste0(from %||% "outside", "-", to %||% "outside")) {
+network_flow <- function(from, to, rate, by = NULL,
+                         name = paste0(from %||% "outside", "-", to %||% "outside")) {
   check_present(from, to, rate)
   check_places(list(from = from, to = to), optional = c("from", "to"))
   new_part("flow", name, list(from = from, to = to, rate = rate, by = by))
@@ -76,7 +86,8 @@ network_flow <- function(from, to, rate, by = NULL, name = paste0(from %||% "out
 
 #' @rdname network_parts
 #' @export
-network_gain <- function(to, driver, factor = 1, by = NULL, name = paste(driver %||% "constant", "to", to)) {
+network_gain <- function(to, driver, factor = 1, by = NULL,
+                         name = paste(driver %||% "constant", "to", to)) {
   check_present(to, driver)
   check_places(list(to = to, driver = driver), optional = "driver")
   new_part("gain", name, list(to = to, driver = driver, factor = factor, by = by))
@@ -85,8 +96,9 @@ network_gain <- function(to, driver, factor = 1, by = NULL, name = paste(driver 
 # Before a name is made of them.
 check_places <- function(places, optional = character(), call = rlang::caller_env()) {
   for (field in names(places)) {
-    check_input(checkmate::check_string(places[[field]], min.chars = 1, null.ok = field %in% optional), field,
-                "Give the name of a node or of a driver column.", call = call)
+    check_input(
+      checkmate::check_string(places[[field]], min.chars = 1, null.ok = field %in% optional), field,
+      "Give the name of a node or of a driver column.", call = call)
   }
 }
 
@@ -107,14 +119,16 @@ check_part_field <- function(value, rule, where, field, call) {
   if (is.null(value) && rule$optional) return(invisible())
   if (rule$kind == "place") {
     if (checkmate::test_string(value, min.chars = 1)) return(check_readable(value, field, call))
-    abort_input(c("{where}: {.field {field}} must be the name of a node or of a column; got {seen(value)}.",
-                  i = if (rule$optional) "Use {.code NULL} for none."), call = call)
+    abort_input(c(paste("{where}: {.field {field}} must be the name of a node or of a column; got",
+                        "{seen(value)}."), i = if (rule$optional) "Use {.code NULL} for none."),
+                call = call)
   }
   if (is_free(value)) return(check_prior_inside(value, rule, where, field, call))
   number <- isTRUE(plain_number(value, single = TRUE)) && checkmate::test_number(value)
-  if (number && (is.finite(value) || rule$infinite && value == Inf) && inside_rule(value, rule)) return(invisible())
-  abort_input("{where}: {.field {field}} must be one number {rule_words(rule)} or {.fn free}; got {seen(value)}.",
-              call = call)
+  if (number && (is.finite(value) || rule$infinite && value == Inf) && inside_rule(value, rule))
+    return(invisible())
+  abort_input(paste("{where}: {.field {field}} must be one number {rule_words(rule)} or",
+                    "{.fn free}; got {seen(value)}."), call = call)
 }
 
 inside_rule <- function(value, rule) if (rule$open) value > rule$lower else value >= rule$lower
@@ -131,7 +145,8 @@ check_prior_inside <- function(parameter, rule, where, field, call) {
   least <- min(c(prior$lower, prior$upper) * if (scaled) parameter$factor else 1)
   if (least >= rule$lower) return(invisible())
   name <- if (scaled) parameter$free$name else parameter$name
-  abort_input(c("{where}: {.field {field}} must be {rule_words(rule)}, and the prior of {.val {name}} reaches {least}.",
+  abort_input(c(paste("{where}: {.field {field}} must be {rule_words(rule)}, and the prior of",
+                      "{.val {name}} reaches {least}."),
                 i = "Cut it off there: {.code lower = {rule$lower}}."), call = call)
 }
 

@@ -1,14 +1,15 @@
 # Runs of a network, and their slopes.
 
 #' @export
-simulate_runs.amiss_network <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+simulate_runs.amiss_network <- function(simulator, values, drivers, step_h, hold = NULL,
+                                        threads = 1L, ...) {
   check_run_dots(...)
   call <- rlang::current_env()
   check_run_number(nrow(values), nrow(drivers))
   run <- network_request(simulator, drivers, step_h, hold, call)
   numbers <- coefficient_values(coefficient_table(simulator), values)
-  call_engine(network_simulate_(run$network, numbers, run$drivers, run$hold, run$options, engine_context(0, threads)),
-              call)
+  call_engine(network_simulate_(run$network, numbers, run$drivers, run$hold, run$options,
+                                engine_context(0, threads)), call)
 }
 
 #' @export
@@ -21,8 +22,8 @@ slopes.amiss_network <- function(simulator, values, drivers, step_h, hold = NULL
   table <- coefficient_table(simulator)
   at <- values[1, , drop = FALSE]
   out <- call_engine(network_slopes_(run$network, coefficient_values(table, at)[, 1],
-                                     coefficient_slopes(table, at, parameters), run$drivers, run$hold, run$options),
-                     call)
+                                     coefficient_slopes(table, at, parameters), run$drivers,
+                                     run$hold, run$options), call)
   colnames(out) <- parameters
   out
 }
@@ -36,12 +37,13 @@ network_request <- function(network, drivers, step_h, hold, call) {
   gaps <- needed[!apply(is.finite(drivers), 2, all)]
   if (length(gaps)) {
     abort_input(c("{.arg drivers} has missing or infinite values in {.val {gaps}}.",
-                  i = "The simulator needs every driver in every row: fill the gaps first."), call = call)
+                  i = "The simulator needs every driver in every row: fill the gaps first."),
+                call = call)
   }
   list(network = engine_network(network, needed), drivers = drivers,
        hold = if (network$hold) as.numeric(hold) else numeric(),
-       options = list(step_h = step_h, linear = network$interpolation == "linear", mean = network$output_at == "mean",
-                      start_hours = network$start_hours))
+       options = list(step_h = step_h, linear = network$interpolation == "linear",
+                      mean = network$output_at == "mean", start_hours = network$start_hours))
 }
 
 # A node that nothing joins to a driver or to a known state has no steady state to start from.
@@ -57,9 +59,10 @@ check_network_joined <- function(network, call) {
     loose <- setdiff(loose, joined)
   }
   if (!length(loose)) return(invisible())
-  abort_input(c("Node {.val {loose[1]}} has no steady state to start from: nothing leads out of it.",
-                i = "Give its {.field start}, or a {.fn network_link} or {.fn network_flow} that leads elsewhere."),
-              call = call)
+  abort_input(
+    c("Node {.val {loose[1]}} has no steady state to start from: nothing leads out of it.",
+      i = paste("Give its {.field start}, or a {.fn network_link} or {.fn network_flow} that leads",
+                "elsewhere.")), call = call)
 }
 
 # Whether a part takes something from a node to where it is not kept among those that are loose.
@@ -81,7 +84,8 @@ engine_network <- function(network, drivers) {
     by <- if (is.null(part$by)) -1 else match(part$by, drivers) - 1
     c(place(into)[["node"]], place(of), sign, elements[[part$name]], by)
   }
-  balance <- do.call(rbind, c(list(matrix(0, 0, 6)), lapply(exchanges, function(part) part_terms(part, term))))
+  balance <- do.call(
+    rbind, c(list(matrix(0, 0, 6)), lapply(exchanges, function(part) part_terms(part, term))))
   list(nodes = length(nodes), elements = length(exchanges), drivers = length(drivers),
        balance = balance[balance[, 1] >= 0, , drop = FALSE],
        output = if (network$output %in% nodes) rbind(c(-1, place(network$output), 1, -1, -1))
@@ -105,13 +109,13 @@ output_terms <- function(part, term) {
     gain = rbind(term(NULL, part$driver, 1, part)))
 }
 
-# All coefficients in the engine's order: elements, capacities, starts, drivers before the start. Each is a number, or
-# a factor times a parameter, or the inverse of that.
+# All coefficients in the engine's order: elements, capacities, starts, drivers before the start.
+# Each is a number, or a factor times a parameter, or the inverse of that.
 coefficient_table <- function(network) {
   parts <- network$components
   nodes <- Filter(function(part) part$type == "node", parts)
-  element <- function(part) switch(part$type, link = part$conductance %||% part$resistance, flow = part$rate,
-                                   gain = part$factor)
+  element <- function(part) switch(part$type, link = part$conductance %||% part$resistance,
+                                   flow = part$rate, gain = part$factor)
   exchanges <- Filter(function(part) part$type != "node", parts)
   fields <- c(lapply(exchanges, element), lapply(nodes, `[[`, "capacity"),
               lapply(nodes, function(node) node$start %||% NaN),
@@ -120,11 +124,15 @@ coefficient_table <- function(network) {
                logical(2 * length(nodes) + length(named_drivers(network))))
   scaled <- vapply(fields, inherits, NA, "amiss_scaled_free")
   free <- vapply(fields, is_free, NA)
-  data.frame(value = vapply(seq_along(fields), function(i) if (free[i]) NA_real_ else as.numeric(fields[[i]]), 0),
+  data.frame(value = vapply(seq_along(fields),
+                            function(i) if (free[i]) NA_real_ else as.numeric(fields[[i]]), 0),
              parameter = vapply(seq_along(fields), function(i) {
-               if (scaled[i]) fields[[i]]$free$name else if (free[i]) fields[[i]]$name else NA_character_
+               if (scaled[i]) fields[[i]]$free$name
+               else if (free[i]) fields[[i]]$name
+               else NA_character_
              }, ""),
-             factor = vapply(seq_along(fields), function(i) if (scaled[i]) fields[[i]]$factor else 1, 0),
+             factor = vapply(seq_along(fields),
+                             function(i) if (scaled[i]) fields[[i]]$factor else 1, 0),
              inverse = unname(inverse))
 }
 

@@ -3,13 +3,16 @@
 check_sqlite <- function(column, call = rlang::caller_env()) {
   if (is.numeric(column)) {
     abort_input(c("{.arg column} = {.val {column}} names no variable of an SQLite output.",
-                  i = "Write {.code \"KEY:Name of the variable\"}, as in EnergyPlus' CSV."), call = call)
+                  i = "Write {.code \"KEY:Name of the variable\"}, as in EnergyPlus' CSV."),
+                call = call)
   }
-  absent <- Filter(function(package) !requireNamespace(package, quietly = TRUE), c("DBI", "RSQLite"))
+  absent <- Filter(function(package) !requireNamespace(package, quietly = TRUE),
+                   c("DBI", "RSQLite"))
   if (length(absent)) {
-    abort_input(c("An SQLite output is read by the package{?s} {.pkg {absent}}, which {?is/are} not installed.",
-                  i = "Install {?it/them}, or let EnergyPlus write {.file eplusout.csv}."), call = call,
-                class = "amiss_error_package")
+    abort_input(c(paste("An SQLite output is read by the package{?s} {.pkg {absent}}, which",
+                        "{?is/are} not installed."),
+                  i = "Install {?it/them}, or let EnergyPlus write {.file eplusout.csv}."),
+                call = call, class = "amiss_error_package")
   }
 }
 
@@ -21,14 +24,17 @@ read_sqlite <- function(output, folder) {
   on.exit(DBI::dbDisconnect(database))
   series <- lapply(output$column, sqlite_series, database = database, file = output$file)
   index <- lapply(series, `[[`, "TimeIndex")
-  if (length(unique(index)) > 1) stop("the variables in ", output$file, " are reported at different times")
+  if (length(unique(index)) > 1)
+    stop("the variables in ", output$file, " are reported at different times")
   value <- Reduce(`+`, lapply(series, `[[`, "Value"))
   if (identical(output$combine, "mean")) value <- value / length(series)
   first <- series[[1]]
-  list(value = value, month = first$Month, day = first$Day, seconds = 3600 * first$Hour + 60 * first$Minute)
+  list(value = value, month = first$Month, day = first$Day,
+       seconds = 3600 * first$Hour + 60 * first$Minute)
 }
 
-# A variable as it was reported most often, of the weather's run period alone: no design days, no warm-up.
+# A variable as it was reported most often, of the weather's run period alone: no design days, no
+# warm-up.
 sqlite_series <- function(column, database, file) {
   known <- DBI::dbGetQuery(database, "SELECT ReportDataDictionaryIndex AS id, KeyValue AS key, Name AS name
                                       FROM ReportDataDictionary")

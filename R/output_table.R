@@ -7,17 +7,19 @@ read_output_table <- function(output, folder, rows) {
   stamp <- if (!is.null(output$time)) paste_columns(table, output$time, output)
   words <- lapply(output$column, function(column) table$words[, column_at(column, table, output)])
   # Variables that EnergyPlus reports less often leave their fields empty.
-  kept <- if (is.null(stamp)) rep(TRUE, nrow(table$words)) else Reduce(`|`, lapply(words, nzchar)) & nzchar(stamp)
+  kept <- if (is.null(stamp)) rep(TRUE, nrow(table$words))
+          else Reduce(`|`, lapply(words, nzchar)) & nzchar(stamp)
   within <- seq_len(nrow(table$words))[kept]
   within <- without_ends(within, output$drop_first, output$drop_last)
-  values <- Map(function(word, column) table_numbers(word[within], table$line[within], column, output), words,
-                output$column)
+  values <- Map(function(word, column) table_numbers(word[within], table$line[within], column,
+                                                     output), words, output$column)
   value <- Reduce(`+`, values)
   if (identical(output$combine, "mean")) value <- value / length(values)
   list(value = value, stamp = stamp[within], line = table$line[within])
 }
 
-without_ends <- function(x, first, last = 0) x[seq_along(x) > first & seq_along(x) <= length(x) - last]
+without_ends <- function(x, first, last = 0)
+  x[seq_along(x) > first & seq_along(x) <= length(x) - last]
 
 least_rows <- 2000  # that a table may have, however few the record has: warm-up, a whole year
 
@@ -25,8 +27,8 @@ table_numbers <- function(words, line, column, output) {
   value <- output_numbers(if (output$decimal == ",") sub(",", ".", words, fixed = TRUE) else words)
   bad <- which(is.na(value) & !is.nan(value))
   if (length(bad)) {
-    stop("line ", line[bad[1]], " of ", output$file, " holds ", shown(words[bad[1]]), " in the column ", column,
-         ", which is no number", table_hint(bad, words, output))
+    stop("line ", line[bad[1]], " of ", output$file, " holds ", shown(words[bad[1]]),
+         " in the column ", column, ", which is no number", table_hint(bad, words, output))
   }
   value
 }
@@ -37,12 +39,15 @@ table_hint <- function(bad, words, output) {
   else number_hint(bad, words)
 }
 
-# list(words, line, names): the fields of the rows below the names, a matrix, and the numbers of their lines.
+# list(words, line, names): the fields of the rows below the names, a matrix, and the numbers of
+# their lines.
 split_table <- function(lines, output) {
   lines <- lines[as.integer(names(lines)) > output$skip]
-  remark <- if (nzchar(output$comment)) startsWith(trimws(lines), output$comment) else rep(FALSE, length(lines))
+  remark <- if (nzchar(output$comment)) startsWith(trimws(lines), output$comment)
+            else rep(FALSE, length(lines))
   named <- is.character(output$column)
-  header <- if (named) table_header(lines, remark, output) else list(at = 0, separator = table_separator(output, ""))
+  header <- if (named) table_header(lines, remark, output)
+            else list(at = 0, separator = table_separator(output, ""))
   body <- lines[!remark & seq_along(lines) > header$at]
   body <- without_ends(body, output$units_rows)
   if (!length(body)) stop("it wrote no rows of numbers into ", output$file)
@@ -50,7 +55,8 @@ split_table <- function(lines, output) {
   list(words = field_matrix(body, header, output$file), line = names(body), names = header$fields)
 }
 
-# A body line per row; those that end with a separator have an empty field more than there are names.
+# A body line per row; those that end with a separator have an empty field more than there are
+# names.
 field_matrix <- function(body, header, file) {
   connection <- textConnection(body, encoding = "UTF-8")
   on.exit(close(connection))
@@ -60,11 +66,11 @@ field_matrix <- function(body, header, file) {
   if (length(uneven)) {
     k <- uneven[1]
     stop("line ", names(body)[k], " of ", file, " has ",
-         if (is.na(counts[k])) "a quote that does not end" else paste(counts[k], "field(s), not", needed), ": ",
-         shown(body[k]))
+         if (is.na(counts[k])) "a quote that does not end"
+         else paste(counts[k], "field(s), not", needed), ": ", shown(body[k]))
   }
-  words <- scan(text = body, what = "", sep = header$separator, quote = "\"", strip.white = TRUE, quiet = TRUE,
-                na.strings = character(), encoding = "UTF-8")
+  words <- scan(text = body, what = "", sep = header$separator, quote = "\"", strip.white = TRUE,
+                quiet = TRUE, na.strings = character(), encoding = "UTF-8")
   matrix(words, ncol = counts[1], byrow = TRUE)
 }
 
@@ -73,24 +79,28 @@ table_separator <- function(output, detected) {
   if (is.null(output$separator)) detected else known_separator(output$separator)
 }
 
-# list(at, fields, separator): the first line that names all that is looked for, in a comment or not.
+# list(at, fields, separator): the first line that names all that is looked for, in a comment or
+# not.
 table_header <- function(lines, remark, output) {
   wanted <- c(output$column, output$time)
   tried <- if (is.null(output$separator)) separators else known_separator(output$separator)
   best <- list(found = -1)
   for (at in utils::head(seq_along(lines), 200)) {
-    bare <- if (remark[at]) trimws(substring(trimws(lines[at]), nchar(output$comment) + 1)) else lines[at]
+    bare <- if (remark[at]) trimws(substring(trimws(lines[at]), nchar(output$comment) + 1))
+            else lines[at]
     if (!possible_header(bare, wanted)) next
     for (separator in tried) {
       fields <- split_line(bare, separator)
       found <- sum(!is.na(match_columns(wanted, fields)))
-      if (found > best$found) best <- list(found = found, at = at, fields = fields, separator = separator)
+      if (found > best$found)
+        best <- list(found = found, at = at, fields = fields, separator = separator)
       if (found == length(wanted)) return(best)
     }
   }
   there <- if (best$found > 0) best$fields else if (any(!remark)) lines[!remark][1] else lines[1]
   missed <- if (best$found > 0) wanted[is.na(match_columns(wanted, best$fields))] else wanted
-  stop("there is no column ", missed[1], " in ", output$file, "; there: ", shown(paste(there, collapse = ", ")))
+  stop("there is no column ", missed[1], " in ", output$file, "; there: ",
+       shown(paste(there, collapse = ", ")))
 }
 
 # Whether one of the names stands in a line at all: splitting each line in five ways takes its time.

@@ -3,11 +3,12 @@
 #' Outputs of one simulator
 #'
 #' A simulator whose function returns several series in one run, as one simulator for each of them
-#' ([calibrate_jointly()]). They share their runs: for the same values, drivers and, if the function asks for it,
-#' `info`, the function is called once, as long as a session lasts or until the memory of runs holds ten million
-#' numbers.
+#' ([calibrate_jointly()]). They share their runs: for the same values, drivers and, if the function
+#' asks for it, `info`, the function is called once, as long as a session lasts or until the memory
+#' of runs holds ten million numbers.
 #'
-#' @param simulator A [function_simulator()] whose function returns a matrix with named columns, or a data frame.
+#' @param simulator A [function_simulator()] whose function returns a matrix with named columns, or
+#'   a data frame.
 #' @param outputs Names of the columns.
 #' @return A named list of simulators.
 #' @section Errors: A run that lacks a column stops as a run that fails does.
@@ -20,7 +21,8 @@
 #' @export
 outputs_of <- function(simulator, outputs) {
   check_object(simulator, "amiss_function_simulator", "simulator")
-  check_input(checkmate::check_character(outputs, min.len = 1, any.missing = FALSE, unique = TRUE), "outputs")
+  check_input(checkmate::check_character(outputs, min.len = 1, any.missing = FALSE, unique = TRUE),
+              "outputs")
   recall <- run_memory(simulator$f)
   lapply(stats::setNames(nm = outputs), function(output) {
     one <- simulator
@@ -28,7 +30,8 @@ outputs_of <- function(simulator, outputs) {
     one$f <- function(values, drivers, info) {
       run <- as.matrix(plain_numbers(recall(values, drivers, info)))
       if (!output %in% colnames(run)) {
-        stop("it returned the columns ", paste(colnames(run), collapse = ", "), ", not ", output, call. = FALSE)
+        stop("it returned the columns ", paste(colnames(run), collapse = ", "), ", not ", output,
+             call. = FALSE)
       }
       unname(run[, output])
     }

@@ -1,50 +1,57 @@
-paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1), t2 = c(1, 1), unit = 1,
-                      fictitious_seed = 1, probability = 0.95, tolerance = 0.01, ais = list())
+paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1), t2 = c(1, 1),
+                      unit = 1, fictitious_seed = 1, probability = 0.95, tolerance = 0.01,
+                      ais = list())
 
 #' Calibrate a simulator as in the paper
 #'
 #' The method of Monari (2022), its misprints corrected, beside the package's own ([calibrate()],
-#' [attribute_discrepancy()]): the parameters from the measurement's coefficients on the basis (equation 5), the
-#' discrepancy as a Gaussian process over the boundary conditions of the same time step (equation 6), both by annealed
-#' importance sampling, and the variance index of each condition. It knows neither the history of the conditions nor
-#' autocorrelated errors.
+#' [attribute_discrepancy()]): the parameters from the measurement's coefficients on the basis
+#' (equation 5), the discrepancy as a Gaussian process over the boundary conditions of the same time
+#' step (equation 6), both by annealed importance sampling, and the variance index of each
+#' condition. It knows neither the history of the conditions nor autocorrelated errors.
 #'
-#' *Evidence.* The product of the normalising constants of (5) and (6), with the Jacobian `|K'K|^(-1/2)`, is a density
-#' of the calibration record, so that models with different bases may be compared. The precision `lambda*` of the noise
-#' is one quantity, but is drawn once for each basis vector and once for the discrepancy, as in the paper: the product
-#' is the evidence of a model with as many independent noises. `shared_lambda` draws it once for all basis vectors;
+#' *Evidence.* The product of the normalising constants of (5) and (6), with the Jacobian
+#' `|K'K|^(-1/2)`, is a density of the calibration record, so that models with different bases may
+#' be compared. The precision `lambda*` of the noise is one quantity, but is drawn once for each
+#' basis vector and once for the discrepancy, as in the paper: the product is the evidence of a
+#' model with as many independent noises. `shared_lambda` draws it once for all basis vectors;
 #' [calibrate()] draws it once.
 #'
-#' *Variance index.* `R2_s` is the variance of the discrepancy predicted from condition s alone over the variance of
-#' the discrepancy; `R2_0` that of a fictitious condition, white noise; `difference` = `R2_s - R2_0`. A condition is
-#' significant if 0 lies outside the highest-density interval of the difference. An interval below 0 means that it
-#' explains less than white noise does; its rank shows that.
+#' *Variance index.* `R2_s` is the variance of the discrepancy predicted from condition s alone over
+#' the variance of the discrepancy; `R2_0` that of a fictitious condition, white noise; `difference`
+#' = `R2_s - R2_0`. A condition is significant if 0 lies outside the highest-density interval of the
+#' difference. An interval below 0 means that it explains less than white noise does; its rank shows
+#' that.
 #'
-#' The prior of the discrepancy's variance, `(1 - t2) / t2` with `t2` uniform, has its median at 1 in the target's unit
-#' squared: unlike [calibrate()]'s, the evidence depends on that unit beyond the change of density, unless `unit`
-#' changes with it.
+#' The prior of the discrepancy's variance, `(1 - t2) / t2` with `t2` uniform, has its median at 1
+#' in the target's unit squared: unlike [calibrate()]'s, the evidence depends on that unit beyond
+#' the change of density, unless `unit` changes with it.
 #'
-#' *Cost.* The kernel of (6) is smooth in the values of the conditions and so of low rank. Beyond 120 steps its
-#' posterior is annealed by way of every 4th, 16th, ... step of the record, with values that are approximate to
-#' `tolerance` nats; at 32 of the final draws they are compared with certified ones, and the evidence is corrected.
-#' `tolerance = 0` computes every value densely, at a cost that grows with N^3, and anneals from the prior.
+#' *Cost.* The kernel of (6) is smooth in the values of the conditions and so of low rank. Beyond
+#' 120 steps its posterior is annealed by way of every 4th, 16th, ... step of the record, with
+#' values that are approximate to `tolerance` nats; at 32 of the final draws they are compared with
+#' certified ones, and the evidence is corrected. `tolerance = 0` computes every value densely, at a
+#' cost that grows with N^3, and anneals from the prior.
 #'
 #' @inheritParams calibrate
-#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed; default 2/N),
-#'   `shared_lambda` (one noise precision for all basis vectors; `FALSE`), `alpha` and `t2` (the two shapes of their
-#'   beta priors, `c(1, 0.1)` and `c(1, 1)`), `unit` (of the target, in whose square `(1 - t2) / t2` is the
-#'   discrepancy's variance; 1), `fictitious_seed` (of the white noise, which is part of the data; 1),
-#'   `probability` of the highest-density intervals (0.95), `tolerance` (0.01, in nats; 0 for dense values), and `ais`,
-#'   options of [ais()], with its defaults (not those of [calibrate()]).
-#' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of the parameters),
-#'   `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of equations 5 and 6 and the total),
-#'   `hyperparameters` (draws of `alpha`, the fictitious condition last, `t2`, `lambda` and their weights), `lambda`
-#'   (draws of the precisions of equation 5), `index` (ranked: `boundary`, `difference` (posterior median of its `R2`
-#'   less that of the fictitious condition), `mean`, `lower95` and `upper95` (the highest-density interval, so called
-#'   whatever `probability` is), `significant`, `rank`), `share` (draws of `R2`), `trust`, and `posterior`
-#'   and `outside`, all that the sampler said of (5) and (6); `outside$approximation` tells the largest error among the
-#'   certified draws, the correction of the log evidence, and how many values were computed: in the stages before the
-#'   last, and in the last by skeletons and directly. [tidy()][posterior] gives the table of the parameters.
+#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed;
+#'   default 2/N), `shared_lambda` (one noise precision for all basis vectors; `FALSE`), `alpha` and
+#'   `t2` (the two shapes of their beta priors, `c(1, 0.1)` and `c(1, 1)`), `unit` (of the target,
+#'   in whose square `(1 - t2) / t2` is the discrepancy's variance; 1), `fictitious_seed` (of the
+#'   white noise, which is part of the data; 1), `probability` of the highest-density intervals
+#'   (0.95), `tolerance` (0.01, in nats; 0 for dense values), and `ais`, options of [ais()], with
+#'   its defaults (not those of [calibrate()]).
+#' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of
+#'   the parameters), `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of
+#'   equations 5 and 6 and the total), `hyperparameters` (draws of `alpha`, the fictitious condition
+#'   last, `t2`, `lambda` and their weights), `lambda` (draws of the precisions of equation 5),
+#'   `index` (ranked: `boundary`, `difference` (posterior median of its `R2` less that of the
+#'   fictitious condition), `mean`, `lower95` and `upper95` (the highest-density interval, so called
+#'   whatever `probability` is), `significant`, `rank`), `share` (draws of `R2`), `trust`, and
+#'   `posterior` and `outside`, all that the sampler said of (5) and (6); `outside$approximation`
+#'   tells the largest error among the certified draws, the correction of the log evidence, and how
+#'   many values were computed: in the stages before the last, and in the last by skeletons and
+#'   directly. [tidy()][posterior] gives the table of the parameters.
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)
@@ -54,8 +61,8 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #' runs <- simulate_design(linear, house, runs = 12, seed = 1)
 #' calibrate_paper(train_emulator(runs, house), house, seed = 1,
 #'                 control = list(ais = list(pilot_chains = 48, groups = 4)))
-#' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models with
-#'   high-dimensional outputs and boundary conditions.
+#' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models
+#'   with high-dimensional outputs and boundary conditions.
 #' @export
 calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
   rows <- emulated_rows(emulator, measurements)
@@ -75,20 +82,24 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
   hyperparameters <- c(outside$hyperparameters, list(weights = outside$weights))
   colnames(hyperparameters$alpha) <- c(conditions, "(fictitious)")
   colnames(result$index$share) <- c(conditions, "(fictitious)")
-  total <- list(log_evidence = evidence$log_evidence[3], standard_error = evidence$standard_error[3],
+  total <- list(log_evidence = evidence$log_evidence[3],
+                standard_error = evidence$standard_error[3],
                 interval = c(evidence$lower95[3], evidence$upper95[3]))
-  set <- list(emulator = emulator, measurements = measurements, control = control, seed = seed, rows = rows,
-              priors = priors)
-  new_fit("amiss_paper_calibration", set, inside, total, lambda = inside$lambda, hyperparameters = hyperparameters,
-          evidence = evidence, log_jacobian = result$log_jacobian, trust = paper_trust(outside, inside),
-          index = index_table(result$index, conditions), share = result$index$share, outside = outside)
+  set <- list(emulator = emulator, measurements = measurements, control = control, seed = seed,
+              rows = rows, priors = priors)
+  new_fit("amiss_paper_calibration", set, inside, total, lambda = inside$lambda,
+          hyperparameters = hyperparameters, evidence = evidence,
+          log_jacobian = result$log_jacobian, trust = paper_trust(outside, inside),
+          index = index_table(result$index, conditions), share = result$index$share,
+          outside = outside)
 }
 
 # What a person should know before using it.
 paper_trust <- function(outside, inside) {
   why <- c(if (!outside$trusted) paste("discrepancy:", outside$verdict),
            if (!inside$trusted) paste("parameters:", inside$verdict))
-  list(trusted = is.null(why), verdict = if (is.null(why)) inside$verdict else paste(why, collapse = "; "))
+  list(trusted = is.null(why),
+       verdict = if (is.null(why)) inside$verdict else paste(why, collapse = "; "))
 }
 
 fill_paper_control <- function(control, n, what = "control", call = rlang::caller_env()) {
@@ -96,19 +107,20 @@ fill_paper_control <- function(control, n, what = "control", call = rlang::calle
   named <- function(option) paste0(what, "$", option)
   control$ais <- fill_ais_control(control$ais, named("ais"), call = call)
   if (is.null(control$confidence)) control["confidence"] <- 2 / n
-  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1), named("confidence"),
+  check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1),
+              named("confidence"),
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
   check_input(checkmate::check_flag(control$shared_lambda), named("shared_lambda"), call = call)
   for (prior in c("alpha", "t2")) {
-    check_input(checkmate::check_numeric(control[[prior]], lower = 1e-6, finite = TRUE, len = 2, any.missing = FALSE),
-                named(prior),
+    check_input(checkmate::check_numeric(control[[prior]], lower = 1e-6, finite = TRUE, len = 2,
+                                         any.missing = FALSE), named(prior),
                 "Give the two shapes of a beta distribution.", call = call)
   }
-  check_input(checkmate::check_number(control$unit, lower = .Machine$double.xmin, finite = TRUE), named("unit"),
-              call = call)
+  check_input(checkmate::check_number(control$unit, lower = .Machine$double.xmin, finite = TRUE),
+              named("unit"), call = call)
   check_seed(control$fictitious_seed, named("fictitious_seed"), call)
-  check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999), named("probability"),
-              call = call)
+  check_input(checkmate::check_number(control$probability, lower = 0.01, upper = 0.9999),
+              named("probability"), call = call)
   check_input(checkmate::check_number(control$tolerance, lower = 0, upper = 1), named("tolerance"),
               "In nats; 0 for dense values.", call = call)
   control
@@ -127,14 +139,16 @@ paper_evidence <- function(inside, outside) {
   interval <- rbind(inside$interval, outside$interval)
   lower <- c(interval[, 1], sum(value) - sqrt(sum((value - interval[, 1])^2)))
   upper <- c(interval[, 2], sum(value) + sqrt(sum((interval[, 2] - value)^2)))
-  data.frame(part = c("parameters (5)", "discrepancy (6)", "total"), log_evidence = c(value, sum(value)),
-             standard_error = c(error, sqrt(sum(error^2))), lower95 = lower, upper95 = upper,
+  data.frame(part = c("parameters (5)", "discrepancy (6)", "total"),
+             log_evidence = c(value, sum(value)), standard_error = c(error, sqrt(sum(error^2))),
+             lower95 = lower, upper95 = upper,
              trusted = c(inside$trusted, outside$trusted, inside$trusted && outside$trusted))
 }
 
 index_table <- function(index, conditions) {
-  table <- data.frame(boundary = conditions, difference = index$median, mean = index$mean, lower95 = index$lower,
-                      upper95 = index$upper, significant = as.logical(index$significant), rank = as.integer(index$rank))
+  table <- data.frame(boundary = conditions, difference = index$median, mean = index$mean,
+                      lower95 = index$lower, upper95 = index$upper,
+                      significant = as.logical(index$significant), rank = as.integer(index$rank))
   table <- table[order(table$rank), ]
   rownames(table) <- NULL
   table
@@ -143,15 +157,17 @@ index_table <- function(index, conditions) {
 #' @export
 print.amiss_paper_calibration <- function(x, ...) on_stdout(x, {
   ten <- log(10)
-  cli::cli_text("{.strong Calibration as in the paper} on {length(x$rows)} rows of {.val {x$measurements$name}}")
-  cli::cli_text(paste("log10 evidence {round(x$log_evidence / ten, 2)} [{round(x$interval[1] / ten, 2)},",
-                      "{round(x$interval[2] / ten, 2)}] = {round(x$evidence$log_evidence[1] / ten, 2)} (5) +",
+  cli::cli_text(paste("{.strong Calibration as in the paper} on {length(x$rows)} rows of",
+                      "{.val {x$measurements$name}}"))
+  cli::cli_text(paste("log10 evidence {round(x$log_evidence / ten, 2)}",
+                      "[{round(x$interval[1] / ten, 2)}, {round(x$interval[2] / ten, 2)}] =",
+                      "{round(x$evidence$log_evidence[1] / ten, 2)} (5) +",
                       "{round(x$evidence$log_evidence[2] / ten, 2)} (6), {x$trust$verdict}"))
   say_parameters(x, 3)
   cli::cli_text("variance index of the boundary conditions over that of white noise")
   say_table(utils::head(x$index, 4))
-  cli::cli_bullets(
-    c(">" = "next: {.fun calibrate} and {.fun attribute_discrepancy}, which know the history of the conditions"))
+  cli::cli_bullets(c(">" = paste("next: {.fun calibrate} and {.fun attribute_discrepancy}, which",
+                                 "know the history of the conditions")))
 })
 
 #' @export

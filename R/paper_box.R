@@ -1,20 +1,22 @@
 #' The test box of the method's paper, as its models M1 to M6
 #'
-#' A cube of 0.96 m inside with walls of 12 cm all round, a window of 0.60 x 0.60 m in the front and a heater; the box
-#' stands free, so that outside air is all around it. M1 has walls of one layer, the others of 3 + 6 + 3 cm. M4 is M2
-#' with a free transmission of the window; M5 is M3 with other limits of its cracks; M6 is M5 with a wider prior of the
-#' outer layers' capacity. M3, M5 and M6 leak through two equal openings, low in the front and high in the back, so that
-#' wind and buoyancy drive the exchange. Driver columns: `Te` (degC), `Gv` (W/m2, front), `Ws` (m/s), `Wd` (degrees) and
-#' `RHP` (heater power, W); the first and last in every model, wind only in those that leak.
+#' A cube of 0.96 m inside with walls of 12 cm all round, a window of 0.60 x 0.60 m in the front and
+#' a heater; the box stands free, so that outside air is all around it. M1 has walls of one layer,
+#' the others of 3 + 6 + 3 cm. M4 is M2 with a free transmission of the window; M5 is M3 with other
+#' limits of its cracks; M6 is M5 with a wider prior of the outer layers' capacity. M3, M5 and M6
+#' leak through two equal openings, low in the front and high in the back, so that wind and buoyancy
+#' drive the exchange. Driver columns: `Te` (degC), `Gv` (W/m2, front), `Ws` (m/s), `Wd` (degrees)
+#' and `RHP` (heater power, W); the first and last in every model, wind only in those that leak.
 #'
-#' Where the paper gives no value: film coefficients, solar absorptance and the window's thermal transmittance
-#' (1.5 W/m2K) are this package's; together they give the measured heat loss coefficient of about 4 W/K.
+#' Where the paper gives no value: film coefficients, solar absorptance and the window's thermal
+#' transmittance (1.5 W/m2K) are this package's; together they give the measured heat loss
+#' coefficient of about 4 W/K.
 #'
 #' @param model `"M1"` to `"M6"`.
 #' @param azimuth Direction that the front faces, degrees from north, clockwise.
 #' @return A [zone()] with the free parameters and uniform priors of the paper.
-#' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models with
-#'   high-dimensional outputs and boundary conditions.
+#' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models
+#'   with high-dimensional outputs and boundary conditions.
 #' @examples
 #' paper_box("M3")
 #' @export
@@ -33,13 +35,13 @@ paper_box <- function(model = "M3", azimuth = 180) {
     side("back"), side("left"), side("right"), side("roof"), side("floor"),
     zone_window("window", window_area, outside = "Te", u_value = 1.5, sun = "Gv",
                 solar_factor = transmission * (0.52^2 / window_area)),
-    zone_heater("heater", power = "RHP", radiant_fraction = free("heater_radiant", uniform(0.53, 0.98))),
-    volume = inside^3)
+    zone_heater("heater", power = "RHP",
+                radiant_fraction = free("heater_radiant", uniform(0.53, 0.98))), volume = inside^3)
   area <- box_crack_area(model)
   if (is.null(area)) return(box)
   leak <- function(name, height, azimuth) {
-    zone_opening(name, area * 1e-6, outside = "Te", height = height, azimuth = azimuth, wind_speed = "Ws",
-                 wind_direction = "Wd")
+    zone_opening(name, area * 1e-6, outside = "Te", height = height, azimuth = azimuth,
+                 wind_speed = "Ws", wind_direction = "Wd")
   }
   box <- add_component(box, leak("crack_low", 0.2, azimuth))
   add_component(box, leak("crack_high", 0.8, azimuth + 180))
@@ -51,7 +53,8 @@ box_layers <- function(model) {
                            free("wall_c", uniform(1680, 3120), "kJ/m3K") * 1e3)))
   }
   outer_c <- if (model == "M6") uniform(1440, 3360) else uniform(2240, 4160)
-  outer <- zone_layer(0.03, free("outer_k", uniform(0.7, 1.3), "W/mK"), free("outer_c", outer_c, "kJ/m3K") * 1e3)
+  outer <- zone_layer(0.03, free("outer_k", uniform(0.7, 1.3), "W/mK"),
+                      free("outer_c", outer_c, "kJ/m3K") * 1e3)
   insulation <- zone_layer(0.06, free("insulation_k", uniform(0.035, 0.065), "W/mK"),
                            free("insulation_c", uniform(112, 208), "kJ/m3K") * 1e3)
   list(outer, insulation, outer)

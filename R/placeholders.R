@@ -1,24 +1,29 @@
-# What stands in double braces in templates, arguments and inputs: a parameter, or arithmetic of parameters, and how its
-# number is written: {{k}}, {{k:%.4f}}, {{2 * k + C / 1000:%10.3e}}, {{k:12}} (in at most 12 characters).
+# What stands in double braces in templates, arguments and inputs: a parameter, or arithmetic of
+# parameters, and how its number is written: {{k}}, {{k:%.4f}}, {{2 * k + C / 1000:%10.3e}},
+# {{k:12}} (in at most 12 characters).
 
 placeholder <- "\\{\\{\\s*([^{}]*?)\\s*\\}\\}"
 
 # What may be called, with the least and the largest number of arguments. Nothing else is evaluated.
-arithmetic <- list(
-  "+" = c(1, 2), "-" = c(1, 2), "*" = c(2, 2), "/" = c(2, 2), "^" = c(2, 2), "(" = c(1, 1), sqrt = c(1, 1),
-  exp = c(1, 1), log = c(1, 1), log10 = c(1, 1), abs = c(1, 1), round = c(1, 2), min = c(1, Inf), max = c(1, Inf))
+arithmetic <- list("+" = c(1, 2), "-" = c(1, 2), "*" = c(2, 2), "/" = c(2, 2), "^" = c(2, 2),
+                   "(" = c(1, 1), sqrt = c(1, 1),
+                   exp = c(1, 1), log = c(1, 1), log10 = c(1, 1), abs = c(1, 1), round = c(1, 2),
+                   min = c(1, Inf), max = c(1, Inf))
 
-# The placeholders of a text, each once, as they stand there. Byte by byte: templates may be in any encoding.
+# The placeholders of a text, each once, as they stand there. Byte by byte: templates may be in any
+# encoding.
 placeholder_texts <- function(text) {
   if (is.raw(text)) return(character())
   text <- text[grepl("{{", text, fixed = TRUE, useBytes = TRUE)]
-  found <- as.character(unlist(regmatches(text, gregexpr(placeholder, text, perl = TRUE, useBytes = TRUE))))
+  found <- as.character(
+    unlist(regmatches(text, gregexpr(placeholder, text, perl = TRUE, useBytes = TRUE))))
   Encoding(found) <- "UTF-8"
   unique(found)
 }
 
-# list(text, call, format): the placeholder as it stands, a name or a call, and how its number is written: NULL, a
-# format of sprintf() or a number of characters. An error says what is wrong with it.
+# list(text, call, format): the placeholder as it stands, a name or a call, and how its number is
+# written: NULL, a format of sprintf() or a number of characters. An error says what is wrong with
+# it.
 read_placeholder <- function(text, known) {
   inside <- sub(placeholder, "\\1", text, perl = TRUE)
   if (inside %in% known) return(list(text = text, call = as.name(inside)))
@@ -46,13 +51,15 @@ check_arithmetic <- function(call, known) {
   name <- if (is.call(call) && is.name(call[[1]])) as.character(call[[1]]) else ""
   count <- arithmetic[[name, exact = TRUE]]
   if (is.null(count)) {
-    stop("which is no arithmetic of parameters: ", one_line(deparse1(call)), " is not evaluated; known are + - * / ^ ",
-         "( ) sqrt exp log log10 abs round min max")
+    stop("which is no arithmetic of parameters: ", one_line(deparse1(call)),
+         " is not evaluated; known are + - * / ^ ", "( ) sqrt exp log log10 abs round min max")
   }
   arguments <- as.list(call)[-1]
   missed <- any(vapply(arguments, rlang::is_missing, NA))
-  if (missed || length(arguments) < count[1] || length(arguments) > count[2] || !is.null(names(arguments))) {
-    stop("which is no arithmetic of parameters: ", one_line(deparse1(call)), " has not the arguments of ", name)
+  if (missed || length(arguments) < count[1] || length(arguments) > count[2] ||
+      !is.null(names(arguments))) {
+    stop("which is no arithmetic of parameters: ", one_line(deparse1(call)),
+         " has not the arguments of ", name)
   }
   for (argument in arguments) check_arithmetic(argument, known)
 }
@@ -71,27 +78,31 @@ read_number_format <- function(text) {
   } else if (grepl("^%[-+ 0#]*[0-9]{0,2}([.][0-9]{1,2})?[eEfgGdi]$", text)) {
     return(text)
   }
-  stop("whose format ", text, " is not known: write one of sprintf() for a number, such as %.4f, %10.3e or %d, or the ",
+  stop("whose format ", text,
+       " is not known: write one of sprintf() for a number, such as %.4f, %10.3e or %d, or the ",
        "most characters that it may have, such as 12")
 }
 
 # ---- numbers as text
 
 # As short as carries 15 significant digits; exponents without zeros in front.
-shortest_number <- function(x, digits = 15) sub("e([+-])0+", "e\\1", sub("e[+]0*", "e", sprintf("%.*g", digits, x)))
+shortest_number <- function(x, digits = 15)
+  sub("e([+-])0+", "e\\1", sub("e[+]0*", "e", sprintf("%.*g", digits, x)))
 
 # A number in a format, or in at most `width` characters. An error says why that cannot be.
 number_text <- function(x, format = NULL, width = NULL) {
   if (is.numeric(format)) return(fitted_number(x, format))
   if (is.null(format)) return(if (is.null(width)) shortest_number(x) else fitted_number(x, width))
   if (grepl("[di]$", format)) {
-    if (x != round(x) || abs(x) > 2^31 - 1) stop("it is no whole number, as ", format, " needs one; use round()")
+    if (x != round(x) || abs(x) > 2^31 - 1)
+      stop("it is no whole number, as ", format, " needs one; use round()")
     text <- sprintf(format, as.integer(x))
   } else {
     text <- sprintf(format, x)
   }
   most <- min(width, number_width(format))
-  if (nchar(text) > most) stop("written by ", format, " it is ", text, ", longer than ", most, " characters")
+  if (nchar(text) > most)
+    stop("written by ", format, " it is ", text, ", longer than ", most, " characters")
   back <- suppressWarnings(as.numeric(text))
   if (is.na(back) || abs(back - x) > format_error(x, format)) {
     stop("written by ", format, " it is ", text, ", which does not read back")
@@ -120,7 +131,8 @@ number_width <- function(format) {
 format_error <- function(x, format) {
   kind <- sub("^.*(.)$", "\\1", format)
   if (kind %in% c("d", "i")) return(0)
-  digits <- if (grepl(".", format, fixed = TRUE)) as.integer(sub("^.*[.]([0-9]+).$", "\\1", format)) else 6L
+  digits <- if (grepl(".", format, fixed = TRUE)) as.integer(sub("^.*[.]([0-9]+).$", "\\1", format))
+            else 6L
   if (kind == "f") return(0.5 * 10^-digits + 1e-15 * abs(x))
   if (kind %in% c("g", "G")) digits <- max(digits, 1) - 1
   0.5 * 10^(floor(log10(max(abs(x), .Machine$double.xmin))) - digits + 1e-6) + 1e-15 * abs(x)
@@ -130,7 +142,8 @@ format_error <- function(x, format) {
 
 # The placeholders of several texts, read once for many runs: list(text, slots) each.
 compile_texts <- function(texts, known) {
-  lapply(texts, function(text) list(text = text, slots = lapply(placeholder_texts(text), read_placeholder, known)))
+  lapply(texts, function(text) list(
+    text = text, slots = lapply(placeholder_texts(text), read_placeholder, known)))
 }
 
 # The text with its numbers, byte by byte. What cannot be written is refused before a run begins.
@@ -154,29 +167,32 @@ slot_text <- function(slot, values, width, place, call) {
   if (!is.null(text)) return(text)
   abort_input(c("{.val {slot$text}} in {place} cannot be written at {point_words(values)}.",
                 x = "Its value is {signif(value, 8)}; {why}.",
-                i = paste("Widen its format, as in {.val {{{{k:%12.5e}}}}}, or narrow the priors of its parameters.")),
-              call = call)
+                i = paste("Widen its format, as in {.val {{{{k:%12.5e}}}}}, or narrow the priors",
+                          "of its parameters.")), call = call)
 }
 
-# Each placeholder of `places` is arithmetic of parameters that can be written, and each parameter stands in one.
+# Each placeholder of `places` is arithmetic of parameters that can be written, and each parameter
+# stands in one.
 check_placeholders <- function(places, parameters, width = NULL, call = rlang::caller_env()) {
   known <- names(parameters)
   used <- character()
   for (place in names(places)) for (text in placeholder_texts(places[[place]])) {
     slot <- tryCatch(read_placeholder(text, known), error = function(e) {
       inside <- sub(placeholder, "\\1", text, perl = TRUE)
-      abort_input(c("Template {.val {place}} holds the placeholder {.val {inside}}, {conditionMessage(e)}.",
-                    i = "Parameters: {.val {known}}; declare it with {.fun free} or correct the template."),
-                  call = call)
+      abort_input(
+        c("Template {.val {place}} holds the placeholder {.val {inside}}, {conditionMessage(e)}.",
+          i = "Parameters: {.val {known}}; declare it with {.fun free} or correct the template."),
+        call = call)
     })
     used <- c(used, all.vars(slot$call))
     check_written(slot, parameters, width, paste("template", place), call)
   }
   idle <- setdiff(known, used)
   if (!length(idle)) return(invisible())
-  abort_input(c("Parameter {.val {idle[1]}} stands in no template and in no argument of the command.",
-                i = paste("Write {.code {paste0('{{', idle[1], '}}')}} where its value belongs. Templates:",
-                          "{.val {names(places)}}.")), call = call)
+  abort_input(
+    c("Parameter {.val {idle[1]}} stands in no template and in no argument of the command.",
+      i = paste("Write {.code {paste0('{{', idle[1], '}}')}} where its value belongs. Templates:",
+                "{.val {names(places)}}.")), call = call)
 }
 
 # Tried at the middle of the priors, and where it is a number at their ends.

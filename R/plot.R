@@ -1,26 +1,30 @@
-figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response", "gain", "mean_day",
-                  "priors",
+figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response",
+                  "gain", "mean_day", "priors",
                   "moved", "steps", "missing", "emulator", "sampler")
 
 # Of several records each has its own.
-record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_day", "missing", "emulator")
+record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_day", "missing",
+                         "emulator")
 
 #' Figures
 #'
-#' `plot()` draws a figure and returns it invisibly; `autoplot()` of ggplot2 returns it undrawn, to be changed or saved.
+#' `plot()` draws a figure and returns it invisibly; `autoplot()` of ggplot2 returns it undrawn, to
+#' be changed or saved.
 #'
 #' @param x,object [measurements()]; a calibration ([calibrate()], not [calibrate_paper()]); what
-#'   [attribute_discrepancy()], [discrepancy()], [sobol_indices()], [ais()], [compare_models()] or [upgrade_model()]
-#'   return. Of several records plot one of `records`.
-#' @param which Which figure of an upgrade: `"fit"` (measured and simulated), `"attribution"` (what the error answers
-#'   to), `"candidates"` (mechanisms tried), `"parameters"`, `"discrepancy"` (over time), `"response"` (error against
-#'   the leading boundary condition), `"gain"` (scores before and after), `"mean_day"`, `"priors"` (against posteriors),
-#'   `"moved"` (parameters that moved between the models, and what they trade off with), `"steps"` (what each mechanism
-#'   brought), `"missing"` (the response that the first model lacks, by boundary condition), `"emulator"` (its errors on
-#'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`, `"criteria"` (ranks by
-#'   each), `"attribution"`, `"fit"` (measured and simulated), `"discrepancy"` (over time), `"parameters"`,
-#'   `"heat_loss"` (of zones) or `"held_out"` (where rows validate). Of an upgrade of several records, figures that show
-#'   a series are of one record: `"fit of NAME"`, with `"fit"` for that of the first.
+#'   [attribute_discrepancy()], [discrepancy()], [sobol_indices()], [ais()], [compare_models()] or
+#'   [upgrade_model()] return. Of several records plot one of `records`.
+#' @param which Which figure of an upgrade: `"fit"` (measured and simulated), `"attribution"` (what
+#'   the error answers to), `"candidates"` (mechanisms tried), `"parameters"`, `"discrepancy"` (over
+#'   time), `"response"` (error against the leading boundary condition), `"gain"` (scores before and
+#'   after), `"mean_day"`, `"priors"` (against posteriors), `"moved"` (parameters that moved between
+#'   the models, and what they trade off with), `"steps"` (what each mechanism brought), `"missing"`
+#'   (the response that the first model lacks, by boundary condition), `"emulator"` (its errors on
+#'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`,
+#'   `"criteria"` (ranks by each), `"attribution"`, `"fit"` (measured and simulated),
+#'   `"discrepancy"` (over time), `"parameters"`, `"heat_loss"` (of zones) or `"held_out"` (where
+#'   rows validate). Of an upgrade of several records, figures that show a series are of one record:
+#'   `"fit of NAME"`, with `"fit"` for that of the first.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A ggplot.
 #' @examples
@@ -136,26 +140,28 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
     check_input(checkmate::check_choice(which, figures_of(upgrade)), "which", call = call)
     for (name in names) {
       one <- match(which, paste(record_figure_names, "of", name))
-      if (!is.na(one)) return(upgrade_figure(record_upgrade(upgrade, name), record_figure_names[one], call))
+      if (!is.na(one))
+        return(upgrade_figure(record_upgrade(upgrade, name), record_figure_names[one], call))
     }
   }
   check_input(checkmate::check_choice(which, figure_names), "which", call = call)
   stages <- upgrade_stages(upgrade)
   switch(which,
-    fit = figure_fit(upgrade),
-    attribution = figure_attribution(lapply(stages, `[[`, "attribution")),
-    candidates = figure_candidates(upgrade),
-    parameters = figure_parameters(lapply(stages, `[[`, "fit")),
-    discrepancy = figure_discrepancy(lapply(stages, function(s) discrepancy(s$fit)), leading_condition(upgrade)),
-    response = figure_response(upgrade),
-    gain = figure_gain(upgrade),
-    mean_day = figure_mean_day(upgrade),
-    priors = figure_priors(lapply(stages, `[[`, "fit")),
-    moved = figure_moved(upgrade),
-    steps = figure_steps(upgrade),
-    missing = figure_missing(discrepancy(stages[[1]]$fit), stages[[1]]$attribution),
-    emulator = figure_emulator(lapply(stages, `[[`, "fit")),
-    sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)))
+         fit = figure_fit(upgrade),
+         attribution = figure_attribution(lapply(stages, `[[`, "attribution")),
+         candidates = figure_candidates(upgrade),
+         parameters = figure_parameters(lapply(stages, `[[`, "fit")),
+         discrepancy = figure_discrepancy(lapply(stages, function(s) discrepancy(s$fit)),
+                                          leading_condition(upgrade)),
+         response = figure_response(upgrade),
+         gain = figure_gain(upgrade),
+         mean_day = figure_mean_day(upgrade),
+         priors = figure_priors(lapply(stages, `[[`, "fit")),
+         moved = figure_moved(upgrade),
+         steps = figure_steps(upgrade),
+         missing = figure_missing(discrepancy(stages[[1]]$fit), stages[[1]]$attribution),
+         emulator = figure_emulator(lapply(stages, `[[`, "fit")),
+         sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)))
 }
 
 # Names of the figures that an object has.
@@ -173,6 +179,6 @@ figure_files <- function(which) paste0(file_stem(which), ".png")
 
 # `ragg` finds fonts in the same way on every machine, and letters that a font lacks in another.
 save_figure <- function(figure, path, width = canvas_width, dpi = 120) {
-  ggplot2::ggsave(path, figure, ragg::agg_png, width = width, height = figure_height(figure, width), dpi = dpi,
-                  bg = "white")
+  ggplot2::ggsave(path, figure, ragg::agg_png, width = width, height = figure_height(figure, width),
+                  dpi = dpi, bg = "white")
 }

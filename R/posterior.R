@@ -35,17 +35,19 @@ parameter_table <- function(fit) {
 
 #' The posterior of the parameters
 #'
-#' What R's users expect of a fitted model, from the weighted draws of a calibration; of an upgrade it is that of its
-#' last model.
+#' What R's users expect of a fitted model, from the weighted draws of a calibration; of an upgrade
+#' it is that of its last model.
 #'
-#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]).
+#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade
+#'   ([upgrade_model()]).
 #' @param parm Names or numbers of parameters; all by default.
 #' @param level,conf.level Probability that the intervals hold; their ends cut off equal tails.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return `coef()`: the posterior medians. `confint()`: a matrix of the ends of credible intervals. `vcov()`: the
-#'   covariance of the posterior. `tidy()`: a data frame with one row for each parameter: `term`, `label`, `unit`,
-#'   `estimate` (the median), `std.error` (the posterior's standard deviation), `conf.low`, `conf.high`, and how many
-#'   `modes` the posterior has: over several, median and interval describe none.
+#' @return `coef()`: the posterior medians. `confint()`: a matrix of the ends of credible intervals.
+#'   `vcov()`: the covariance of the posterior. `tidy()`: a data frame with one row for each
+#'   parameter: `term`, `label`, `unit`, `estimate` (the median), `std.error` (the posterior's
+#'   standard deviation), `conf.low`, `conf.high`, and how many `modes` the posterior has: over
+#'   several, median and interval describe none.
 #' @seealso [as_draws][as.data.frame.amiss_fit] for the draws themselves.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
@@ -78,12 +80,15 @@ confint.amiss_fit <- function(object, parm = NULL, level = 0.95, ...) {
   check_level(level, "level")
   names <- picked_parameters(object, parm)
   tails <- c((1 - level) / 2, (1 + level) / 2)
-  ends <- vapply(names, function(n) weighted_quantile(object$values[, n], object$weights, tails), c(0, 0))
-  matrix(ends, ncol = 2, byrow = TRUE, dimnames = list(names, paste(format(100 * tails, trim = TRUE, digits = 3), "%")))
+  ends <- vapply(names, function(n) weighted_quantile(object$values[, n], object$weights, tails),
+                 c(0, 0))
+  matrix(ends, ncol = 2, byrow = TRUE,
+         dimnames = list(names, paste(format(100 * tails, trim = TRUE, digits = 3), "%")))
 }
 
 check_level <- function(level, name, call = rlang::caller_env()) {
-  check_input(checkmate::check_number(level, lower = 1e-6, upper = 1 - 1e-6), name, "It is a probability.", call = call)
+  check_input(checkmate::check_number(level, lower = 1e-6, upper = 1 - 1e-6), name,
+              "It is a probability.", call = call)
 }
 
 picked_parameters <- function(fit, parm, call = rlang::caller_env()) {
@@ -118,23 +123,25 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
              unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
              std.error = unname(sqrt(diag(stats::vcov(x)))),
              conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]),
-             modes = vapply(rownames(ends), function(name) length(parameter_modes(x, name)), 0L), row.names = NULL)
+             modes = vapply(rownames(ends), function(name) length(parameter_modes(x, name)), 0L),
+             row.names = NULL)
 }
 
 #' Posterior draws as other packages take them
 #'
-#' The draws of a calibration carry importance weights; here they are resampled to equal weights by a systematic rule
-#' and stand in an order that says nothing, as one chain: what `posterior` and `bayesplot` take. Draws of more weight
-#' than one of `draws` are repeated, so that the effective number of draws that `posterior` states is too large, and
-#' R-hat means nothing: whether the sampler can be trusted is `trust` of the fit.
+#' The draws of a calibration carry importance weights; here they are resampled to equal weights by
+#' a systematic rule and stand in an order that says nothing, as one chain: what `posterior` and
+#' `bayesplot` take. Draws of more weight than one of `draws` are repeated, so that the effective
+#' number of draws that `posterior` states is too large, and R-hat means nothing: whether the
+#' sampler can be trusted is `trust` of the fit.
 #'
-#' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]), of which it is the
-#'   last model.
+#' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]), of
+#'   which it is the last model.
 #' @param draws Number of draws; by default as many as the fit has.
 #' @param row.names,optional As [as.data.frame()] has them; `optional` is not used.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame or matrix with one row for each draw and one column for each parameter; of `as_draws()`,
-#'   `as_draws_df()` and `as_draws_matrix()` of `posterior` the class of that name.
+#' @return A data frame or matrix with one row for each draw and one column for each parameter; of
+#'   `as_draws()`, `as_draws_df()` and `as_draws_matrix()` of `posterior` the class of that name.
 #' @examplesIf requireNamespace("posterior", quietly = TRUE)
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
@@ -146,7 +153,8 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
 #'                  control = list(ais = list(pilot_chains = 48, groups = 4)), seed = 1)
 #' posterior::summarise_draws(posterior::as_draws_df(fit), "mean", "sd")
 #' @export
-as.data.frame.amiss_fit <- function(x, row.names = NULL, optional = FALSE, draws = nrow(x$values), ...) {
+as.data.frame.amiss_fit <- function(x, row.names = NULL, optional = FALSE,
+                                    draws = nrow(x$values), ...) {
   check_whole(x, "x")
   rlang::check_dots_empty()
   as.data.frame(equal_draws(x, draws), row.names = row.names)
@@ -195,12 +203,12 @@ parameter_rows <- function(fit) {
     limit <- prior_quantile(p$prior, u)
     if (is.finite(limit)) limit else prior_quantile(p$prior, fallback)
   }, 0)
-  cbind(table, label = distinct_labels(declared), prior_lower = side(0, 0.001), prior_upper = side(1, 0.999),
-        at_edge = unname(edge_of_prior(fit)[table$name]))
+  cbind(table, label = distinct_labels(declared), prior_lower = side(0, 0.001),
+        prior_upper = side(1, 0.999), at_edge = unname(edge_of_prior(fit)[table$name]))
 }
 
-# TRUE for each parameter whose 95 % interval comes within 1 % (in probability) of an end of its prior, with its median
-# in the outer tenth at that end.
+# TRUE for each parameter whose 95 % interval comes within 1 % (in probability) of an end of its
+# prior, with its median in the outer tenth at that end.
 edge_of_prior <- function(fit) {
   unit <- posterior_unit(fit)
   stats::setNames(vapply(seq_len(ncol(unit)), function(p) {
@@ -211,7 +219,8 @@ edge_of_prior <- function(fit) {
 
 posterior_centre <- function(fit) colSums(fit$weights * to_normal(posterior_unit(fit)))
 
-# The first parameters of a fit, and how many there are besides; and those whose posterior has several modes.
+# The first parameters of a fit, and how many there are besides; and those whose posterior has
+# several modes.
 say_parameters <- function(fit, most) {
   table <- parameter_table(fit)
   say_table(utils::head(table, most))
@@ -219,8 +228,9 @@ say_parameters <- function(fit, most) {
   say_bullets(mode_words(fit), "!")
 }
 
-# Modes of a parameter: parts of its draws that a gap keeps apart, list(lower95, upper95, share) each. A gap counts if
-# it is a quarter of the 95 % interval or more, with a twentieth of the posterior on either side.
+# Modes of a parameter: parts of its draws that a gap keeps apart, list(lower95, upper95, share)
+# each. A gap counts if it is a quarter of the 95 % interval or more, with a twentieth of the
+# posterior on either side.
 parameter_modes <- function(fit, name) {
   x <- fit$values[, name]
   keep <- fit$weights > 0
@@ -245,7 +255,8 @@ mode_words <- function(fit) {
     ends <- vapply(modes, function(mode) {
       sprintf("%s (%s)", interval_words(mode$lower95, mode$upper95), percent(mode$share))
     }, "")
-    sprintf("%s has %d modes: %s. Its median and interval describe none of them.", name, length(modes), listed(ends))
+    sprintf("%s has %d modes: %s. Its median and interval describe none of them.", name,
+            length(modes), listed(ends))
   }))
 }
 
@@ -254,6 +265,7 @@ posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, co
 # Share of the prior's 95 % interval that the posterior's takes.
 narrowing <- function(fit) {
   rows <- parameter_rows(fit)
-  width <- vapply(drawn_parameters(fit)[rows$name], function(p) diff(prior_quantile(p$prior, c(0.025, 0.975))), 0)
+  width <- vapply(drawn_parameters(fit)[rows$name],
+                  function(p) diff(prior_quantile(p$prior, c(0.025, 0.975))), 0)
   stats::setNames((rows$upper95 - rows$lower95) / width, rows$label)
 }

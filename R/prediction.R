@@ -1,34 +1,36 @@
 #' Predict with a calibrated simulator
 #'
-#' The simulator itself is run at draws of the posterior (no emulator error); errors as large as those that calibration
-#' left widen the band. Of an [ensemble()] made elsewhere, the emulator of its runs at the rows asked for predicts, and
-#' its own uncertainty widens the band too.
+#' The simulator itself is run at draws of the posterior (no emulator error); errors as large as
+#' those that calibration left widen the band. Of an [ensemble()] made elsewhere, the emulator of
+#' its runs at the rows asked for predicts, and its own uncertainty widens the band too.
 #'
-#' @param object A calibration ([calibrate()], [calibrate_paper()]), or an upgrade ([upgrade_model()]), of
-#'   which it is the last model.
-#' @param newdata A record of its own: [measurements()] with the same time step and boundary conditions; or a data frame
-#'   of equal steps, as long as those of the data that were given to [measurements()], with a column `time` (whatever it
-#'   was called there), all boundary conditions of the record and what else drives the simulator, one row for each
-#'   interval. Its target, if it has that column, is compared with
-#'   the prediction, and nothing is learned from it. A data frame has no warm-up: begin it before the rows that count.
-#'   It is checked as the record was: `missing` and `range` of [measurements()] hold, other codes for a missing value
-#'   are refused, and a warning names values far outside all others, readings that are stuck, and counters.
-#'   By default the record that was calibrated on.
+#' @param object A calibration ([calibrate()], [calibrate_paper()]), or an upgrade
+#'   ([upgrade_model()]), of which it is the last model.
+#' @param newdata A record of its own: [measurements()] with the same time step and boundary
+#'   conditions; or a data frame of equal steps, as long as those of the data that were given to
+#'   [measurements()], with a column `time` (whatever it was called there), all boundary conditions
+#'   of the record and what else drives the simulator, one row for each interval. Its target, if it
+#'   has that column, is compared with the prediction, and nothing is learned from it. A data frame
+#'   has no warm-up: begin it before the rows that count. It is checked as the record was: `missing`
+#'   and `range` of [measurements()] hold, other codes for a missing value are refused, and a
+#'   warning names values far outside all others, readings that are stuck, and counters. By default
+#'   the record that was calibrated on.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both; every row of a data frame.
 #' @param draws Number of posterior draws.
-#' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as it was seen in
-#'   calibration ([discrepancy()]). Where its reach is limited, the runs of the ensemble are made again at the rows
-#'   asked for.
-#' @param interval `"prediction"`, a band of new measurements, or `"confidence"`, one of the simulation (and the
-#'   discrepancy) alone.
+#' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as
+#'   it was seen in calibration ([discrepancy()]). Where its reach is limited, the runs of the
+#'   ensemble are made again at the rows asked for.
+#' @param interval `"prediction"`, a band of new measurements, or `"confidence"`, one of the
+#'   simulation (and the discrepancy) alone.
 #' @param level Probability that the band holds.
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the number is `level`),
-#'   and `crps`, the continuous ranked probability score of each row; of a data frame also `segment`, the number of the
-#'   unbroken part. Of several records `newdata` and what is returned are lists by record.
-#' @source Gneiting and Raftery (2007), Strictly proper scoring rules, prediction, and estimation, Journal of the
-#'   American Statistical Association 102, 359-378, for the CRPS.
+#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the
+#'   number is `level`), and `crps`, the continuous ranked probability score of each row; of a data
+#'   frame also `segment`, the number of the unbroken part. Of several records `newdata` and what is
+#'   returned are lists by record.
+#' @source Gneiting and Raftery (2007), Strictly proper scoring rules, prediction, and estimation,
+#'   Journal of the American Statistical Association 102, 359-378, for the CRPS.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -45,8 +47,9 @@
 #' warmer <- data.frame(time = 97:120, Te = 15 + 5 * sin(97:120 / 4), Gv = 0)
 #' head(predict(fit, warmer, interval = "confidence"))
 #' @export
-predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "validate"), draws = 40, discrepancy = FALSE,
-                              interval = c("prediction", "confidence"), level = 0.95, seed = object$seed,
+predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "validate"), draws = 40,
+                              discrepancy = FALSE, interval = c("prediction", "confidence"),
+                              level = 0.95, seed = object$seed,
                               threads = 1, ...) {
   rlang::check_dots_empty()
   check_object(object, "amiss_fit", "object")
@@ -73,16 +76,20 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
     return(predict_given(object, picked, rows, use, discrepancy, interval, level, seed, threads))
   }
   require_simulator(object)
-  runs <- simulate_measured(object$emulator$simulator, object$values[picked, , drop = FALSE], record, use, threads)
+  runs <- simulate_measured(object$emulator$simulator, object$values[picked, , drop = FALSE],
+                            record, use, threads)
   runs <- runs[, colSums(!is.finite(runs)) == 0, drop = FALSE]
-  if (!ncol(runs)) abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
+  if (!ncol(runs))
+    abort_numerical("The simulator failed at every one of the {draws} posterior draws.")
   if (!is.null(object$best) && !discrepancy) {
-    runs <- about_best(runs, simulate_measured(object$emulator$simulator, object$best$values, record, use, threads))
+    runs <- about_best(
+      runs, simulate_measured(object$emulator$simulator, object$best$values, record, use, threads))
   }
   sd <- error_sd(object)
   if (discrepancy) {
     carried <- carried_response(object, use, threads, record)
-    runs <- runs + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(runs)), drop = FALSE]
+    runs <- runs + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(runs)),
+                                    drop = FALSE]
     sd <- carried$sd
   }
   with_seed(seed, summarise_prediction(record, rows, runs, sd, interval, level))
@@ -90,8 +97,9 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
 
 require_simulator <- function(fit, call = rlang::caller_env()) {
   if (is.null(fit$emulator$simulator)) {
-    abort_input(c("The runs of this ensemble were made elsewhere, so that the simulator cannot be run again.",
-                  i = "Use {.fun predict} on the emulator for the calibration rows."), call = call)
+    abort_input(
+      c("The runs of this ensemble were made elsewhere, so that the simulator cannot be run again.",
+        i = "Use {.fun predict} on the emulator for the calibration rows."), call = call)
   }
 }
 
@@ -102,17 +110,20 @@ prediction_record <- function(m, newdata, call = rlang::caller_env()) {
   if (is.null(newdata)) return(m)
   if (is.data.frame(newdata)) return(new_record(m, newdata, call))
   check_object(newdata, "amiss_measurements", "newdata",
-              "Give a data frame or {.fun measurements}; rows of the record itself are chosen by {.arg use}.",
-              call = call)
-  if (!isTRUE(all.equal(newdata$step_h, m$step_h)) || !identical(newdata$conditions, m$conditions)) {
+               paste("Give a data frame or {.fun measurements}; rows of the record itself are",
+                     "chosen by {.arg use}."), call = call)
+  if (!isTRUE(all.equal(newdata$step_h, m$step_h)) ||
+      !identical(newdata$conditions, m$conditions)) {
     abort_input(c("{.arg newdata} must have the record's time step and boundary conditions.",
                   i = "The record has steps of {signif(m$step_h, 3)} h and {.val {m$conditions}}.",
-                  x = "It has steps of {signif(newdata$step_h, 3)} h and {.val {newdata$conditions}}."), call = call)
+                  x = paste("It has steps of {signif(newdata$step_h, 3)} h and",
+                            "{.val {newdata$conditions}}.")), call = call)
   }
   newdata
 }
 
-# All rows have the use "new". `y` marks the rows to simulate; `observed` is the target, NA where it is not known.
+# All rows have the use "new". `y` marks the rows to simulate; `observed` is the target, NA where it
+# is not known.
 new_record <- function(m, data, call = rlang::caller_env()) {
   terms <- list(name = m$conditions, circular = tabulate(m$condition, length(m$conditions)) == 2)
   data <- plain_table(as.list(data), nrow(data))
@@ -124,14 +135,16 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   hours <- time_hours(time)
   step <- m$raw$step_h
   if (length(hours) < 2 || any(abs(diff(hours) - step) > 0.01 * step)) {
-    abort_input(c("{.arg newdata} must have at least two rows, one for every {signif(step, 4)} h without a gap.",
+    abort_input(c(paste("{.arg newdata} must have at least two rows, one for every",
+                        "{signif(step, 4)} h without a gap."),
                   i = "Predict each part of a broken record on its own."), call = call)
   }
   numeric_columns <- setdiff(names(data)[vapply(data, is.numeric, NA)], c("time", m$target))
   data <- checked_values(m, data, compared, numeric_columns, terms$name[terms$circular], call)
   drivers <- as.matrix(data[numeric_columns])
   require_complete(drivers, terms$name, time, call = call)
-  observed <- if (m$target %in% names(data)) as.numeric(data[[m$target]]) else rep(NA_real_, nrow(data))
+  observed <- if (m$target %in% names(data)) as.numeric(data[[m$target]])
+              else rep(NA_real_, nrow(data))
   raw <- list(time = time, hours = hours, step_h = step, segment = rep(1L, nrow(data)),
               use = rep("new", nrow(data)), y = observed, drivers = drivers)
   columns <- boundary_columns(drivers, terms)
@@ -140,18 +153,20 @@ new_record <- function(m, data, call = rlang::caller_env()) {
     utils::modifyList(coarse, list(y = numeric(length(coarse$y)))))
 }
 
-# The table as the record's own was read: its codes for a missing value and the range of its sensor hold here as well,
-# other codes are refused, and values that seem to be no measurements are told of.
+# The table as the record's own was read: its codes for a missing value and the range of its sensor
+# hold here as well, other codes are refused, and values that seem to be no measurements are told
+# of.
 checked_values <- function(m, data, compared, numeric_columns, circular, call) {
   data <- with_marks(data, union(compared, numeric_columns), m$target, m$missing, m$range)
   if (!identical(m$missing, NA)) refuse_codes(data, compared, circular, call)
-  found <- table_findings(data[union(compared, numeric_columns)], m$target, circular, m$noise_sd * sqrt(m$per_step),
-                          m$per_step, m$findings)
+  found <- table_findings(data[union(compared, numeric_columns)], m$target, circular,
+                          m$noise_sd * sqrt(m$per_step), m$per_step, m$findings)
   warn_findings(found[found$id != "missing_code", ], "newdata")
   data
 }
 
-# The lacking response at the rows of these uses (rows x kept draws), and what it leaves in calibration.
+# The lacking response at the rows of these uses (rows x kept draws), and what it leaves in
+# calibration.
 carried_response <- function(fit, use, threads, record = fit$measurements) {
   rows <- rows_used(record, use)
   responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
@@ -185,22 +200,26 @@ slopes_at <- function(fit, use, threads, record) {
   z <- fit$emulator$moves$z
   step <- rules$search_difference * difference_side(z, space)
   around <- rbind(z, matrix(z, length(z), length(z), byrow = TRUE) + diag(step, length(z)))
-  runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, space), parameters), use, threads, record)
+  runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, space), parameters), use, threads,
+                         record)
   if (!all(is.finite(runs))) {
     abort_numerical("The simulator failed beside its best run at these rows.")
   }
   sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, fit$emulator$moves$unit / step, "*")
 }
 
-# The vectors of an emulator's basis at other rows: the same combinations of its runs, without those that fail there.
+# The vectors of an emulator's basis at other rows: the same combinations of its runs, without those
+# that fail there.
 vectors_at <- function(fit, emulator, use, threads, record) {
   w <- emulator$processes$coefficients
   last <- ncol(w)
   runs <- if (is.null(fit$emulator$simulator)) runs_given(fit, use)
-          else runs_elsewhere(fit, unit_to_values(emulator$unit, emulator$parameters), use, threads, record)
+          else runs_elsewhere(fit, unit_to_values(emulator$unit, emulator$parameters), use, threads,
+                              record)
   made <- colSums(!is.finite(runs)) == 0
   if (sum(made) < last) {
-    abort_numerical("The simulator failed at {sum(!made)} of the ensemble's {length(made)} runs, made at these rows.")
+    abort_numerical(paste("The simulator failed at {sum(!made)} of the ensemble's {length(made)}",
+                          "runs, made at these rows."))
   }
   coordinates <- w[made, -last, drop = FALSE]
   shifted <- sweep(runs[, made, drop = FALSE], 2, w[made, last])
@@ -211,15 +230,16 @@ runs_elsewhere <- function(fit, values, use, threads, record) {
   suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
 }
 
-# What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error and discrepancy
-# as large as they were seen, the fitted parameters taken off the degrees of freedom.
+# What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error
+# and discrepancy as large as they were seen, the fitted parameters taken off the degrees of
+# freedom.
 error_sd <- function(fit) {
   r <- left_at_best(fit)
   sqrt(sum(r^2) / max(1, length(r) - length(fit$emulator$parameters)))
 }
 
-# Runs at draws of the posterior about the best run in place of their mean: where the discrepancy takes over what
-# parameters at the ends of their priors cannot do, draws lie off the best.
+# Runs at draws of the posterior about the best run in place of their mean: where the discrepancy
+# takes over what parameters at the ends of their priors cannot do, draws lie off the best.
 about_best <- function(runs, best) runs + (as.numeric(best) - rowMeans(runs))
 
 summarise_prediction <- function(m, rows, runs, sd, interval, level) {
@@ -228,14 +248,16 @@ summarise_prediction <- function(m, rows, runs, sd, interval, level) {
   samples <- runs[, member, drop = FALSE] + sd * stats::rnorm(length(rows) * n)
   y <- (m$observed %||% m$y)[rows]
   sorted <- t(apply(samples, 1, sort))
-  # CRPS of an ensemble: mean |x - y| - 1/2 mean |x - x'| (Gneiting and Raftery 2007), by the sorted members.
+  # CRPS of an ensemble: mean |x - y| - 1/2 mean |x - x'| (Gneiting and Raftery 2007), by the sorted
+  # members.
   spread <- as.numeric(sorted %*% (2 * seq_len(n) - n - 1)) / n^2
   tails <- c((1 - level) / 2, (1 + level) / 2)
   band <- apply(if (interval == "prediction") sorted else runs, 1, stats::quantile, tails)
   ends <- data.frame(band[1, ], band[2, ])
   names(ends) <- paste0(c("lower", "upper"), format(100 * level, digits = 4))
   data.frame(time = m$time[rows], use = m$use[rows], observed = y, mean = rowMeans(runs), ends,
-             crps = rowMeans(abs(samples - y)) - spread, segment = m$segment[rows], row.names = NULL)
+             crps = rowMeans(abs(samples - y)) - spread, segment = m$segment[rows],
+             row.names = NULL)
 }
 
 prediction_scores <- function(prediction) {
@@ -250,19 +272,20 @@ prediction_scores <- function(prediction) {
 
 #' Simulate the record that a calibration expects
 #'
-#' Draws of the calibration record from the posterior: for checks of the model, as `bayesplot` makes them. Each is a run
-#' of the simulator at a posterior draw and a new error. Of [calibrate()], the discrepancy of that draw is added (its
-#' mean given the draw), and the error has the draw's variance and autocorrelation; of [calibrate_paper()], errors are
-#' independent and as large as those that calibration left.
+#' Draws of the calibration record from the posterior: for checks of the model, as `bayesplot` makes
+#' them. Each is a run of the simulator at a posterior draw and a new error. Of [calibrate()], the
+#' discrepancy of that draw is added (its mean given the draw), and the error has the draw's
+#' variance and autocorrelation; of [calibrate_paper()], errors are independent and as large as
+#' those that calibration left.
 #'
-#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its simulator, or an
-#'   upgrade ([upgrade_model()]), of which it is the last model.
-#' @param nsim Number of records. The draws of a calibration's discrepancy (`error_draws` of [calibrate()]) serve again
-#'   where there are fewer.
+#' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its
+#'   simulator, or an upgrade ([upgrade_model()]), of which it is the last model.
+#' @param nsim Number of records. The draws of a calibration's discrepancy (`error_draws` of
+#'   [calibrate()]) serve again where there are fewer.
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ..., whose attribute
-#'   `seed` makes them again.
+#' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ...,
+#'   whose attribute `seed` makes them again.
 #' @source `vignette("algorithm", "amiss")`, *One covariance*.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -289,8 +312,8 @@ simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) 
   records <- with_seed(seed, {
     member <- rep_len(sample.int(length(pool)), nsim)
     draws <- pool[member]
-    runs <- simulate_measured(object$emulator$simulator, object$values[draws, , drop = FALSE], object$measurements,
-                              "calibrate", threads)
+    runs <- simulate_measured(object$emulator$simulator, object$values[draws, , drop = FALSE],
+                              object$measurements, "calibrate", threads)
     if (history) runs + seen_response(object)[, member, drop = FALSE] + drawn_errors(object, draws)
     else runs + error_sd(object) * stats::rnorm(length(runs))
   })
@@ -298,7 +321,8 @@ simulate.amiss_fit <- function(object, nsim = 1, seed = NULL, threads = 1, ...) 
   structure(as.data.frame(records), seed = seed)
 }
 
-# Errors at the calibration rows (rows x draws) with the white and autocorrelated parts of these draws.
+# Errors at the calibration rows (rows x draws) with the white and autocorrelated parts of these
+# draws.
 drawn_errors <- function(fit, draws) {
   m <- fit$measurements
   n <- length(fit$rows)
@@ -309,7 +333,8 @@ drawn_errors <- function(fit, draws) {
     sd <- sqrt(fit$posterior$variance[draws[i]])
     error <- sd * stats::rnorm(n)
     for (k in which(ratios[i, ] > 0)) {
-      error <- error + sd * sqrt(ratios[i, k]) * ornstein_uhlenbeck(exp(-steps / fit$control$error_times[k]))
+      error <- error +
+        sd * sqrt(ratios[i, k]) * ornstein_uhlenbeck(exp(-steps / fit$control$error_times[k]))
     }
     error
   }, numeric(n))
@@ -317,25 +342,28 @@ drawn_errors <- function(fit, draws) {
 
 # Stationary, of variance one; `kept` is what each value keeps of the one before it.
 ornstein_uhlenbeck <- function(kept) {
-  Reduce(function(x, i) kept[i] * x + sqrt(1 - kept[i]^2) * stats::rnorm(1), seq_along(kept), 0, accumulate = TRUE)[-1]
+  Reduce(function(x, i) kept[i] * x + sqrt(1 - kept[i]^2) * stats::rnorm(1), seq_along(kept), 0,
+         accumulate = TRUE)[-1]
 }
 
-# As predict() by the simulator, but by emulators at the draws `picked`; their standard deviations join that of the
-# error.
+# As predict() by the simulator, but by emulators at the draws `picked`; their standard deviations
+# join that of the error.
 predict_given <- function(fit, picked, rows, use, discrepancy, interval, level, seed, threads,
                           call = rlang::caller_env()) {
   m <- fit$measurements
   values <- fit$values[rep_len(picked, 200), , drop = FALSE]
   mean <- sd <- matrix(0, length(rows), nrow(values))
   for (one in intersect(use, m$use[rows])) {
-    emulated <- stats::predict(if (one == "calibrate") fit$emulator else held_out_emulator(fit, call), values)
+    emulated <- stats::predict(if (one == "calibrate") fit$emulator
+                               else held_out_emulator(fit, call), values)
     mean[m$use[rows] == one, ] <- emulated$mean
     sd[m$use[rows] == one, ] <- emulated$sd
   }
   left <- error_sd(fit)
   if (discrepancy) {
     carried <- carried_response(fit, use, threads)
-    mean <- mean + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(mean)), drop = FALSE]
+    mean <- mean + carried$response[, rep_len(seq_len(ncol(carried$response)), ncol(mean)),
+                                    drop = FALSE]
     left <- carried$sd
   }
   with_seed(seed, summarise_prediction(m, rows, mean, sqrt(left^2 + sd^2), interval, level))

@@ -20,6 +20,7 @@ say_table <- function(table) {
 
 # The parts of a summary, a paragraph each, and where to go on.
 say_parts <- function(parts) {
-  for (part in names(parts)) cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
+  for (part in names(parts))
+    cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
   cli::cli_bullets(c(">" = "next: {.fun report}"))
 }

@@ -1,11 +1,12 @@
 #' Priors of model parameters
 #'
-#' A prior is a distribution on one parameter, in that parameter's unit. The design, the emulator and the
-#' sampler work on the unit cube; a prior's quantile function maps the cube onto the parameters, so that the
-#' prior is uniform there. `normal()` and `lognormal()` may be truncated.
+#' A prior is a distribution on one parameter, in that parameter's unit. The design, the emulator
+#' and the sampler work on the unit cube; a prior's quantile function maps the cube onto the
+#' parameters, so that the prior is uniform there. `normal()` and `lognormal()` may be truncated.
 #'
-#' @param lower,upper Of `uniform()`, `triangular()` and `beta_prior()` the ends of the distribution (the shape of
-#'   `beta_prior()` is stretched to them); of `normal()` and `lognormal()` where it is cut off and scaled up again.
+#' @param lower,upper Of `uniform()`, `triangular()` and `beta_prior()` the ends of the distribution
+#'   (the shape of `beta_prior()` is stretched to them); of `normal()` and `lognormal()` where it is
+#'   cut off and scaled up again.
 #' @param mean,sd Mean and standard deviation (before truncation).
 #' @param meanlog,sdlog Mean and standard deviation of the logarithm.
 #' @param shape1,shape2 Shapes of the beta distribution on `[lower, upper]`.
@@ -20,22 +21,24 @@ NULL
 new_prior <- function(family, parameters, lower, upper, call) {
   if (!is.finite(lower) && family %in% c("uniform", "triangular", "beta") ||
       !is.finite(upper) && family %in% c("uniform", "triangular", "beta")) {
-    abort_input("A {family} prior needs finite limits; got lower = {.val {lower}}, upper = {.val {upper}}.",
-                call = call)
+    abort_input(paste("A {family} prior needs finite limits; got lower = {.val {lower}}, upper =",
+                      "{.val {upper}}."), call = call)
   }
   if (is.na(lower) || is.na(upper) || lower >= upper) {
-    abort_input(c("A {family} prior needs lower < upper; got lower = {.val {lower}}, upper = {.val {upper}}.",
-                  i = "Exchange or widen the limits."), call = call)
+    abort_input(c(paste("A {family} prior needs lower < upper; got lower = {.val {lower}}, upper =",
+                        "{.val {upper}}."), i = "Exchange or widen the limits."), call = call)
   }
   if (family %in% c("uniform", "triangular", "beta") && !is.finite(upper - lower)) {
-    abort_input("A {family} prior from {.val {lower}} to {.val {upper}} is wider than numbers go.", call = call)
+    abort_input("A {family} prior from {.val {lower}} to {.val {upper}} is wider than numbers go.",
+                call = call)
   }
   prior <- structure(list(family = family, parameters = parameters, lower = lower, upper = upper),
                      class = "amiss_prior")
   mass <- diff(untruncated_cdf(prior, c(lower, upper)))
   if (!is.finite(mass) || mass < 1e-8) {
-    abort_input(c("A {family} prior has no mass between its limits {.val {lower}} and {.val {upper}}.",
-                  i = "Move the limits to where the distribution is."), call = call)
+    abort_input(c(paste("A {family} prior has no mass between its limits {.val {lower}} and",
+                        "{.val {upper}}."), i = "Move the limits to where the distribution is."),
+                call = call)
   }
   prior
 }
@@ -59,15 +62,17 @@ uniform <- function(lower, upper) {
 #' @rdname prior
 #' @export
 normal <- function(mean, sd, lower = -Inf, upper = Inf) {
-  new_prior("normal", list(mean = number(mean, "mean"), sd = number(sd, "sd", .Machine$double.xmin)),
-            limit(lower, "lower"), limit(upper, "upper"), rlang::current_env())
+  new_prior(
+    "normal", list(mean = number(mean, "mean"), sd = number(sd, "sd", .Machine$double.xmin)),
+    limit(lower, "lower"), limit(upper, "upper"), rlang::current_env())
 }
 
 #' @rdname prior
 #' @export
 lognormal <- function(meanlog, sdlog, lower = 0, upper = Inf) {
   new_prior("lognormal",
-            list(meanlog = number(meanlog, "meanlog"), sdlog = number(sdlog, "sdlog", .Machine$double.xmin)),
+            list(meanlog = number(meanlog, "meanlog"),
+                 sdlog = number(sdlog, "sdlog", .Machine$double.xmin)),
             limit(lower, "lower"), limit(upper, "upper"), rlang::current_env())
 }
 
@@ -86,7 +91,8 @@ triangular <- function(lower, mode, upper) {
   prior <- new_prior("triangular", list(mode = mode), limit(lower, "lower"), limit(upper, "upper"),
                      rlang::current_env())
   if (mode < lower || mode > upper) {
-    abort_input("A triangular prior needs lower <= mode <= upper; got {.val {c(lower, mode, upper)}}.")
+    abort_input(
+      "A triangular prior needs lower <= mode <= upper; got {.val {c(lower, mode, upper)}}.")
   }
   prior
 }
@@ -146,7 +152,8 @@ prior_cdf <- function(prior, x) {
 
 prior_quantile <- function(prior, u) {
   limits <- untruncated_cdf(prior, c(prior$lower, prior$upper))
-  pmin(pmax(untruncated_quantile(prior, limits[1] + u * (limits[2] - limits[1])), prior$lower), prior$upper)
+  pmin(pmax(untruncated_quantile(prior, limits[1] + u * (limits[2] - limits[1])), prior$lower),
+       prior$upper)
 }
 
 prior_density <- function(prior, x) {
@@ -156,8 +163,10 @@ prior_density <- function(prior, x) {
 
 #' @export
 format.amiss_prior <- function(x, ...) {
-  values <- c(x$parameters, if (is.finite(x$lower) || is.finite(x$upper)) list(lower = x$lower, upper = x$upper))
-  paste0(x$family, "(", paste(names(values), vapply(values, format, "", digits = 4), sep = " = ", collapse = ", "), ")")
+  values <- c(x$parameters,
+              if (is.finite(x$lower) || is.finite(x$upper)) list(lower = x$lower, upper = x$upper))
+  paste0(x$family, "(", paste(names(values), vapply(values, format, "", digits = 4), sep = " = ",
+                              collapse = ", "), ")")
 }
 
 #' @export
@@ -168,14 +177,15 @@ print.amiss_prior <- function(x, ...) {
 
 #' Declare a free parameter where it stands
 #'
-#' A number in a model's description may be replaced by a free parameter: an unknown that calibration finds.
-#' The same name may stand in several places; it is then one parameter, and must carry the same prior.
+#' A number in a model's description may be replaced by a free parameter: an unknown that
+#' calibration finds. The same name may stand in several places; it is then one parameter, and must
+#' carry the same prior.
 #'
 #' @param name Name of the parameter.
 #' @param prior Its [prior].
 #' @param unit Its unit, for people.
-#' @param label One short phrase for people; the name if not given. A label that two parameters of a model share, or
-#'   that is the name of another, is shown with the parameter's name behind it.
+#' @param label One short phrase for people; the name if not given. A label that two parameters of a
+#'   model share, or that is the name of another, is shown with the parameter's name behind it.
 #' @return An object of class `amiss_free`.
 #' @examples
 #' free("k_insulation", uniform(0.03, 0.05), unit = "W/mK")
@@ -198,7 +208,8 @@ print.amiss_free <- function(x, ...) {
   invisible(x)
 }
 
-# Labels that tell parameters apart: one that two share, or that is the name of another, has its own name behind it.
+# Labels that tell parameters apart: one that two share, or that is the name of another, has its own
+# name behind it.
 distinct_labels <- function(parameters) {
   label <- vapply(parameters, `[[`, "", "label")
   name <- names(parameters)

@@ -1,88 +1,99 @@
 #' A simulator that is an external program
 #'
-#' Any program that reads text files and writes numbers can be calibrated: ESP-r, EnergyPlus, a Modelica model, a
-#' script. Each run gets a fresh directory with the files of the model, the rendered `templates` and the drivers; the
-#' program is started there, without a shell, and its output is read. `vignette("programs", "amiss")` has recipes for
-#' ESP-r, EnergyPlus and hydrological programs.
+#' Any program that reads text files and writes numbers can be calibrated: ESP-r, EnergyPlus, a
+#' Modelica model, a script. Each run gets a fresh directory with the files of the model, the
+#' rendered `templates` and the drivers; the program is started there, without a shell, and its
+#' output is read. `vignette("programs", "amiss")` has recipes for ESP-r, EnergyPlus and
+#' hydrological programs.
 #'
 #' # Placeholders
 #'
-#' In templates, in the arguments of the command and in the inputs of its steps, `{{name}}` stands for the value of a
-#' parameter. `{{2 * k + C / 1000}}` is arithmetic of parameters: `+ - * / ^`, parentheses, `sqrt`, `exp`, `log`,
-#' `log10`, `abs`, `round`, `min` and `max`; nothing else is evaluated.
+#' In templates, in the arguments of the command and in the inputs of its steps, `{{name}}` stands
+#' for the value of a parameter. `{{2 * k + C / 1000}}` is arithmetic of parameters: `+ - * / ^`,
+#' parentheses, `sqrt`, `exp`, `log`, `log10`, `abs`, `round`, `min` and `max`; nothing else is
+#' evaluated.
 #'
-#' A number is written with 15 significant digits at most, and no more than it needs. A program that reads columns of
-#' a fixed width, or cuts words, needs a limit: `{{k:12}}` takes 12 characters at most, `{{k:%.4f}}` and `{{k:%10.3e}}`
-#' are formats of [sprintf()], and `width` is the limit for all others. A number that does not fit is an error before
-#' anything is executed. A file without a placeholder is copied byte for byte.
+#' A number is written with 15 significant digits at most, and no more than it needs. A program that
+#' reads columns of a fixed width, or cuts words, needs a limit: `{{k:12}}` takes 12 characters at
+#' most, `{{k:%.4f}}` and `{{k:%10.3e}}` are formats of [sprintf()], and `width` is the limit for
+#' all others. A number that does not fit is an error before anything is executed. A file without a
+#' placeholder is copied byte for byte.
 #'
 #' # Output
 #'
-#' `c(file = "out.csv", column = "Ti")` is a CSV with one line of names and a line of numbers for each row of the
-#' drivers, a point before decimals. Exponents as Fortran writes them (`1.5D-03`, `1.5-103`) are numbers, too. Anything
-#' else (`****`, a decimal comma, a row of units, a line with one field more or less than there are names) makes the run
-#' fail: the warning says line and value. Other tables are described by [program_output()], which also matches rows by
-#' time.
+#' `c(file = "out.csv", column = "Ti")` is a CSV with one line of names and a line of numbers for
+#' each row of the drivers, a point before decimals. Exponents as Fortran writes them (`1.5D-03`,
+#' `1.5-103`) are numbers, too. Anything else (`****`, a decimal comma, a row of units, a line with
+#' one field more or less than there are names) makes the run fail: the warning says line and value.
+#' Other tables are described by [program_output()], which also matches rows by time.
 #'
 #' # A run and its end
 #'
-#' A run ends with the process that was started: what it leaves behind in the background is stopped, as is everything
-#' of a run that takes longer than `time_limit`, reading its output included, or writes more than `size_limit`. If R
-#' itself is killed, the program is stopped, and the next call removes what was left of its run.
+#' A run ends with the process that was started: what it leaves behind in the background is stopped,
+#' as is everything of a run that takes longer than `time_limit`, reading its output included, or
+#' writes more than `size_limit`. If R itself is killed, the program is stopped, and the next call
+#' removes what was left of its run.
 #'
-#' A run that fails (exit status, a step that did not make or say what it must, time limit, unreadable output, too few
-#' rows, values that are not finite) is `NaN`. A warning names its directory, which is kept, and shows the end of what
-#' it wrote. It is tried again at the next call. Runs are made in parallel as [future::plan()] says.
+#' A run that fails (exit status, a step that did not make or say what it must, time limit,
+#' unreadable output, too few rows, values that are not finite) is `NaN`. A warning names its
+#' directory, which is kept, and shows the end of what it wrote. It is tried again at the next call.
+#' Runs are made in parallel as [future::plan()] says.
 #'
 #' # Drivers
 #'
-#' The drivers' CSV has the columns `time` (the record's: ISO 8601 in UTC, or its hours), `hours` since the start of
-#' the segment, both at the end of each interval, and the columns named in `boundary`.
+#' The drivers' CSV has the columns `time` (the record's: ISO 8601 in UTC, or its hours), `hours`
+#' since the start of the segment, both at the end of each interval, and the columns named in
+#' `boundary`.
 #'
-#' Of a record with gaps the program is started once for each unbroken segment, from its first row, warm-up included, to
-#' the last that is used, at the step of the data (before averages): let it take its period and step from the drivers'
-#' file, and write one row for each of its rows.
+#' Of a record with gaps the program is started once for each unbroken segment, from its first row,
+#' warm-up included, to the last that is used, at the step of the data (before averages): let it
+#' take its period and step from the drivers' file, and write one row for each of its rows.
 #'
-#' A building or a catchment remembers the weather of days or months before the record. If the record has rows without a
-#' target ahead of its first measured value, their drivers are there. `lead_in` asks for more, for each segment.
+#' A building or a catchment remembers the weather of days or months before the record. If the
+#' record has rows without a target ahead of its first measured value, their drivers are there.
+#' `lead_in` asks for more, for each segment.
 #'
 #' # What is kept
 #'
-#' A run that succeeds is kept in `cache` at once and never made twice: its key is what it reads (files, templates,
-#' command, drivers, contents of the files that the command names, `version`) and how its output is read. Runs that
-#' were found there do not count in a budget. What was kept is checked when it is read, and made again if it is not
-#' whole. What else the program reads, such as a library of its own, does not count: give another `version` when it
-#' changes.
+#' A run that succeeds is kept in `cache` at once and never made twice: its key is what it reads
+#' (files, templates, command, drivers, contents of the files that the command names, `version`) and
+#' how its output is read. Runs that were found there do not count in a budget. What was kept is
+#' checked when it is read, and made again if it is not whole. What else the program reads, such as
+#' a library of its own, does not count: give another `version` when it changes.
 #'
-#' @param command The program and its arguments, as a character vector, or a list of several [program_step()], which run
-#'   one after the other. Words that name an existing file become absolute paths, but for the names of files of the run.
+#' @param command The program and its arguments, as a character vector, or a list of several
+#'   [program_step()], which run one after the other. Words that name an existing file become
+#'   absolute paths, but for the names of files of the run.
 #' @param ... The parameters, each made by [free()].
-#' @param output Where the output is: `c(file = "out.csv", column = "Ti")` of a CSV in the run's directory (`stdout.txt`
-#'   for what the last program prints), a table described by [program_output()], or a function of that directory that
-#'   returns one number per row of the drivers.
-#' @param templates Named list: file in the run's directory = path of its template, or its text in [I()]. A name may
-#'   hold folders (`"inputs/model.txt"`), and does not lead out of the run's directory. A file of `files` may be named
-#'   by its path there alone: `templates = "cfg/walls.con"`.
+#' @param output Where the output is: `c(file = "out.csv", column = "Ti")` of a CSV in the run's
+#'   directory (`stdout.txt` for what the last program prints), a table described by
+#'   [program_output()], or a function of that directory that returns one number per row of the
+#'   drivers.
+#' @param templates Named list: file in the run's directory = path of its template, or its text in
+#'   [I()]. A name may hold folders (`"inputs/model.txt"`), and does not lead out of the run's
+#'   directory. A file of `files` may be named by its path there alone: `templates =
+#'   "cfg/walls.con"`.
 #' @param boundary Names of the driver columns that the program needs.
-#' @param drivers Name of the drivers' CSV; [epw_weather()]; a function of `table` (a data frame of `time`, `hours` and
-#'   the columns) and `folder` that writes files into the folder; or a list of several of these.
+#' @param drivers Name of the drivers' CSV; [epw_weather()]; a function of `table` (a data frame of
+#'   `time`, `hours` and the columns) and `folder` that writes files into the folder; or a list of
+#'   several of these.
 #' @param time_limit Seconds for one run.
-#' @param size_limit Megabytes that one run may write. Of a run that fails, files over one megabyte are kept without
-#'   their middle.
+#' @param size_limit Megabytes that one run may write. Of a run that fails, files over one megabyte
+#'   are kept without their middle.
 #' @param retries How often a failed run is tried again at once.
 #' @param cache Directory of the finished runs, and of the directories of failed ones.
 #' @param version Anything that tells versions of the program apart.
 #' @param name A name for people.
-#' @param files The files of the model: a folder, all of which is copied into each run's directory byte for byte, or
-#'   paths of files (with names, if they are to have others there).
+#' @param files The files of the model: a folder, all of which is copied into each run's directory
+#'   byte for byte, or paths of files (with names, if they are to have others there).
 #' @param width The most characters of a number for a placeholder that states none.
-#' @param lead_in Hours of drivers ahead of the first measured value of each segment; the output has rows for them, too,
-#'   which are then left out.
-#' @param before How the lead-in is filled: `"record"`, by the rows that the record has there and else by the first day
-#'   of the segment, repeated, which is said; `"first_day"`, by that day alone; `"record_only"`, only as far as the
-#'   record goes.
-#' @param keep How many directories of runs that succeeded are kept in `cache`, to look at; `TRUE`: all. See also
-#'   [render_run()].
+#' @param lead_in Hours of drivers ahead of the first measured value of each segment; the output has
+#'   rows for them, too, which are then left out.
+#' @param before How the lead-in is filled: `"record"`, by the rows that the record has there and
+#'   else by the first day of the segment, repeated, which is said; `"first_day"`, by that day
+#'   alone; `"record_only"`, only as far as the record goes.
+#' @param keep How many directories of runs that succeeded are kept in `cache`, to look at; `TRUE`:
+#'   all. See also [render_run()].
 #' @return An object of class `amiss_program_simulator`.
 #' @examples
 #' rule <- c("BEGIN { FS = \",\"; print \"Ti\" }", "NR > 1 { print 20 + {{gain}} * $3 }")
@@ -101,30 +112,36 @@
 #'   templates = list(model.awk = I(rule)), boundary = "Te", cache = tempfile("runs"))
 #' simulate_runs(chain, cbind(gain = 1.5), cbind(Te = c(4, 6, 5)), step_h = 1)
 #' @export
-program_simulator <- function(command, ..., output, templates = list(), boundary = character(), drivers = "drivers.csv",
-                              time_limit = 600, retries = 0, cache = tools::R_user_dir("amiss", "cache"), version = "",
-                              name = "program", size_limit = 1000, files = NULL, width = NULL, lead_in = 0,
-                              before = "record", keep = 0) {
+program_simulator <- function(command, ..., output, templates = list(), boundary = character(),
+                              drivers = "drivers.csv", time_limit = 600, retries = 0,
+                              cache = tools::R_user_dir("amiss", "cache"), version = "",
+                              name = "program", size_limit = 1000, files = NULL, width = NULL,
+                              lead_in = 0, before = "record", keep = 0) {
   check_present(command, output)
   steps <- as_steps(command)
   output <- check_output(output)
   check_columns_named(boundary)
   drivers <- check_program_drivers(drivers)
-  check_input(checkmate::check_number(time_limit, lower = 1e-3, finite = TRUE), "time_limit", "It is in seconds.")
+  check_input(checkmate::check_number(time_limit, lower = 1e-3, finite = TRUE), "time_limit",
+              "It is in seconds.")
   check_input(checkmate::check_int(retries, lower = 0, upper = 1000), "retries")
   check_input(checkmate::check_string(cache, min.chars = 1), "cache")
   check_input(checkmate::check_string(name), "name")
-  check_input(checkmate::check_number(size_limit, lower = 1, finite = TRUE), "size_limit", "It is in megabytes.")
-  check_input(checkmate::check_int(width, lower = 6, upper = 100, null.ok = TRUE), "width", "It is in characters.")
-  check_input(checkmate::check_number(lead_in, lower = 0, upper = 1e6), "lead_in", "It is in hours.")
+  check_input(checkmate::check_number(size_limit, lower = 1, finite = TRUE), "size_limit",
+              "It is in megabytes.")
+  check_input(checkmate::check_int(width, lower = 6, upper = 100, null.ok = TRUE), "width",
+              "It is in characters.")
+  check_input(checkmate::check_number(lead_in, lower = 0, upper = 1e6), "lead_in",
+              "It is in hours.")
   check_input(checkmate::check_choice(before, lead_ways), "before")
   keep <- check_keep(keep)
   files <- model_files(files)
   templates <- read_templates(templates, files = files)
   simulator <- structure(list(
-    format_version = format_version, name = name, command = command, output = output, templates = templates,
-    parameters = named_parameters(list(...)), boundary = union(boundary, drivers_columns(drivers)), drivers = drivers,
-    files = files, width = width, time_limit = time_limit, size_limit = size_limit, retries = retries,
+    format_version = format_version, name = name, command = command, output = output,
+    templates = templates, parameters = named_parameters(list(...)),
+    boundary = union(boundary, drivers_columns(drivers)), drivers = drivers, files = files,
+    width = width, time_limit = time_limit, size_limit = size_limit, retries = retries,
     lead_in = lead_in, before = before, keep = keep, cache = normalizePath(cache, mustWork = FALSE),
     version = version), class = "amiss_program_simulator")
   simulator$command <- resolve_command(command, steps, simulator)
@@ -133,11 +150,11 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
 
 check_output <- function(output, call = rlang::caller_env()) {
   if (is.function(output) || inherits(output, "amiss_program_output")) return(output)
-  check_input(checkmate::check_character(output, len = 2, any.missing = FALSE), "output", call = call)
+  check_input(checkmate::check_character(output, len = 2, any.missing = FALSE), "output",
+              call = call)
   check_input(checkmate::check_names(names(output), permutation.of = c("file", "column")), "output",
-              paste(
-                "Give {.code c(file = \"out.csv\", column = \"Ti\")}, {.fun program_output} or a function of the run's",
-                    "directory."), call = call)
+              paste("Give {.code c(file = \"out.csv\", column = \"Ti\")}, {.fun program_output} or",
+                    "a function of the run's directory."), call = call)
   check_inside(c(output = output[["file"]]), call)
   output
 }
@@ -152,11 +169,12 @@ check_keep <- function(keep, call = rlang::caller_env()) {
 
 # The files of a run that neither templates nor people give.
 own_files <- function(simulator, steps) {
-  c(drivers_files(simulator$drivers), unlist(lapply(steps, function(step) c(step$stdout, step$stderr))))
+  c(drivers_files(simulator$drivers),
+    unlist(lapply(steps, function(step) c(step$stdout, step$stderr))))
 }
 
-# Words that name a file of the session become absolute paths, but for those that name a file of the run. Inputs are
-# read, or are files of the run, too.
+# Words that name a file of the session become absolute paths, but for those that name a file of the
+# run. Inputs are read, or are files of the run, too.
 resolve_command <- function(command, steps, simulator, call = rlang::caller_env()) {
   made <- c(names(simulator$templates), simulator$files$name, own_files(simulator, steps),
             unlist(lapply(steps, `[[`, "makes")), output_file(simulator$output))
@@ -177,7 +195,8 @@ output_file <- function(output) {
 # Text as lines, bytes of a file, or list(file) of one in the run's folder.
 step_input <- function(input, made, call) {
   if (is.null(input) || is.list(input)) return(input)
-  if (inherits(input, "AsIs")) return(if (is.raw(input)) unclass(input) else enc2utf8(as.character(input)))
+  if (inherits(input, "AsIs"))
+    return(if (is.raw(input)) unclass(input) else enc2utf8(as.character(input)))
   if (input %in% made) return(list(file = input))
   if (is_regular_file(input)) return(template_of(file_bytes(input)))
   abort_input(c("{.arg input} names {.file {input}}, which is neither a file nor one of the run.",
@@ -192,10 +211,11 @@ check_program <- function(simulator, call = rlang::caller_env()) {
   written <- intersect(simulator$files$name, own_files(simulator, steps))
   if (length(written)) {
     abort_input(c("The run itself writes {.file {written[1]}}, which is in {.arg files}, too.",
-                  i = "Give it another name by {.arg drivers}, or by {.arg stdout} of {.fun program_step}."),
-                  call = call)
+                  i = paste("Give it another name by {.arg drivers}, or by {.arg stdout} of",
+                            "{.fun program_step}.")), call = call)
   }
-  check_placeholders(places_of(simulator$templates, steps), simulator$parameters, simulator$width, call)
+  check_placeholders(places_of(simulator$templates, steps), simulator$parameters,
+                     simulator$width, call)
   simulator
 }
 
@@ -204,9 +224,9 @@ check_program <- function(simulator, call = rlang::caller_env()) {
 #' A mechanism of a [program_simulator()] is an edit of its templates, with parameters of its own.
 #'
 #' @param simulator A [program_simulator()].
-#' @param templates Named list of templates, new ones or in place of those of the same name: a path, text in [I()], or a
-#'   function of the lines that are there, also of a file of the model's folder. Functions stack: they keep what other
-#'   mechanisms have put in.
+#' @param templates Named list of templates, new ones or in place of those of the same name: a path,
+#'   text in [I()], or a function of the lines that are there, also of a file of the model's folder.
+#'   Functions stack: they keep what other mechanisms have put in.
 #' @param ... Parameters to add, each made by [free()].
 #' @param boundary Driver columns to add.
 #' @return The edited simulator.
@@ -237,14 +257,16 @@ with_template <- function(simulator, templates, ..., boundary = character()) {
 print.amiss_program_simulator <- function(x, ...) on_stdout(x, {
   steps <- as_steps(x$command)
   programs <- unique(vapply(steps, function(step) step$command[1], ""))
-  cli::cli_text(
-    paste("{.strong Simulator} {.val {x$name}} (the {cli::qty(length(programs))}program{?s} {.file {programs}}) with",
+  cli::cli_text(paste("{.strong Simulator} {.val {x$name}} (the",
+                      "{cli::qty(length(programs))}program{?s} {.file {programs}}) with",
                       "{length(x$parameters)} free parameter{?s}"))
   say_bullets(vapply(utils::head(x$parameters, 6), format, ""))
-  if (length(x$parameters) > 6) say_bullets(paste("and", length(x$parameters) - 6, "more parameters"))
-  cli::cli_bullets(c("*" = if (length(x$boundary)) "driven by {.field {x$boundary}}" else "driven by nothing",
-                     "*" = if (nrow(x$files)) "{nrow(x$files)} file{?s} of the model are copied into each run",
-                     "*" = if (x$lead_in > 0) "{x$lead_in} h of weather ahead of each segment"))
+  if (length(x$parameters) > 6)
+    say_bullets(paste("and", length(x$parameters) - 6, "more parameters"))
+  cli::cli_bullets(
+    c("*" = if (length(x$boundary)) "driven by {.field {x$boundary}}" else "driven by nothing",
+      "*" = if (nrow(x$files)) "{nrow(x$files)} file{?s} of the model are copied into each run",
+      "*" = if (x$lead_in > 0) "{x$lead_in} h of weather ahead of each segment"))
   kept <- kept_runs(x)
   took <- if (is.null(kept$seconds)) "not run yet" else paste(short(kept$seconds), "s a run")
   cli::cli_bullets(c("*" = "{took}; {kept$runs} finished run{?s} in {.file {x$cache}}"))
@@ -260,12 +282,14 @@ free_parameters.amiss_program_simulator <- function(simulator) simulator$paramet
 driver_names.amiss_program_simulator <- function(simulator) simulator$boundary
 
 #' @export
-simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L,
+simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, step_h, hold = NULL,
+                                                  threads = 1L,
                                                   time = step_h * seq_len(nrow(drivers)), ...) {
   check_run_dots(...)
   check_row_times(time, nrow(drivers))
   plan <- plan_runs(simulator, values, drivers, step_h, time)
-  if (!dir.exists(simulator$cache) && !dir.create(simulator$cache, recursive = TRUE, showWarnings = FALSE)) {
+  if (!dir.exists(simulator$cache) &&
+      !dir.create(simulator$cache, recursive = TRUE, showWarnings = FALSE)) {
     abort_input("The folder {.file {simulator$cache}} for {.arg cache} cannot be made.")
   }
   remove_abandoned(simulator$cache)
@@ -276,7 +300,8 @@ simulate_runs.amiss_program_simulator <- function(simulator, values, drivers, st
     piece_done()
     run
   }, future.packages = "amiss", future.seed = NULL)
-  note_found(vapply(made, function(run) isTRUE(run$found), NA), unlist(lapply(made, `[[`, "seconds")))
+  note_found(vapply(made, function(run) isTRUE(run$found), NA),
+             unlist(lapply(made, `[[`, "seconds")))
   tell_failed(simulator, made)
   if (any(vapply(made, function(run) isFALSE(run$kept), NA))) tell_unkept(simulator$cache)
   matrix(unlist(lapply(made, function(run) run$value %||% rep(NaN, nrow(drivers)))), nrow(drivers))

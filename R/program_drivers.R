@@ -1,4 +1,5 @@
-# What drives a program's run, as the files that it reads: CSV, a weather file, or what a function writes.
+# What drives a program's run, as the files that it reads: CSV, a weather file, or what a function
+# writes.
 
 # A list of file names, epw_weather() and functions.
 check_program_drivers <- function(drivers, call = rlang::caller_env()) {
@@ -8,21 +9,25 @@ check_program_drivers <- function(drivers, call = rlang::caller_env()) {
     if (is.function(one)) {
       if (length(formals(args(one))) >= 2) next
       abort_input(c("The function in {.arg drivers} has {length(formals(args(one)))} argument{?s}.",
-                    i = "Write {.code function(table, folder)}: it writes files into the folder."), call = call)
+                    i = "Write {.code function(table, folder)}: it writes files into the folder."),
+                  call = call)
     }
     check_input(checkmate::check_string(one, min.chars = 1), "drivers",
-                "Give the name of a CSV file, {.fun epw_weather} or a function of table and folder.", call = call)
+                paste("Give the name of a CSV file, {.fun epw_weather} or a function of table and",
+                      "folder."), call = call)
     check_inside(c(drivers = one), call)
   }
   names <- drivers_files(drivers)
   twice <- names[duplicated(names)]
-  if (length(twice)) abort_input("{.arg drivers} has the file {.file {twice[1]}} twice.", call = call)
+  if (length(twice))
+    abort_input("{.arg drivers} has the file {.file {twice[1]}} twice.", call = call)
   drivers
 }
 
 # Names of the files that are known before a function has run.
 drivers_files <- function(drivers) {
-  unlist(lapply(drivers, function(one) if (is.character(one)) one else if (inherits(one, "amiss_epw")) one$file))
+  unlist(lapply(drivers, function(one) if (is.character(one)) one
+                                       else if (inherits(one, "amiss_epw")) one$file))
 }
 
 # The columns that weather files need.
@@ -40,12 +45,14 @@ drivers_offset <- function(drivers) {
 drivers_bytes <- function(drivers, table, step_h, call = rlang::caller_env()) {
   files <- lapply(drivers, function(one) {
     if (is.character(one)) return(stats::setNames(list(csv_bytes(csv_times(table))), one))
-    if (inherits(one, "amiss_epw")) return(stats::setNames(list(epw_bytes(one, table, step_h, call)), one$file))
+    if (inherits(one, "amiss_epw"))
+      return(stats::setNames(list(epw_bytes(one, table, step_h, call)), one$file))
     written_by(one, table, call)
   })
   files <- do.call(c, files)
   twice <- names(files)[duplicated(names(files))]
-  if (length(twice)) abort_input("Two of {.arg drivers} write the file {.file {twice[1]}}.", call = call)
+  if (length(twice))
+    abort_input("Two of {.arg drivers} write the file {.file {twice[1]}}.", call = call)
   files
 }
 
@@ -56,13 +63,14 @@ written_by <- function(f, table, call) {
   on.exit(unlink(folder, recursive = TRUE))
   tryCatch(f(table, folder), error = function(e) {
     abort_input(c("The function in {.arg drivers} stopped: {conditionMessage(e)}",
-                  i = "It is given a data frame of the columns {.val {names(table)}}, and a folder."), call = call)
+                  i = paste("It is given a data frame of the columns {.val {names(table)}}, and a",
+                            "folder.")), call = call)
   })
   names <- dir(folder, recursive = TRUE, all.files = TRUE, no.. = TRUE)
   if (!length(names)) {
     abort_input(c("The function in {.arg drivers} wrote no file.",
-                  i = "Let it write into its second argument: {.code file.path(folder, \"weather.txt\")}."),
-                  call = call)
+                  i = paste("Let it write into its second argument:",
+                            "{.code file.path(folder, \"weather.txt\")}.")), call = call)
   }
   stats::setNames(lapply(file.path(folder, names), file_bytes), names)
 }

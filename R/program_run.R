@@ -1,22 +1,28 @@
 # One run of a program: the folder that it has, its processes, and how finished runs are kept.
 
-# What the runs of one call share, ready to be made: list(steps, files, inputs, expected, id, jobs, ...), a job for each
-# row of `values`. All that can be wrong with numbers and files is refused here, before anything is executed.
+# What the runs of one call share, ready to be made: list(steps, files, inputs, expected, id, jobs,
+# ...), a job for each row of `values`. All that can be wrong with numbers and files is refused
+# here, before anything is executed.
 plan_runs <- function(simulator, values, drivers, step_h, time, call = rlang::caller_env()) {
   check_files_same(simulator$files, call)
   inputs <- drivers_bytes(simulator$drivers, drivers_table(drivers, step_h, time), step_h, call)
-  expected <- list(time = time, step_h = step_h, rows = nrow(drivers), offset = drivers_offset(simulator$drivers))
-  steps <- lapply(as_steps(simulator$command, call), find_program, simulator = simulator, call = call)
+  expected <- list(time = time, step_h = step_h, rows = nrow(drivers),
+                   offset = drivers_offset(simulator$drivers))
+  steps <- lapply(as_steps(simulator$command, call), find_program, simulator = simulator,
+                  call = call)
   shared <- rlang::hash(list(inputs, unname(tools::md5sum(command_files(steps))), simulator$version,
-                             plain(simulator$output), simulator$files[c("name", "md5")], lapply(steps, what_counts)))
+                             plain(simulator$output), simulator$files[c("name", "md5")],
+                             lapply(steps, what_counts)))
   texts <- compiled_texts(simulator, steps)
   id <- simulator_id(simulator)
   jobs <- lapply(seq_len(nrow(values)), function(m) {
     point <- stats::setNames(values[m, ], colnames(values))[names(simulator$parameters)]
-    filled <- Map(function(text, place) fill_text(text, point, simulator$width, place, call), texts, names(texts))
+    filled <- Map(function(text, place) fill_text(text, point, simulator$width, place, call), texts,
+                  names(texts))
     job_of(filled, simulator, steps, paste0(id, "-", rlang::hash(list(shared, unname(filled)))))
   })
-  list(steps = steps, files = simulator$files, inputs = inputs, expected = expected, id = id, jobs = jobs,
+  list(steps = steps, files = simulator$files, inputs = inputs, expected = expected, id = id,
+       jobs = jobs,
        simulator = simulator[c("cache", "output", "time_limit", "size_limit", "retries", "keep")])
 }
 
@@ -42,16 +48,19 @@ command_files <- function(steps) {
   unlist(lapply(steps, function(step) c(step$program, step$command[is_regular_file(step$command)])))
 }
 
-# All texts in which a placeholder may stand, ready to be filled in, by what they are called in messages.
+# All texts in which a placeholder may stand, ready to be filled in, by what they are called in
+# messages.
 compiled_texts <- function(simulator, steps) {
   compile_texts(places_of(simulator$templates, steps), names(simulator$parameters))
 }
 
 places_of <- function(templates, steps) {
-  numbered <- function(what) if (length(steps) > 1) paste(what, "of step", seq_along(steps)) else what
+  numbered <- function(what)
+    if (length(steps) > 1) paste(what, "of step", seq_along(steps)) else what
   commands <- lapply(steps, function(step) step$command[-1])
   inputs <- lapply(steps, function(step) if (is.list(step$input)) character() else step$input)
-  c(templates, stats::setNames(commands, numbered("the command")), stats::setNames(inputs, numbered("the input")))
+  c(templates, stats::setNames(commands, numbered("the command")),
+    stats::setNames(inputs, numbered("the input")))
 }
 
 # What one run differs by from the others: the texts filled in, in the order of places_of().
@@ -68,7 +77,8 @@ job_of <- function(filled, simulator, steps, key) {
 simulator_id <- function(simulator) {
   of <- simulator[c("templates", "files", "drivers", "version", "boundary", "lead_in", "before")]
   steps <- lapply(as_steps(simulator$command), what_counts)
-  substr(content_hash(plain(c(of, list(steps, names(simulator$parameters), simulator$output)))), 1, 8)
+  substr(content_hash(plain(c(of, list(steps, names(simulator$parameters), simulator$output)))),
+         1, 8)
 }
 
 # list(value, seconds, found) of one run, found or made; list(why, directory, said) if it failed.
@@ -77,10 +87,12 @@ program_run <- function(plan, job) {
   file <- file.path(simulator$cache, paste0(job$key, ".rds"))
   kept <- read_kept(file, job$key, function(run) is_run(run, plan$expected$rows))
   if (!is.null(kept)) {
-    return(list(value = as.numeric(kept$value), seconds = attr(kept$value, "seconds"), found = TRUE))
+    return(list(value = as.numeric(kept$value), seconds = attr(kept$value, "seconds"),
+                found = TRUE))
   }
   run <- with_run_folder(simulator$cache, job$key, function(folder) try_to_run(plan, job, folder))
-  if (!is.null(run$value)) run$kept <- store_value(structure(run$value, seconds = run$seconds), file, job$key)
+  if (!is.null(run$value))
+    run$kept <- store_value(structure(run$value, seconds = run$seconds), file, job$key)
   run
 }
 
@@ -102,7 +114,8 @@ try_to_run <- function(plan, job, folder) {
   }
   said <- last_words(plan$steps, failed$step %||% length(plan$steps), folder)
   why <- cli::ansi_strip(conditionMessage(failed))
-  c(list(why = why), keep_failed(folder, file.path(plan$simulator$cache, paste0("failed-", job$key))),
+  c(list(why = why),
+    keep_failed(folder, file.path(plan$simulator$cache, paste0("failed-", job$key))),
     said = list(said))
 }
 
@@ -120,8 +133,8 @@ make_folder <- function(plan, job, folder) {
 
 stdin_names <- function(steps) paste0("stdin", if (steps > 1) paste0("-", seq_len(steps)), ".txt")
 
-# Evaluates `work` of a folder that is removed then. Its lock is the operating system's: what nobody holds was left by a
-# session that was killed.
+# Evaluates `work` of a folder that is removed then. Its lock is the operating system's: what nobody
+# holds was left by a session that was killed.
 with_run_folder <- function(cache, key, work) {
   folder <- tempfile(paste0("running-", substr(key, 1, 8), "-"), cache)
   file <- paste0(folder, ".lock")
@@ -158,7 +171,8 @@ write_inputs <- function(folder, inputs) {
   }
 }
 
-# The output of one run of the program; an error says why there is none, one of a step has its number.
+# The output of one run of the program; an error says why there is none, one of a step has its
+# number.
 run_program <- function(plan, job, folder) {
   simulator <- plan$simulator
   ends <- elapsed() + simulator$time_limit
@@ -173,15 +187,16 @@ run_program <- function(plan, job, folder) {
   })
   rows <- plan$expected$rows
   if (!is.numeric(out)) stop("its output is of class ", class(out)[1], ", not numeric")
-  if (length(out) != rows) stop("its output has ", length(out), " rows, where ", rows, " were expected")
+  if (length(out) != rows)
+    stop("its output has ", length(out), " rows, where ", rows, " were expected")
   if (!all(is.finite(out))) stop("its output is not finite in row ", which(!is.finite(out))[1])
   as.numeric(out)
 }
 
 run_step <- function(plan, job, k, folder, ends) {
   step <- plan$steps[[k]]
-  of <- if (length(plan$steps) > 1) paste0("step ", k, " of ", length(plan$steps), " (", basename(step$command[1]),
-                                           "): ")
+  of <- if (length(plan$steps) > 1)
+    paste0("step ", k, " of ", length(plan$steps), " (", basename(step$command[1]), "): ")
   tryCatch({
     status <- step_status(plan, job, k, folder, ends)
     why <- step_failure(step, status, folder)
@@ -200,11 +215,13 @@ step_status <- function(plan, job, k, folder, ends) {
   stdin <- if (is.list(step$input)) step$input$file
            else if (!is.null(step$input)) stdin_names(length(plan$steps))[k]
   program <- if (is.null(step$within)) job$commands[[k]][1] else file.path(folder, step$within)
-  if (!is.null(stdin) && !is_regular_file(file.path(folder, stdin))) stop("there is no file ", stdin, " for its input")
-  process <- processx::process$new(program, job$commands[[k]][-1], wd = file.path(folder, step$folder %||% "."),
+  if (!is.null(stdin) && !is_regular_file(file.path(folder, stdin)))
+    stop("there is no file ", stdin, " for its input")
+  process <- processx::process$new(program, job$commands[[k]][-1],
+                                   wd = file.path(folder, step$folder %||% "."),
                                    stdin = if (!is.null(stdin)) file.path(folder, stdin),
-                                   stdout = file.path(folder, step$stdout), stderr = file.path(folder, step$stderr),
-                                   cleanup_tree = TRUE)
+                                   stdout = file.path(folder, step$stdout),
+                                   stderr = file.path(folder, step$stderr), cleanup_tree = TRUE)
   wait_for(process, ends, limit, plan$simulator$size_limit, folder)
   process$get_exit_status()
 }
@@ -212,13 +229,16 @@ step_status <- function(plan, job, k, folder, ends) {
 # Why a step that ended has failed, or NULL.
 step_failure <- function(step, status, folder) {
   if (status < 0) return(paste("it was ended by signal", -status))
-  said <- log_failure(step, stats::setNames(file.path(folder, c(step$stdout, step$stderr, step$log)),
-                                            c("standard output", "standard error", step$log)))
-  ended <- if (!is.null(step$status) && !status %in% step$status) paste("it ended with exit status", status)
+  said <- log_failure(step,
+                      stats::setNames(file.path(folder, c(step$stdout, step$stderr, step$log)),
+                                      c("standard output", "standard error", step$log)))
+  ended <- if (!is.null(step$status) && !status %in% step$status)
+    paste("it ended with exit status", status)
   if (length(c(ended, said))) return(paste(c(ended, said), collapse = "; "))
   paths <- file.path(folder, step$makes)
   empty <- step$makes[!(is_regular_file(paths) & file.size(paths) %in% 0 == FALSE)]
-  if (length(empty)) paste0("it ended with exit status ", status, " and wrote nothing into ", empty[1])
+  if (length(empty))
+    paste0("it ended with exit status ", status, " and wrote nothing into ", empty[1])
 }
 
 # Waits for the process alone: what it started, and leaves behind, ends with it.
@@ -279,7 +299,8 @@ last_words <- function(steps, k, folder) {
   words <- lapply(c(k, if (k > 1) k - 1), function(j) {
     step <- steps[[j]]
     of <- if (length(steps) > 1) paste0(" of step ", j, " (", basename(step$command[1]), ")")
-    files <- c("standard output" = step$stdout, "standard error" = step$stderr, stats::setNames(nm = step$log))
+    files <- c("standard output" = step$stdout, "standard error" = step$stderr,
+               stats::setNames(nm = step$log))
     said <- vapply(file.path(folder, files), end_of_file, "")
     stats::setNames(said, paste0("End of ", names(files), of))
   })
@@ -291,12 +312,14 @@ last_words <- function(steps, k, folder) {
 end_of_file <- function(path) {
   if (!is_regular_file(path) || file.size(path) %in% 0) return("")
   bytes <- if (file.size(path) > 1e5) file_ends(path, 1e5) else file_bytes(path)
-  substr(paste(one_line(utils::tail(lines_of(bytes[bytes != as.raw(0)]), 5)), collapse = " "), 1, 500)
+  substr(paste(one_line(utils::tail(lines_of(bytes[bytes != as.raw(0)]), 5)), collapse = " "),
+         1, 500)
 }
 
 # The folder of a run that succeeded under another name, up to the number that is to be kept.
 keep_good <- function(plan, job, folder) {
-  if (plan$simulator$keep < 1 || length(kept_folders(plan$simulator$cache, plan$id)) >= plan$simulator$keep) return()
+  if (plan$simulator$keep < 1 ||
+      length(kept_folders(plan$simulator$cache, plan$id)) >= plan$simulator$keep) return()
   to <- file.path(plan$simulator$cache, paste0("kept-", job$key))
   unlink(to, recursive = TRUE)
   file.rename(folder, to)
@@ -307,13 +330,15 @@ kept_folders <- function(cache, id) {
   found[dir.exists(found)]
 }
 
-# What is kept of the runs of a simulator: list(runs, seconds, folders), the seconds of a typical run, or NULL.
+# What is kept of the runs of a simulator: list(runs, seconds, folders), the seconds of a typical
+# run, or NULL.
 kept_runs <- function(simulator) {
   id <- simulator_id(simulator)
   files <- dir(simulator$cache, paste0("^", id, "-.*[.]rds$"), full.names = TRUE)
   looked <- utils::head(files[order(file.mtime(files), decreasing = TRUE)], 10)
   seconds <- unlist(lapply(looked, function(file) {
-    kept <- tryCatch(unpack(readRDS(file), sub("[.]rds$", "", basename(file))), error = function(e) NULL)
+    kept <- tryCatch(unpack(readRDS(file), sub("[.]rds$", "", basename(file))),
+                     error = function(e) NULL)
     attr(kept$value, "seconds")
   }))
   list(runs = length(files), seconds = if (length(seconds)) stats::median(seconds),
@@ -322,13 +347,15 @@ kept_runs <- function(simulator) {
 
 guard <- new.env(parent = emptyenv())
 
-# Names the program that is to be stopped if this session is killed, by its number, or none. A shell beside the session
-# reads what it writes; when that ends, it stops the process group that was named last. On Windows processx does it.
+# Names the program that is to be stopped if this session is killed, by its number, or none. A shell
+# beside the session reads what it writes; when that ends, it stops the process group that was named
+# last. On Windows processx does it.
 stop_with_session <- function(pid) {
   if (.Platform$OS.type != "unix") return(invisible())
   if (!identical(guard$session, Sys.getpid()) || !guard$shell$is_alive()) {
     if (is.null(pid)) return(invisible())
-    script <- "while read line; do group=$line; done; [ \"$group\" = none ] || kill -s KILL -- \"-$group\""
+    script <-
+      "while read line; do group=$line; done; [ \"$group\" = none ] || kill -s KILL -- \"-$group\""
     guard$shell <- processx::process$new("sh", c("-c", script), stdin = "|")
     guard$session <- Sys.getpid()
   }

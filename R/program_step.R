@@ -1,22 +1,27 @@
 #' Programs one after the other
 #'
-#' A simulation often takes a chain of programs: one simulates, another extracts what was asked for. Give
-#' `program_simulator(command = list(program_step(...), program_step(...)), ...)`. The steps run one after the other in
-#' the folder of the run, without a shell; the first that fails ends the run, and the warning shows what it wrote last.
+#' A simulation often takes a chain of programs: one simulates, another extracts what was asked for.
+#' Give `program_simulator(command = list(program_step(...), program_step(...)), ...)`. The steps
+#' run one after the other in the folder of the run, without a shell; the first that fails ends the
+#' run, and the warning shows what it wrote last.
 #'
-#' A program that exits with 0 may have failed all the same. `makes`, `needs` and `fails_if` find that out at the step
-#' where it happened, and not at the next, which only misses a file.
+#' A program that exits with 0 may have failed all the same. `makes`, `needs` and `fails_if` find
+#' that out at the step where it happened, and not at the next, which only misses a file.
 #'
-#' @param command The program. `./name` or the name of a file in the run's folder is a program that is copied there.
+#' @param command The program. `./name` or the name of a file in the run's folder is a program that
+#'   is copied there.
 #' @param ... Its arguments, as text; `{{name}}` stands for a parameter, as in templates.
-#' @param input What it reads from standard input: text in [I()] (a line for each element), the path of a file, or the
-#'   name of a file in the run's folder. Placeholders in the text or the file are filled in.
-#' @param stdout Name of the file for its standard output. By default `stdout.txt` for the last step and
-#'   `stdout-1.txt`, `stdout-2.txt`, ... for those before.
-#' @param folder Folder within that of the run in which it is started, such as `"cfg"`; by default that of the run.
-#' @param makes Names of files, from the folder of the run, that must be there and not empty after the step.
-#' @param needs,fails_if Regular expressions (of Perl), each of which must stand in its log, or of which none may. The
-#'   log is standard output, standard error and the files named in `log`.
+#' @param input What it reads from standard input: text in [I()] (a line for each element), the path
+#'   of a file, or the name of a file in the run's folder. Placeholders in the text or the file are
+#'   filled in.
+#' @param stdout Name of the file for its standard output. By default `stdout.txt` for the last step
+#'   and `stdout-1.txt`, `stdout-2.txt`, ... for those before.
+#' @param folder Folder within that of the run in which it is started, such as `"cfg"`; by default
+#'   that of the run.
+#' @param makes Names of files, from the folder of the run, that must be there and not empty after
+#'   the step.
+#' @param needs,fails_if Regular expressions (of Perl), each of which must stand in its log, or of
+#'   which none may. The log is standard output, standard error and the files named in `log`.
 #' @param log Names of further files of the log, from the folder of the run (`"eplusout.err"`).
 #' @param time_limit Seconds for this step; the run as a whole has a `time_limit`, too.
 #' @param status Exit statuses that are no failure; `NULL`: any.
@@ -25,8 +30,8 @@
 #' program_step("bps", "-file", "house.cfg", "-mode", "text", input = I(c("c", "{{days:%d}}", "-")),
 #'              makes = "house.res", needs = "finished", fails_if = "(?i)error", time_limit = 300)
 #' @export
-program_step <- function(command, ..., input = NULL, stdout = NULL, folder = NULL, makes = NULL, needs = NULL,
-                         fails_if = NULL, log = NULL, time_limit = NULL, status = 0) {
+program_step <- function(command, ..., input = NULL, stdout = NULL, folder = NULL, makes = NULL,
+                         needs = NULL, fails_if = NULL, log = NULL, time_limit = NULL, status = 0) {
   check_input(checkmate::check_string(command, min.chars = 1), "command", "Name the program.")
   arguments <- list(...)
   if (any(nzchar(rlang::names2(arguments)))) {
@@ -39,12 +44,12 @@ program_step <- function(command, ..., input = NULL, stdout = NULL, folder = NUL
   check_step_files(input, stdout, folder, makes, log)
   check_patterns(needs, "needs")
   check_patterns(fails_if, "fails_if")
-  check_input(checkmate::check_number(time_limit, lower = 1e-3, finite = TRUE, null.ok = TRUE), "time_limit",
-              "It is in seconds.")
+  check_input(checkmate::check_number(time_limit, lower = 1e-3, finite = TRUE, null.ok = TRUE),
+              "time_limit", "It is in seconds.")
   check_input(checkmate::check_integerish(status, any.missing = FALSE, null.ok = TRUE), "status")
-  structure(list(command = c(command, words), input = input, stdout = stdout, folder = folder, makes = makes,
-                 needs = needs, fails_if = fails_if, log = log, time_limit = time_limit, status = status),
-            class = "amiss_program_step")
+  structure(list(command = c(command, words), input = input, stdout = stdout, folder = folder,
+                 makes = makes, needs = needs, fails_if = fails_if, log = log,
+                 time_limit = time_limit, status = status), class = "amiss_program_step")
 }
 
 check_step_files <- function(input, stdout, folder, makes, log, call = rlang::caller_env()) {
@@ -54,10 +59,10 @@ check_step_files <- function(input, stdout, folder, makes, log, call = rlang::ca
   }
   check_input(checkmate::check_string(stdout, min.chars = 1, null.ok = TRUE), "stdout", call = call)
   check_input(checkmate::check_string(folder, min.chars = 1, null.ok = TRUE), "folder", call = call)
-  check_input(checkmate::check_character(makes, min.chars = 1, any.missing = FALSE, null.ok = TRUE), "makes",
-              "Give names of files.", call = call)
-  check_input(checkmate::check_character(log, min.chars = 1, any.missing = FALSE, null.ok = TRUE), "log",
-              "Give names of files.", call = call)
+  check_input(checkmate::check_character(makes, min.chars = 1, any.missing = FALSE, null.ok = TRUE),
+              "makes", "Give names of files.", call = call)
+  check_input(checkmate::check_character(log, min.chars = 1, any.missing = FALSE, null.ok = TRUE),
+              "log", "Give names of files.", call = call)
   named <- list(stdout = stdout, folder = folder, makes = makes, log = log)
   for (name in names(named)) {
     files <- as.character(named[[name]])
@@ -66,20 +71,22 @@ check_step_files <- function(input, stdout, folder, makes, log, call = rlang::ca
 }
 
 check_patterns <- function(patterns, name, call = rlang::caller_env()) {
-  check_input(checkmate::check_character(patterns, min.chars = 1, any.missing = FALSE, null.ok = TRUE), name,
-              "Give regular expressions.", call = call)
+  check_input(
+    checkmate::check_character(patterns, min.chars = 1, any.missing = FALSE, null.ok = TRUE), name,
+    "Give regular expressions.", call = call)
   for (pattern in patterns) {
     fine <- tryCatch(is.logical(grepl(pattern, "", perl = TRUE)), error = function(e) FALSE,
                      warning = function(w) FALSE)
-    if (!fine) abort_input("{.arg {name}} = {.val {pattern}} is no regular expression.", call = call)
+    if (!fine)
+      abort_input("{.arg {name}} = {.val {pattern}} is no regular expression.", call = call)
   }
 }
 
 #' @export
 print.amiss_program_step <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Step} {.code {step_words_of(x)}}")
-  facts <- c("in the folder" = x$folder, "must write" = x$makes, "must say" = x$needs, "fails if it says" = x$fails_if,
-             "seconds at most:" = x$time_limit)
+  facts <- c("in the folder" = x$folder, "must write" = x$makes, "must say" = x$needs,
+             "fails if it says" = x$fails_if, "seconds at most:" = x$time_limit)
   say_bullets(paste(names(facts), facts, recycle0 = TRUE))
 })
 
@@ -89,7 +96,8 @@ step_words_of <- function(step) {
   paste(ifelse(plain, step$command, shQuote(step$command)), collapse = " ")
 }
 
-# A command as a list of steps, each with names of its own for the files of its output: a character vector is one step.
+# A command as a list of steps, each with names of its own for the files of its output: a character
+# vector is one step.
 as_steps <- function(command, call = rlang::caller_env()) {
   if (is.character(command)) command <- list(do.call(program_step, as.list(unname(command))))
   if (inherits(command, "amiss_program_step")) command <- list(command)

@@ -1,10 +1,12 @@
-# Long work shows itself: at a terminal in a line that changes (package cli), elsewhere, as in log files, in a line now
-# and then; in tests and in documents that knitr makes, not at all. Help page of the package: options.
+# Long work shows itself: at a terminal in a line that changes (package cli), elsewhere, as in log
+# files, in a line now and then; in tests and in documents that knitr makes, not at all. Help page
+# of the package: options.
 
 progress_way <- function() {
   asked <- getOption("amiss.progress")
   if (!is.null(asked)) {
-    check_input(checkmate::check_choice(asked, c("bar", "lines", "none")), "options(amiss.progress)")
+    check_input(checkmate::check_choice(asked, c("bar", "lines", "none")),
+                "options(amiss.progress)")
     return(asked)
   }
   unwatched <- identical(Sys.getenv("TESTTHAT"), "true") || isTRUE(getOption("knitr.in.progress"))
@@ -35,7 +37,8 @@ tell_line <- function(text, .envir = parent.frame()) {
   told$at <- elapsed()
 }
 
-# Lines in a log are apart by a number of seconds and, of one piece of work, by a fifth of the time that it has taken.
+# Lines in a log are apart by a number of seconds and, of one piece of work, by a fifth of the time
+# that it has taken.
 tell_seldom <- function(text, began = elapsed()) {
   apart <- max(getOption("amiss.progress_interval", 30), (elapsed() - began) / 5)
   if (elapsed() - told$at >= apart) tell_line("{text}")
@@ -82,8 +85,8 @@ counted <- function(text, n, code) {
   })
 }
 
-# Another piece is done, or `done` of them in all. Workers of package future pass the condition on at once. Made by
-# hand: rlang::signal() takes a fifth of a millisecond, as long as many a run.
+# Another piece is done, or `done` of them in all. Workers of package future pass the condition on
+# at once. Made by hand: rlang::signal() takes a fifth of a millisecond, as long as many a run.
 piece_done <- function(done = NULL) {
   signalCondition(structure(class = c("amiss_piece_done", "immediateCondition", "condition"),
                             list(message = "", call = NULL, done = done)))

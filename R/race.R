@@ -1,5 +1,6 @@
-# Mechanisms as extensions of the present model: a trial of each from the present mode, as long as it can
-# still win; then those in front are verified, until the leader is exact and nobody can reach it.
+# Mechanisms as extensions of the present model: a trial of each from the present mode, as long as
+# it can still win; then those in front are verified, until the leader is exact and nobody can reach
+# it.
 
 # The present model as its trials see it: at its run of least squares.
 as_present <- function(model, catalogue, context) {
@@ -7,14 +8,16 @@ as_present <- function(model, catalogue, context) {
   if (model$level == "given") return(model)
   least <- model$least
   model$present <- list(at = least$at, slopes = least$slopes,
-                        history = tangent_at(model, least$at, least$slopes, moves_of(model, least), context)$history)
+                        history = tangent_at(model, least$at, least$slopes, moves_of(model, least),
+                                             context)$history)
   model
 }
 
-# A mechanism tried on the present model: a model at level "tried", or "silent" if it changes nothing.
-# `off`: the values of its parameters at which it is switched off, if they are known.
+# A mechanism tried on the present model: a model at level "tried", or "silent" if it changes
+# nothing. `off`: the values of its parameters at which it is switched off, if they are known.
 try_mechanism <- function(present, name, simulators, off, bar, context) {
-  model <- new_model(simulators, present$records, paste(present$name, "+", name), present$name, name)
+  model <- new_model(simulators, present$records, paste(present$name, "+", name),
+                     present$name, name)
   before <- runs_spent(context)
   looked <- look_at_mechanism(model, present, off, context)
   model <- looked$model
@@ -32,14 +35,15 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
   model
 }
 
-# A search from the most promising start of the first look. An extension holds the present model, with its mechanism
-# switched off, and cannot be worse: if the search ends below that, or no nearer to the record, it goes on from the next
-# start.
+# A search from the most promising start of the first look. An extension holds the present model,
+# with its mechanism switched off, and cannot be worse: if the search ends below that, or no nearer
+# to the record, it goes on from the next start.
 search_trial <- function(looked, context) {
   model <- looked$model
   best <- NULL
   for (start in utils::head(looked$starts, rules$trial_starts)) {
-    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps, looked$off_at)
+    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps,
+                           looked$off_at)
     search <- run_search(search, context)
     model <- search$model
     others <- c(best$at, looked$off_at)
@@ -59,9 +63,9 @@ comes_nearer <- function(model, at, off_at) {
   misfit[1] < misfit[2] - rules$decisive * log(10) * squared_nats(model, misfit[2])
 }
 
-# A first look: what is new at its ends and between, all else as in the present model. It shows where the
-# mechanism is switched off, and where searches may begin, the most promising first: list(model, silent, off,
-# off_at, starts).
+# A first look: what is new at its ends and between, all else as in the present model. It shows
+# where the mechanism is switched off, and where searches may begin, the most promising first:
+# list(model, silent, off, off_at, starts).
 look_at_mechanism <- function(model, present, off, context) {
   old <- names(present$parameters)
   new <- setdiff(names(model$parameters), old)
@@ -69,13 +73,15 @@ look_at_mechanism <- function(model, present, off, context) {
   z <- model$runs$z[integer(0), , drop = FALSE]
   from <- present$runs$z[present$present$at, ]
   place <- function(values) {
-    z <- matrix(0, nrow(values), length(model$parameters), dimnames = list(NULL, names(model$parameters)))
+    z <- matrix(0, nrow(values), length(model$parameters),
+                dimnames = list(NULL, names(model$parameters)))
     z[, kept] <- rep(from[kept], each = nrow(z))
     z[, new] <- values
     z
   }
   values <- first_values(model$space[match(new, names(model$parameters)), ])
-  if (!is.null(off)) values <- values[colSums(t(values) != off) > 0, , drop = FALSE]  # known already
+  # known already
+  if (!is.null(off)) values <- values[colSums(t(values) != off) > 0, , drop = FALSE]
   made <- with_runs(model, place(values), context)
   model <- made$model
   fine <- made$at[succeeded(model)[made$at]]
@@ -94,13 +100,16 @@ look_at_mechanism <- function(model, present, off, context) {
     fine <- c(off_at, fine + ncol(present$runs$outputs))
     change <- c(Inf, change)
   }
-  apart <- if (is.null(off_at)) fine else fine[change >= rules$off_change]  # switched off it is one start
-  starts <- lapply(apart, function(at) list(at = at, slopes = slopes_in(model, at, fine, new, slopes)))
+  # switched off it is one start
+  apart <- if (is.null(off_at)) fine else fine[change >= rules$off_change]
+  starts <- lapply(apart,
+                   function(at) list(at = at, slopes = slopes_in(model, at, fine, new, slopes)))
   value <- vapply(starts, profile_value, 0, model, present, context)
   list(model = model, silent = FALSE, off = off, off_at = off_at, starts = starts[order(-value)])
 }
 
-# Values of new parameters for the first look: all at their lower ends, all at their upper ends, and between.
+# Values of new parameters for the first look: all at their lower ends, all at their upper ends, and
+# between.
 first_values <- function(space) {
   n <- nrow(space)
   if (n == 0) return(matrix(0, 1, 0))
@@ -108,7 +117,8 @@ first_values <- function(space) {
   rbind(space$lower, space$upper, from_unit(between, space))
 }
 
-# Where the first look shows the output of the present model: a value of each new parameter, or NULL.
+# Where the first look shows the output of the present model: a value of each new parameter, or
+# NULL.
 switched_off <- function(model, looked, new, change) {
   least <- which.min(change)
   if (length(new) && change[least] < rules$off_change) model$runs$z[looked[least], new]
@@ -121,7 +131,8 @@ slopes_in <- function(model, at, looked, new, slopes) {
   weights <- ifelse(rowSums(ways^2) > 0, 1 / pmax(rowSums(ways^2), 1e-6)^2, 0)
   change <- model$runs$outputs[, looked, drop = FALSE] - model$runs$outputs[, at]
   gram <- crossprod(ways * sqrt(weights))
-  slopes[, new] <- change %*% (weights * ways) %*% solve(gram + diag(1e-3 * max(diag(gram)), length(new)))
+  slopes[, new] <- change %*% (weights * ways) %*% solve(
+    gram + diag(1e-3 * max(diag(gram)), length(new)))
   slopes
 }
 
@@ -131,13 +142,15 @@ profile_value <- function(start, model, present, context) {
   slopes <- start$slopes
   history <- present$present$history
   moves <- moves_of(model, start)
-  tangent <- tangent_given(model, model$runs$z[at, ], model$runs$outputs[, at], slopes, history, moves, context)
+  tangent <- tangent_given(model, model$runs$z[at, ], model$runs$outputs[, at], slopes, history,
+                           moves, context)
   z <- within_limits(tangent$mean, solve(tangent$covariance), model$space)
   output <- model$runs$outputs[, at] + slopes %*% (z - model$runs$z[at, ])
   values_of(model, output, rbind(z), history, moves, context)
 }
 
-# The posterior of a trial, checked by a few runs that then train, until they confirm it or it cannot win.
+# The posterior of a trial, checked by a few runs that then train, until they confirm it or it
+# cannot win.
 tried_model <- function(model, present, bar, context) {
   for (round in seq_len(rules$trial_rounds)) {
     found <- posterior_of(model, context, trial_ais, border = rules$border)
@@ -157,19 +170,22 @@ tried_model <- function(model, present, bar, context) {
 trial_ais <- list(pilot_chains = 128, groups = 4, max_groups = 8, max_sweeps = 12, precision = 0.3,
                   gradient = FALSE, importance_draws = 0)
 
-# Whether a trial needs no further runs: they confirm it, it could not win if they did, or it will be verified
-# whatever they say.
+# Whether a trial needs no further runs: they confirm it, it could not win if they did, or it will
+# be verified whatever they say.
 is_clear <- function(model, present, bar) {
   is_confirmed(model) || upper_bound(model, present) < bar || lower_bound(model, present) > bar
 }
 
-# What decides: the log10 Bayes factor with no unknown response to the conditions of the mechanism in either model.
+# What decides: the log10 Bayes factor with no unknown response to the conditions of the mechanism
+# in either model.
 log10_factor <- function(model, present) beside_unknown(model, present) + (model$taken %||% 0)
 
 # The same with such a response in both.
-beside_unknown <- function(model, present) (model$fit$log_evidence - present$fit$log_evidence) / log(10)
+beside_unknown <- function(model, present)
+  (model$fit$log_evidence - present$fit$log_evidence) / log(10)
 
-# What the log10 Bayes factor of a model may be at most, by its level; `leader` is the best model that is known.
+# What the log10 Bayes factor of a model may be at most, by its level; `leader` is the best model
+# that is known.
 upper_bound <- function(model, present, leader = present) {
   if (is_promising(model, present, leader)) return(Inf)
   log10_factor(model, present) + doubt_of(model, present)
@@ -184,8 +200,8 @@ factor_error <- function(model, present) {
   sqrt(model$fit$standard_error^2 + present$fit$standard_error^2) / log(10)
 }
 
-# A trial whose emulator runs refute, or about whose evidence they say nothing, though it is nearer to the record at its
-# best than the leader.
+# A trial whose emulator runs refute, or about whose evidence they say nothing, though it is nearer
+# to the record at its best than the leader.
 is_promising <- function(model, present, leader = present) {
   if (is_verified(model)) return(FALSE)
   is_open <- isFALSE(model$fit$check$passed) || factor_error(model, present) > rules$worst_error
@@ -194,23 +210,27 @@ is_promising <- function(model, present, leader = present) {
 
 least_error <- function(model) sqrt(mean(left_by_simulation(model$fit)^2))
 
-lower_bound <- function(model, present) 2 * log10_factor(model, present) - upper_bound(model, present)
+lower_bound <- function(model, present)
+  2 * log10_factor(model, present) - upper_bound(model, present)
 
 # What a mechanism must reach to be adopted, as far as the trials before it show.
 needed_factor <- function(trials, present, context) {
-  seen <- Filter(function(model) isTRUE(model$fit$trust$trusted) && !cannot_be_adopted(model, present), trials)
+  seen <- Filter(
+    function(model) isTRUE(model$fit$trust$trusted) && !cannot_be_adopted(model, present), trials)
   max(context$control$decisive, vapply(seen, lower_bound, 0, present))
 }
 
-# The next trial to verify, or NULL: of those that may be adopted and may lead the one of highest evidence, so that
-# what the others must reach is known early; then, of those whose evidence says nothing yet, the one that is nearest to
-# the record.
+# The next trial to verify, or NULL: of those that may be adopted and may lead the one of highest
+# evidence, so that what the others must reach is known early; then, of those whose evidence says
+# nothing yet, the one that is nearest to the record.
 next_to_verify <- function(trials, present, context) {
-  open <- Filter(function(model) model$level == "tried" && !cannot_be_adopted(model, present), trials)
+  open <- Filter(function(model) model$level == "tried" && !cannot_be_adopted(model, present),
+                 trials)
   if (!length(open)) return(NULL)
   needed <- context$control$decisive
   leader <- present
-  verified <- Filter(function(model) is_verified(model) && !cannot_be_adopted(model, present), trials)
+  verified <- Filter(function(model) is_verified(model) && !cannot_be_adopted(model, present),
+                     trials)
   factor <- vapply(verified, log10_factor, 0, present)
   if (any(factor >= needed)) {
     leader <- verified[[which.max(factor)]]
@@ -218,7 +238,8 @@ next_to_verify <- function(trials, present, context) {
   }
   bound <- vapply(open, upper_bound, 0, present, leader)
   likely <- open[bound >= needed & bound < Inf]
-  if (length(likely)) return(likely[[which.max(vapply(likely, log10_factor, 0, present))]]$mechanism)
+  if (length(likely))
+    return(likely[[which.max(vapply(likely, log10_factor, 0, present))]]$mechanism)
   near <- open[bound == Inf]
   if (length(near)) near[[which.min(vapply(near, least_error, 0))]]$mechanism
 }
@@ -229,7 +250,8 @@ cannot_be_adopted <- function(model, present) {
 }
 
 is_refused <- function(model, present) {
-  at_most <- beside_unknown(model, present) + if (is_verified(model)) 0 else doubt_of(model, present)
+  at_most <- beside_unknown(model, present) + if (is_verified(model)) 0
+                                              else doubt_of(model, present)
   error_ratio(model$fit, present$fit) > rules$fallen_error || speaks_against(at_most)
 }
 
@@ -239,7 +261,8 @@ settled_trial <- function(model, present, bar, context) {
   tried_model(model, present, bar, context)
 }
 
-# Whether a few runs more may show that a trial cannot win, for a tenth of what its verification costs: once.
+# Whether a few runs more may show that a trial cannot win, for a tenth of what its verification
+# costs: once.
 asks_for_checks <- function(model, present, bar) {
   is_open <- !is_confirmed(model) && !is_promising(model, present) && is.null(model$rechecked)
   is_open && (is_refused(model, present) || lower_bound(model, present) <= bar)
@@ -253,14 +276,16 @@ verify_trial <- function(model, present, context) {
   model
 }
 
-# A trial searched again from runs over all priors, far from where it ended: an extension may have a better mode
-# there, with another part of the model in the place that its mechanism takes. As it was if none is found.
+# A trial searched again from runs over all priors, far from where it ended: an extension may have a
+# better mode there, with another part of the model in the place that its mechanism takes. As it was
+# if none is found.
 widened_trial <- function(trial, present, bar, context) {
   model <- trial
   p <- length(model$parameters)
   unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
   model <- with_runs(model, from_unit(unit, model$space), context)$model
-  own <- list(at = trial$mode, slopes = secant_slopes(model, trial$mode, least_reference(model)), least = trial$least)
+  own <- list(at = trial$mode, slopes = secant_slopes(model, trial$mode, least_reference(model)),
+              least = trial$least)
   own[c("mean", "covariance", "history", "moves")] <- tangent_at(model, own$at, own$slopes,
                                                                moves_of(model, own$least), context)
   modes <- list(own)
@@ -282,8 +307,8 @@ widened_trial <- function(trial, present, bar, context) {
   trial
 }
 
-# If a step ends without a cause of the error, though much of it is left: trials searched again, the one nearest to the
-# record first, until one of them is its cause.
+# If a step ends without a cause of the error, though much of it is left: trials searched again, the
+# one nearest to the record first, until one of them is its cause.
 second_look <- function(present, trials, context) {
   for (name in nearest_first(trials)) {
     if (is_spent(context)) break
@@ -313,11 +338,12 @@ has_cause <- function(trials, present, context) {
 
 # Whether a model leaves little of the error, or of what was beyond the noise.
 takes_error <- function(model, present) {
-  !leaves_much(model) || left_over_noise(model)^2 - 1 < rules$cause_leaves * (left_over_noise(present)^2 - 1)
+  !leaves_much(model) ||
+    left_over_noise(model)^2 - 1 < rules$cause_leaves * (left_over_noise(present)^2 - 1)
 }
 
-# Whether what the simulation leaves at its best is large beside the noise; fitted parameters are no agreement. Of given
-# runs there are no others to look at.
+# Whether what the simulation leaves at its best is large beside the noise; fitted parameters are no
+# agreement. Of given runs there are no others to look at.
 leaves_much <- function(model) {
   model$level != "given" && left_over_noise(model) > rules$large_remainder
 }
@@ -334,7 +360,8 @@ race <- function(present, trials, context) {
     name <- next_to_verify(trials, present, context)
     if (is.null(name) || is_spent(context)) break
     bar <- needed_factor(trials[names(trials) != name], present, context)
-    trials[[name]] <- staged(paste("verifying", name), settled_trial(trials[[name]], present, bar, context))
+    trials[[name]] <- staged(paste("verifying", name),
+                             settled_trial(trials[[name]], present, bar, context))
     report_trial(trials[[name]], present, context)
   }
   trials
@@ -348,7 +375,8 @@ report_trial <- function(trial, present, context) {
   context$say("  {trial$mechanism}: {what}")
   if (trial$level == "silent") warn_no_response(trial$mechanism)
   if (trial$level == "untried") {
-    warn_result(c("Mechanism {.val {trial$mechanism}} could not be tried: every run of its first look failed.",
+    warn_result(c(paste("Mechanism {.val {trial$mechanism}} could not be tried: every run of its",
+                        "first look failed."),
                   i = "Run its simulator at a point of its priors, and see what it returns."),
                 class = "amiss_warning_trial")
   }
@@ -360,7 +388,8 @@ report_trial <- function(trial, present, context) {
 
 warn_no_response <- function(mechanism) {
   warn_input(c(
-    "Mechanism {.val {mechanism}} changes nothing: every run with it is that of the model without it.",
-    i = paste("Does this record hold what it acts on, and does the simulator use its parameters? See",
-              "{.code vignette(\"mechanisms\")}, Inside a simulator.")))
+    paste("Mechanism {.val {mechanism}} changes nothing: every run with it is that of the model",
+          "without it."),
+    i = paste("Does this record hold what it acts on, and does the simulator use its parameters?",
+              "See {.code vignette(\"mechanisms\")}, Inside a simulator.")))
 }

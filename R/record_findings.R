@@ -1,14 +1,16 @@
-# What a record shows by itself: values that cannot be measurements. record_findings() is a function of the table
-# alone. What is natural for a condition is none: zeros (night, no rain, off), few levels (switches, schedules, set
-# points), and either end of what something controlled can do.
+# What a record shows by itself: values that cannot be measurements. record_findings() is a function
+# of the table alone. What is natural for a condition is none: zeros (night, no rain, off), few
+# levels (switches, schedules, set points), and either end of what something controlled can do.
 
-# Codes of loggers and file formats for a value that is missing; any as large as 1e20 counts as one, too.
-missing_codes <- c(-99, -99.9, -99.99, -999, -999.9, -999.99, -6999, -7999, -9999, -9999.9, -99999, -999999, 999, 999.9,
-                   9999, 9999.9, 99999, 999999, 32767, -32768, 65535, 2147483647, -2147483648)
+# Codes of loggers and file formats for a value that is missing; any as large as 1e20 counts as one,
+# too.
+missing_codes <- c(-99, -99.9, -99.99, -999, -999.9, -999.99, -6999, -7999, -9999, -9999.9, -99999,
+                   -999999, 999, 999.9, 9999, 9999.9, 99999, 999999, 32767, -32768, 65535,
+                   2147483647, -2147483648)
 direction_codes <- c(990, 991)  # variable, calm
 
-# Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The next looks at what is left: at
-# the other rows, and at nothing if all are concerned.
+# Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The next looks
+# at what is left: at the other rows, and at nothing if all are concerned.
 record_checks <- list(
   missing_code = function(x) code_finding(x),
   far_outside = function(x) far_finding(x),
@@ -20,23 +22,26 @@ record_checks <- list(
   quantised = function(x) if (x$is_target) quantised_finding(x),
   repeated = function(x) if (x$is_target || !has_few_levels(x$v)) repeated_finding(x))
 
-# `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of a table by name,
-# the use of each row, the noise of a single reading, and how many rows an average takes. Returns a data frame with a
-# row for each finding: its `id`, the `column`, its `rows` (all, if none is listed), the `value`, and what it `says`.
+# `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of
+# a table by name, the use of each row, the noise of a single reading, and how many rows an average
+# takes. Returns a data frame with a row for each finding: its `id`, the `column`, its `rows` (all,
+# if none is listed), the `value`, and what it `says`.
 record_findings <- function(record) {
-  found <- lapply(names(record$columns), function(name) column_findings(record_column(record, name)))
+  found <- lapply(names(record$columns),
+                  function(name) column_findings(record_column(record, name)))
   do.call(rbind, c(list(no_findings()), unlist(found, recursive = FALSE)))
 }
 
 no_findings <- function() {
-  data.frame(id = character(), column = character(), rows = I(list()), value = numeric(), says = character())
+  data.frame(id = character(), column = character(), rows = I(list()), value = numeric(),
+             says = character())
 }
 
 record_column <- function(record, name) {
   v <- as.numeric(record$columns[[name]])
   v[!is.finite(v)] <- NA
-  x <- list(name = name, is_target = name == record$target, is_condition = name %in% record$conditions,
-            is_circular = name %in% record$circular)
+  x <- list(name = name, is_target = name == record$target,
+            is_condition = name %in% record$conditions, is_circular = name %in% record$circular)
   # A target that is not compared does no harm.
   if (x$is_target) v[!record$use %in% c("calibrate", "validate")] <- NA
   c(list(v = v), x, record[c("use", "noise_sd", "per_step")])
@@ -47,8 +52,8 @@ column_findings <- function(x) {
   for (id in names(record_checks)) {
     one <- record_checks[[id]](x)
     if (is.null(one)) next
-    found[[id]] <- data.frame(id = id, column = x$name, rows = I(list(as.integer(one$rows))), value = one$value,
-                              says = one$says)
+    found[[id]] <- data.frame(id = id, column = x$name, rows = I(list(as.integer(one$rows))),
+                              value = one$value, says = one$says)
     if (is.null(one$rows)) break
     x$v[one$rows] <- NA
   }
@@ -58,13 +63,14 @@ column_findings <- function(x) {
 # Those of the target, of the conditions analysed and of what else a simulator reads.
 findings_read <- function(measurements, drivers = character()) {
   found <- measurements$findings
-  found[found$column %in% c(measurements$target, measurements$conditions, measurements$constant, drivers), ]
+  found[found$column %in% c(measurements$target, measurements$conditions, measurements$constant,
+                            drivers), ]
 }
 
 # ---- codes for what is missing, and values far outside
 
-# Codes that stand apart from all other values: farther than three times what ever lies between two of those, or below
-# zero where nothing else is.
+# Codes that stand apart from all other values: farther than three times what ever lies between two
+# of those, or below zero where nothing else is.
 coded_rows <- function(v, is_circular = FALSE) {
   at <- which(stands_for_missing(v, c(missing_codes, if (is_circular) direction_codes)))
   rest <- sort(unique(v[is.finite(v) & !seq_along(v) %in% at]))
@@ -98,16 +104,18 @@ far_finding <- function(x) {
   if (!length(rows)) return(NULL)
   values <- unique(x$v[rows])
   usual <- format_each(signif(range(x$v[-rows], na.rm = TRUE), 4))
-  told <- if (length(values) > 3) paste(listed(usual_ends(values), "to")) else listed(format_each(values), "or")
-  list(rows = rows, value = values[1],
-       says = sprintf("%s is %s in %s, far outside all other values (%s to %s): correct these rows, or set them to NA.",
-                      x$name, told, rows_words(rows), usual[1], usual[2]))
+  told <- if (length(values) > 3) paste(listed(usual_ends(values), "to"))
+          else listed(format_each(values), "or")
+  list(rows = rows, value = values[1], says = sprintf(
+    paste("%s is %s in %s, far outside all other values (%s to %s): correct these rows, or set",
+          "them to NA."), x$name, told, rows_words(rows), usual[1], usual[2]))
 }
 
 usual_ends <- function(values) format_each(signif(range(values), 4))
 
-# Rows beyond a gap that is wider than all that lies inside of it, going outwards from the middle nine tenths of the
-# distinct values. Amounts (never negative, often zero) have long tails and count by their roots.
+# Rows beyond a gap that is wider than all that lies inside of it, going outwards from the middle
+# nine tenths of the distinct values. Amounts (never negative, often zero) have long tails and count
+# by their roots.
 far_rows <- function(v) {
   size <- if (are_amounts(v)) sqrt(v) else v
   u <- sort(unique(size))
@@ -150,12 +158,13 @@ range_finding <- function(x) {
   at <- vapply(ends, `[[`, 0, "end")
   limits <- c(lower = "-Inf", upper = "Inf")
   limits[names(at)] <- format_each(at)
-  extreme <- if (length(at) > 1) "both ends" else switch(names(at), lower = "its least value", "its largest value")
-  list(rows = rows, value = unname(at[1]),
-       says = sprintf(paste("%s is %s, %s, in %d of %d rows: the range of its sensor seems to end there. Give range =",
-                            "c(%s, %s) to leave these rows out of the comparison."), x$name,
-                      listed(format_each(at), "or"), extreme, length(rows), sum(!is.na(x$v)), limits[["lower"]],
-                      limits[["upper"]]))
+  extreme <- if (length(at) > 1) "both ends"
+             else switch(names(at), lower = "its least value", "its largest value")
+  list(rows = rows, value = unname(at[1]), says = sprintf(
+    paste("%s is %s, %s, in %d of %d rows: the range of its sensor seems to end there. Give range",
+          "= c(%s, %s) to leave these rows out of the comparison."), x$name,
+    listed(format_each(at), "or"), extreme, length(rows), sum(!is.na(x$v)), limits[["lower"]],
+    limits[["upper"]]))
 }
 
 # ---- readings that repeat
@@ -170,7 +179,8 @@ value_runs <- function(v) {
   list(first = first[kept], length = runs$lengths[kept], value = runs$values[kept])
 }
 
-# Much longer than nine in ten of the column's runs. What drives has no noise, and may rest at either end of its range.
+# Much longer than nine in ten of the column's runs. What drives has no noise, and may rest at
+# either end of its range.
 stuck_finding <- function(x) {
   runs <- value_runs(x$v)
   if (length(runs$length) < 10) return(NULL)
@@ -178,10 +188,11 @@ stuck_finding <- function(x) {
   long <- runs$length > max(rules$stuck_runs * usual, if (!x$is_target) rules$stuck_rows)
   if (!x$is_target) long <- long & !runs$value %in% range(x$v, na.rm = TRUE)
   if (!any(long)) return(NULL)
-  rows <- unlist(Map(function(first, n) seq(first, length.out = n), runs$first[long], runs$length[long]))
-  list(rows = rows, value = runs$value[long][1],
-       says = sprintf("%s is %s in all of %s: its sensor seems to be stuck. Set these readings to NA.", x$name,
-                      listed(format_each(unique(runs$value[long]))), rows_words(rows)))
+  rows <- unlist(Map(function(first, n) seq(first, length.out = n), runs$first[long],
+                     runs$length[long]))
+  list(rows = rows, value = runs$value[long][1], says = sprintf(
+    "%s is %s in all of %s: its sensor seems to be stuck. Set these readings to NA.", x$name,
+    listed(format_each(unique(runs$value[long]))), rows_words(rows)))
 }
 
 # Changes of value stand a whole number of rows apart.
@@ -190,9 +201,9 @@ repeated_finding <- function(x) {
   if (length(changes) < 10) return(NULL)
   times <- common_spacing(changes)
   if (times < 2 || x$per_step %% times == 0) return(NULL)
-  list(value = times,
-       says = sprintf(paste("%s changes every %d rows at most: each value stands in %d rows. Give average as long as",
-                            "these, or readings of every row."), x$name, times, times))
+  list(value = times, says = sprintf(paste("%s changes every %d rows at most: each value stands in",
+                                           "%d rows. Give average as long as these, or readings of",
+                                           "every row."), x$name, times, times))
 }
 
 # The largest spacing that nineteen in twenty of the places share.
@@ -217,28 +228,31 @@ value_step <- function(v) {
 quantised_finding <- function(x) {
   step <- value_step(x$v)
   if (is.null(step) || step <= rules$coarse_step * x$noise_sd) return(NULL)
-  list(value = step,
-       says = sprintf(paste("%s comes in steps of %s, coarse for a noise of %s: use finer readings, or state a noise",
-                            "of %s at least."), x$name, short(step), short(x$noise_sd), short(step / sqrt(12))))
+  list(value = step, says = sprintf(paste("%s comes in steps of %s, coarse for a noise of %s: use",
+                                          "finer readings, or state a noise of %s at least."),
+                                    x$name, short(step), short(x$noise_sd), short(step / sqrt(12))))
 }
 
 # ---- what is no quantity of its own
 
-# Degrees jump between the ends of the circle, and neighbours are close when taken around it. Those that never do may
-# have the name of a direction.
+# Degrees jump between the ends of the circle, and neighbours are close when taken around it. Those
+# that never do may have the name of a direction.
 direction_finding <- function(x) {
   v <- x$v[!is.na(x$v)]
   if (has_few_levels(v) || min(v) < -180 || max(v) > 360 || min(v) < 0 && max(v) > 180) return(NULL)
-  is_named <- grepl("^(w|wind)?_?(d|dir)$|direction|dir_|_dir|wind_?dir|azimuth", x$name, ignore.case = TRUE)
+  is_named <- grepl("^(w|wind)?_?(d|dir)$|direction|dir_|_dir|wind_?dir|azimuth", x$name,
+                    ignore.case = TRUE)
   jumps <- circle_jumps(v)
   if (jumps < 2 && !(is_named && diff(range(v)) > 90)) return(NULL)
   list(value = jumps,
-       says = sprintf("%s looks like a direction in degrees (%s): write circular(%s) in boundary.", x$name,
-                      if (jumps) sprintf("it jumps %d times from one end of the circle to the other", jumps)
-                      else sprintf("its name, and values from %s to %s", short(min(v)), short(max(v))), x$name))
+       says = sprintf(
+         "%s looks like a direction in degrees (%s): write circular(%s) in boundary.", x$name,
+         if (jumps) sprintf("it jumps %d times from one end of the circle to the other", jumps)
+         else sprintf("its name, and values from %s to %s", short(min(v)), short(max(v))), x$name))
 }
 
-# How often neighbours lie at either end of the circle, if they then are close and all its quarters occur.
+# How often neighbours lie at either end of the circle, if they then are close and all its quarters
+# occur.
 circle_jumps <- function(v) {
   pairs <- cbind(v[-length(v)], v[-1])
   pairs <- pairs[rowSums(pairs == 0) == 0, , drop = FALSE]  # zero is off, or calm
@@ -258,9 +272,9 @@ counter_finding <- function(x) {
   if (length(unique(signif(rise, 6))) <= 5) return(NULL)
   resets <- v[fall + 1] <= min(v) + 0.1 * diff(range(v)) & -change[fall] > 3 * max(rise)
   if (!all(resets)) return(NULL)
-  list(value = length(fall),
-       says = sprintf(paste("%s only rises, and is reset %s: it is a counter. Give its change over each row."), x$name,
-                      if (length(fall) > 1) paste(length(fall), "times") else "once"))
+  list(value = length(fall), says = sprintf(
+    paste("%s only rises, and is reset %s: it is a counter. Give its change over each row."),
+    x$name, if (length(fall) > 1) paste(length(fall), "times") else "once"))
 }
 
 # What calibration cannot show, though the held-out rows have it.
@@ -268,9 +282,9 @@ constant_finding <- function(x) {
   values <- function(use) unique(x$v[x$use == use & !is.na(x$v)])
   seen <- values("calibrate")
   if (!x$is_condition || length(seen) != 1 || all(values("validate") == seen)) return(NULL)
-  list(value = seen,
-       says = sprintf(paste("%s is %s in all rows that calibrate, but not in those held out: what it does cannot be",
-                            "learned. Calibrate on rows in which it varies."), x$name, format(seen)))
+  list(value = seen, says = sprintf(paste("%s is %s in all rows that calibrate, but not in those",
+                                          "held out: what it does cannot be learned. Calibrate on",
+                                          "rows in which it varies."), x$name, format(seen)))
 }
 
 # Row numbers as ranges, the first few of them.

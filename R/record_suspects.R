@@ -1,10 +1,10 @@
-# Faults of a record that only a simulation shows: clocks that differ, a start that is not forgotten, a step of a
-# sensor, a condition whose sensor ends or is coarse. Each changes what the base model simulates; it is suspected if
-# the base model's error then falls decisively, by most of what exceeds the noise, and no less than with what was
-# adopted.
+# Faults of a record that only a simulation shows: clocks that differ, a start that is not
+# forgotten, a step of a sensor, a condition whose sensor ends or is coarse. Each changes what the
+# base model simulates; it is suspected if the base model's error then falls decisively, by most of
+# what exceeds the noise, and no less than with what was adopted.
 
-# The suspects of all records, as record_findings() gives them: `record`, `id`, `column`, `says`. `runs`: how many runs
-# of the simulator may be made.
+# The suspects of all records, as record_findings() gives them: `record`, `id`, `column`, `says`.
+# `runs`: how many runs of the simulator may be made.
 record_suspects <- function(models, measurements, threads, runs = Inf) {
   ends <- models[unique(c(1, length(models)))]
   views <- lapply(ends, each_view, measurements)
@@ -23,21 +23,23 @@ suspect_case <- function(base, adopted, threads, runs) {
   fit <- base$model$fit
   m <- base$measurements
   error <- left_at_best(fit)
-  if (length(error) < 20 || !all(is.finite(error)) || mean(error^2) < rules$excess_error * m$noise_sd^2) return(NULL)
-  case <- list(fit = fit, measurements = m, noise = m$noise_sd, y = m$y[fit$rows], hours = m$hours[fit$rows],
-               segment = m$segment[fit$rows], simulated = m$y[fit$rows] - error, slopes = emulated_slopes(fit),
-               threads = threads, runs = runs)
+  if (length(error) < 20 || !all(is.finite(error)) ||
+      mean(error^2) < rules$excess_error * m$noise_sd^2) return(NULL)
+  case <- list(fit = fit, measurements = m, noise = m$noise_sd, y = m$y[fit$rows],
+               hours = m$hours[fit$rows], segment = m$segment[fit$rows],
+               simulated = m$y[fit$rows] - error, slopes = emulated_slopes(fit), threads = threads,
+               runs = runs)
   if (!is.null(adopted)) {
     p <- adopted$prediction[adopted$prediction$use == "calibrate", ]
-    case$adopted <- list(left = p$observed - p$mean,
-                         more = length(drawn_parameters(adopted$fit)) - length(drawn_parameters(fit)))
+    case$adopted <- list(left = p$observed - p$mean, more = length(drawn_parameters(adopted$fit)) -
+                                                            length(drawn_parameters(fit)))
   }
   case$before <- left_with(case)
   case
 }
 
-# What is left of the record beside a simulation, by least squares in the model's parameters under their priors, and in
-# the amounts of `extra` columns; NA where the simulation is.
+# What is left of the record beside a simulation, by least squares in the model's parameters under
+# their priors, and in the amounts of `extra` columns; NA where the simulation is.
 left_with <- function(case, simulated = case$simulated, slopes = case$slopes, extra = NULL) {
   r <- case$y - simulated
   x <- cbind(slopes, extra)
@@ -51,8 +53,8 @@ left_with <- function(case, simulated = case$simulated, slopes = case$slopes, ex
   list(left = left, amounts = amounts[-seq_len(ncol(slopes))])
 }
 
-# log10 of how much more probable the errors are when `left` than when `before`, if `more` parameters do it; errors
-# count as normal, and as fewer by the autocorrelation that is left.
+# log10 of how much more probable the errors are when `left` than when `before`, if `more`
+# parameters do it; errors count as normal, and as fewer by the autocorrelation that is left.
 error_gain <- function(before, left, more) {
   there <- is.finite(left) & is.finite(before)
   left <- left[there]
@@ -72,27 +74,32 @@ excess_share <- function(before, left, noise) {
 strongest_suspect <- function(case) {
   tried <- c(clock_suspects(case), start_suspects(case), step_suspects(case))
   best <- best_suspect(tried, case)
-  if (is.null(best)) best <- best_suspect(c(driver_clock_suspects(case), range_suspects(case)), case)
+  if (is.null(best))
+    best <- best_suspect(c(driver_clock_suspects(case), range_suspects(case)), case)
   best
 }
 
 best_suspect <- function(tried, case) {
   tried <- Filter(Negate(is.null), tried)
   if (!length(tried)) return(NULL)
-  gains <- vapply(tried, function(s) error_gain(case$before$left, s$left, s$more), 0) - log10(length(tried))
+  gains <- vapply(tried, function(s) error_gain(case$before$left, s$left, s$more), 0) -
+    log10(length(tried))
   best <- tried[[which.max(gains)]]
   holds <- max(gains) >= rules$decisive &&
-    excess_share(case$before$left, best$left, case$noise) >= rules$excess_gone && !is_beaten(best, case)
+    excess_share(case$before$left, best$left, case$noise) >= rules$excess_gone &&
+    !is_beaten(best, case)
   if (holds) best
 }
 
 # Whether what was adopted explains the error decisively better.
 is_beaten <- function(suspect, case) {
   if (is.null(case$adopted)) return(FALSE)
-  error_gain(suspect$left, case$adopted$left + 0 * suspect$left, case$adopted$more - suspect$more) >= rules$decisive
+  error_gain(suspect$left, case$adopted$left + 0 * suspect$left,
+             case$adopted$more - suspect$more) >= rules$decisive
 }
 
-suspect <- function(id, column, found, more, ...) list(id = id, column = column, left = found$left, more = more, ...)
+suspect <- function(id, column, found, more, ...)
+  list(id = id, column = column, left = found$left, more = more, ...)
 
 # ---- clocks
 
@@ -120,13 +127,15 @@ lagged_by <- function(case, x, lag) {
 clock_suspects <- function(case) {
   lags <- clock_lags(case)
   shifted <- lapply(lags, function(lag) {
-    list(simulated = lagged_by(case, case$simulated, lag)[, 1], slopes = lagged_by(case, case$slopes, lag))
+    list(simulated = lagged_by(case, case$simulated, lag)[, 1],
+         slopes = lagged_by(case, case$slopes, lag))
   })
   whole <- Map(function(lag, s) {
     suspect("clock", case$measurements$target, left_with(case, s$simulated, s$slopes), 1, lag = lag)
   }, lags, shifted)
   hour <- abs(lags) == 1
-  c(whole, unlist(Map(function(lag, s) changed_clock(case, lag, s), lags[hour], shifted[hour]), recursive = FALSE))
+  c(whole, unlist(Map(function(lag, s) changed_clock(case, lag, s), lags[hour], shifted[hour]),
+                  recursive = FALSE))
 }
 
 # The clock differs from a row on, or up to it, as with daylight saving.
@@ -149,13 +158,15 @@ places <- function(case, number) {
   unique(round(seq(0.08 * n, 0.92 * n, length.out = min(number, n))))
 }
 
-# One driver: runs with it a step early and late show along what the error falls; if along none, a day is tried.
+# One driver: runs with it a step early and late show along what the error falls; if along none, a
+# day is tried.
 driver_clock_suspects <- function(case) {
   if (!is_unsettled(case)) return(NULL)
   names <- moving_drivers(case)
   steps <- expand.grid(name = names, sign = c(1, -1), stringsAsFactors = FALSE)
   step_h <- case$measurements$raw$step_h
-  gains <- mapply(function(name, sign) first_gain(case, name, sign * step_h), steps$name, steps$sign)
+  gains <- mapply(function(name, sign) first_gain(case, name, sign * step_h), steps$name,
+                  steps$sign)
   best <- steps[which.max(gains), ]
   lags <- clock_lags(case)
   if (max(gains) < rules$decisive) return(driver_lags(case, names, lags[abs(lags) == 24]))
@@ -173,7 +184,8 @@ first_gain <- function(case, name, lag) {
 driver_lags <- function(case, names, lags) {
   pairs <- expand.grid(name = names, lag = lags, stringsAsFactors = FALSE)
   unlist(Map(function(name, lag) {
-    change <- with_driver(case, name, function(v, hours) lagged_driver(v, hours, lag)) - case$simulated
+    change <- with_driver(case, name, function(v, hours) lagged_driver(v, hours, lag)) -
+      case$simulated
     change[!is_known(case, lag)] <- NA
     of <- function(id, change, more, ...) {
       found <- left_with(case, extra = change)
@@ -207,18 +219,21 @@ moving_drivers <- function(case) {
   if (is.null(case$fit$best) || is.null(case$fit$emulator$simulator)) return(character())
   drivers <- case$measurements$raw$drivers
   names <- intersect(driver_names(case$fit$emulator$simulator), colnames(drivers))
-  names[vapply(names, function(name) all(is.finite(drivers[, name])) && diff(range(drivers[, name])) > 0, NA)]
+  names[vapply(
+    names, function(name) all(is.finite(drivers[, name])) && diff(range(drivers[, name])) > 0, NA)]
 }
 
-# A run at the base model's best, with a driver that `f` has changed in each segment; NA if it fails.
+# A run at the base model's best, with a driver that `f` has changed in each segment; NA if it
+# fails.
 with_driver <- function(case, name, f) {
   m <- case$measurements
   for (rows in split(seq_along(m$raw$hours), m$raw$segment)) {
-    if (length(rows) > 1) m$raw$drivers[rows, name] <- f(m$raw$drivers[rows, name], m$raw$hours[rows])
+    if (length(rows) > 1)
+      m$raw$drivers[rows, name] <- f(m$raw$drivers[rows, name], m$raw$hours[rows])
   }
   made <- tryCatch(suppress_run_warnings(suppressWarnings(
-    simulate_measured(case$fit$emulator$simulator, case$fit$best$values, m, "calibrate", case$threads)[, 1])),
-    error = function(e) case$simulated * NA)
+    simulate_measured(case$fit$emulator$simulator, case$fit$best$values, m, "calibrate",
+                      case$threads)[, 1])), error = function(e) case$simulated * NA)
   if (all(is.finite(made))) made else case$simulated
 }
 
@@ -236,7 +251,8 @@ start_suspects <- function(case) {
     decay <- vapply(long, function(part) ifelse(parts == part, exp(-since / time), 0), case$y)
     found <- left_with(case, extra = decay)
     if (!is_clear_amount(found, case)) return(NULL)
-    suspect("start", case$measurements$target, found, length(long) + 1, time = time, amount = found$amounts)
+    suspect("start", case$measurements$target, found, length(long) + 1, time = time,
+            amount = found$amounts)
   })
 }
 
@@ -257,8 +273,8 @@ step_suspects <- function(case) {
 
 # ---- conditions at the end of a range, or in coarse steps
 
-# A sensor that ends cuts off what lies beyond: each time an amount of its own, level and as an arc that goes on as the
-# values came and went.
+# A sensor that ends cuts off what lies beyond: each time an amount of its own, level and as an arc
+# that goes on as the values came and went.
 range_suspects <- function(case) {
   if (!is_unsettled(case)) return(NULL)
   unlist(lapply(moving_drivers(case), function(name) {
@@ -300,20 +316,21 @@ beyond_end <- function(v, end) {
   v
 }
 
-# Drivers in steps so coarse that half of one moves the simulation by a good part of the noise, where the error exceeds
-# the noise by as much.
+# Drivers in steps so coarse that half of one moves the simulation by a good part of the noise,
+# where the error exceeds the noise by as much.
 coarse_driver_suspects <- function(case) {
   if (!is_unsettled(case)) return(NULL)
   do.call(rbind, lapply(moving_drivers(case), function(name) {
     step <- coarse_value_step(case$measurements$raw$drivers[, name])
     if (is.null(step)) return(NULL)
-    shaken <- with_driver(case, name, function(v, hours) v + step * (with_seed(1, stats::runif(length(v))) - 0.5))
+    shaken <- with_driver(
+      case, name, function(v, hours) v + step * (with_seed(1, stats::runif(length(v))) - 0.5))
     moves <- rms(shaken - case$simulated)
     excess <- mean(case$before$left^2) - case$noise^2
     if (moves < case$noise / 2 || excess < moves^2 / 2) return(NULL)
-    data.frame(id = "quantised", column = name,
-               says = sprintf(paste("%s comes in steps of %s, which moves the simulation by %s, with a noise of %s:",
-                                    "use finer readings."), name, short(step), short(moves), short(case$noise)))
+    data.frame(id = "quantised", column = name, says = sprintf(
+      paste("%s comes in steps of %s, which moves the simulation by %s, with a noise of %s: use",
+            "finer readings."), name, short(step), short(moves), short(case$noise)))
   }))
 }
 
@@ -321,7 +338,8 @@ coarse_driver_suspects <- function(case) {
 coarse_value_step <- function(v) {
   step <- value_step(v)
   change <- abs(diff(v))
-  if (!is.null(step) && step >= 0.01 * diff(range(v)) && mean(change[change > 0] < 2.5 * step) > 0.5) step
+  if (!is.null(step) && step >= 0.01 * diff(range(v)) &&
+      mean(change[change > 0] < 2.5 * step) > 0.5) step
 }
 
 # ---- in words
@@ -329,33 +347,37 @@ coarse_value_step <- function(v) {
 suspect_words <- function(s, case) {
   if (is.null(s)) return(NULL)
   there <- is.finite(s$left)
-  s$fall <- sprintf("the base model's error falls from %s to %s", short(rms(case$before$left[there])),
+  s$fall <- sprintf("the base model's error falls from %s to %s",
+                    short(rms(case$before$left[there])),
                     with_unit(short(rms(s$left[there])), case$measurements$unit))
   data.frame(id = s$id, column = s$column, says = suspect_sentences[[s$id]](s, case))
 }
 
 suspect_sentences <- list(
   clock = function(s, case) {
-    sprintf("The clock of %s seems to be %s that of the rest: with it set right, %s.", s$column, behind_words(s, case),
-            s$fall)
+    sprintf("The clock of %s seems to be %s that of the rest: with it set right, %s.", s$column,
+            behind_words(s, case), s$fall)
   },
   daylight = function(s, case) {
-    sprintf(paste("The clock of %s seems to be %s that of the rest %s %s, as with daylight saving in one of them: with",
-                  "it set right, %s."), s$column, behind_words(s, case), if (s$later) "from" else "until",
+    sprintf(paste("The clock of %s seems to be %s that of the rest %s %s, as with daylight saving",
+                  "in one of them: with it set right, %s."),
+            s$column, behind_words(s, case), if (s$later) "from" else "until",
             at_words(s, case), s$fall)
   },
   start = function(s, case) {
-    sprintf(paste("The error decays from the first row (by half in %s h): the start is not forgotten. Give a warmup of",
-                  "%s h or more."), short(log(2) * s$time), short(4 * s$time))
+    sprintf(paste("The error decays from the first row (by half in %s h): the start is not",
+                  "forgotten. Give a warmup of %s h or more."), short(log(2) * s$time),
+            short(4 * s$time))
   },
   step_change = function(s, case) {
-    sprintf(paste("From %s on, %s lies %s %s than before, as if a sensor was moved or exchanged: with that taken off,",
-                  "%s."), at_words(s, case), s$column, with_unit(short(abs(s$amount)), case$measurements$unit),
+    sprintf(paste("From %s on, %s lies %s %s than before, as if a sensor was moved or exchanged:",
+                  "with that taken off, %s."), at_words(s, case), s$column,
+            with_unit(short(abs(s$amount)), case$measurements$unit),
             if (s$amount > 0) "higher" else "lower", s$fall)
   },
   range_end = function(s, case) {
-    sprintf("%s is %s in %d rows, as at the end of its sensor's range: with what may lie beyond, %s.", s$column,
-            format(s$end), length(s$rows), s$fall)
+    sprintf(paste("%s is %s in %d rows, as at the end of its sensor's range: with what may lie",
+                  "beyond, %s."), s$column, format(s$end), length(s$rows), s$fall)
   })
 
 # A target that is late is simulated with a lag; a driver that is late needs a lead.
@@ -375,7 +397,8 @@ at_words <- function(s, case) {
 record_faults <- function(upgrade) {
   suspects <- upgrade$models[[1]]$suspects
   c(read_findings(upgrade$models, upgrade$measurements),
-    stats::setNames(paste0(record_prefix(suspects$record), suspects$says, recycle0 = TRUE), suspects$id))
+    stats::setNames(paste0(record_prefix(suspects$record), suspects$says, recycle0 = TRUE),
+                    suspects$id))
 }
 
 record_prefix <- function(record) ifelse(nzchar(record), paste0(record, ": "), "")
@@ -392,13 +415,14 @@ read_findings <- function(models, measurements) {
   do.call(c, unname(told))
 }
 
-fault_words <- c(missing_code = "a code for missing values", far_outside = "values far outside all others",
-                 range_end = "readings at the end of a sensor's range", stuck = "a sensor that is stuck",
-                 quantised = "readings in coarse steps", repeated = "repeated values",
-                 direction = "a direction that is not circular()", counter = "a counter",
-                 constant = "a condition that is constant in calibration", clock = "clocks that differ",
-                 daylight = "clocks that differ", start = "a start that is not forgotten",
-                 step_change = "a step of a sensor")
+fault_words <- c(
+  missing_code = "a code for missing values", far_outside = "values far outside all others",
+  range_end = "readings at the end of a sensor's range", stuck = "a sensor that is stuck",
+  quantised = "readings in coarse steps", repeated = "repeated values",
+  direction = "a direction that is not circular()", counter = "a counter",
+  constant = "a condition that is constant in calibration", clock = "clocks that differ",
+  daylight = "clocks that differ", start = "a start that is not forgotten",
+  step_change = "a step of a sensor")
 
 record_doubt_words <- function(ids, subject = "the record itself") {
   if (length(ids)) paste(subject, "has", listed(unique(unname(fault_words[ids]))))

@@ -1,9 +1,9 @@
 # One of several records of an upgrade, as if it were the only one: what is told or drawn of it.
 
 record_model <- function(model, name) {
-  model[c("fit", "attribution", "prediction", "scores")] <-
-    list(model$fit$records[[name]], model$attribution$records[[name]], model$records[[name]]$prediction,
-         model$records[[name]]$scores)
+  model[c("fit", "attribution", "prediction", "scores")] <- list(
+    model$fit$records[[name]], model$attribution$records[[name]], model$records[[name]]$prediction,
+    model$records[[name]]$scores)
   model$records <- NULL
   model
 }

@@ -1,32 +1,37 @@
 #' Calibrate with few runs, checked by the simulator
 #'
-#' Searches for the mode by runs of the simulator, trains an emulator in the region of the mode, samples the
-#' posterior, and lets the simulator check the emulator where the posterior lies. The runs of a check also train:
-#' the next round has them. It ends when a check passes with enough to spare, or after `rounds`.
+#' Searches for the mode by runs of the simulator, trains an emulator in the region of the mode,
+#' samples the posterior, and lets the simulator check the emulator where the posterior lies. The
+#' runs of a check also train: the next round has them. It ends when a check passes with enough to
+#' spare, or after `rounds`.
 #'
-#' *Search.* From the run that is nearest to the record, and from others far from it, steps lead to the posterior
-#' under the line that touches the simulator; each run corrects the slopes of that line. The search ends when two
-#' starts lead to one mode. If no two do, the result is not trusted and says so.
+#' *Search.* From the run that is nearest to the record, and from others far from it, steps lead to
+#' the posterior under the line that touches the simulator; each run corrects the slopes of that
+#' line. The search ends when two starts lead to one mode. If no two do, the result is not trusted
+#' and says so.
 #'
-#' *Region.* About thirty runs in the ellipsoid that holds the posterior train an emulator whose mean is the
-#' simulator's tangent. The discrepancy keeps out of what the parameters do there, as far as its reach says
-#' ([calibrate()]), so that it does not depend on the runs with which the search began.
+#' *Region.* About thirty runs in the ellipsoid that holds the posterior train an emulator whose
+#' mean is the simulator's tangent. The discrepancy keeps out of what the parameters do there, as
+#' far as its reach says ([calibrate()]), so that it does not depend on the runs with which the
+#' search began.
 #'
-#' @param ensemble An ensemble: [simulate_design()] (twice as many runs as parameters, and two, are enough),
-#'   [refine_ensemble()], or [ensemble()], which can be checked, but not refined.
-#' @param rounds Most checks before the result is left as not trusted; 0 calibrates the ensemble as it is.
+#' @param ensemble An ensemble: [simulate_design()] (twice as many runs as parameters, and two, are
+#'   enough), [refine_ensemble()], or [ensemble()], which can be checked, but not refined.
+#' @param rounds Most checks before the result is left as not trusted; 0 calibrates the ensemble as
+#'   it is.
 #' @param runs Runs in the region of the mode, by default 25 or, if more, two for each
 #'   parameter.
-#' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and [calibrate()] take
-#'   them.
+#' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and
+#'   [calibrate()] take them.
 #' @inheritParams calibrate
 #' @inheritParams simulate_design
-#' @return A calibration as [calibrate()] gives; its `rounds` says how many checks were made, `runs_made` how many
-#'   runs of the simulator were made here, `modes` how many searches there were (`searches`) and whether two of
-#'   them agreed (`agree`).
-#' @source `vignette("algorithm", "amiss")`, *The simulator first*. Powell (2004), Least Frobenius norm updating of
-#'   quadratic models that satisfy interpolation conditions, Mathematical Programming 100, 183-215, and Moré (1978),
-#'   The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630, 105-116, for the search.
+#' @return A calibration as [calibrate()] gives; its `rounds` says how many checks were made,
+#'   `runs_made` how many runs of the simulator were made here, `modes` how many searches there were
+#'   (`searches`) and whether two of them agreed (`agree`).
+#' @source `vignette("algorithm", "amiss")`, *The simulator first*. Powell (2004), Least Frobenius
+#'   norm updating of quadratic models that satisfy interpolation conditions, Mathematical
+#'   Programming 100, 183-215, and Moré (1978), The Levenberg-Marquardt algorithm, Lecture Notes in
+#'   Mathematics 630, 105-116, for the search.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -39,8 +44,8 @@
 #' fit <- calibrate_refined(runs, room, control = quick, seed = 1)
 #' c(fit$rounds, fit$runs_made)
 #' @export
-calibrate_refined <- function(ensemble, measurements, rounds = rules$verify_rounds, runs = NULL, control = NULL,
-                              seed = NULL, threads = 1, quiet = FALSE) {
+calibrate_refined <- function(ensemble, measurements, rounds = rules$verify_rounds, runs = NULL,
+                              control = NULL, seed = NULL, threads = 1, quiet = FALSE) {
   hush(quiet)
   check_object(ensemble, "amiss_ensemble", "ensemble")
   check_object(measurements, "amiss_measurements", "measurements")
@@ -53,21 +58,25 @@ calibrate_refined <- function(ensemble, measurements, rounds = rules$verify_roun
 check_refining <- function(measurements, rounds, runs, control, call = rlang::caller_env()) {
   check_input(checkmate::check_count(rounds), "rounds", call = call)
   check_input(checkmate::check_count(runs, positive = TRUE, null.ok = TRUE), "runs", call = call)
-  for (m in measurements) check_run_number(runs %||% rules$local_runs, length(m$raw$hours), "runs", call)
-  check_training_size((runs %||% rules$local_runs) + rules$more_runs * rounds, "rounds", rounds, call)
+  for (m in measurements)
+    check_run_number(runs %||% rules$local_runs, length(m$raw$hours), "runs", call)
+  check_training_size((runs %||% rules$local_runs) + rules$more_runs * rounds, "rounds",
+                      rounds, call)
   control <- merge_control(list(emulator = list(), calibration = list()), control, call = call)
   for (m in measurements) check_controls_of(control, m, "history", call, attribution = FALSE)
   control
 }
 
-# One calibration of all ensembles: by a search if they know their simulators and rounds are asked for.
+# One calibration of all ensembles: by a search if they know their simulators and rounds are asked
+# for.
 calibrate_ensembles <- function(ensembles, measurements, rounds, runs, control, seed, threads) {
   context <- new_context(seed, threads, c(control, list(rounds = rounds)))
   searched <- rounds > 0 && all(vapply(ensembles, can_be_run, NA))
   fit <- if (searched) searched_fit(ensembles, measurements, runs, control, context)
          else given_model(ensembles, measurements, "the model", context)$fit
   for (one in record_fits(fit)) {
-    warn_coarse_basis(one$emulator, "control$emulator$max_vectors", if (length(ensembles) > 1) one$measurements$name)
+    warn_coarse_basis(one$emulator, "control$emulator$max_vectors",
+                      if (length(ensembles) > 1) one$measurements$name)
   }
   fit
 }
@@ -82,7 +91,8 @@ searched_fit <- function(ensembles, measurements, runs, control, context) {
 
 can_be_run <- function(ensemble) !is.null(ensemble$simulator)
 
-# The runs of ensembles that were made at the same points of all parameters. Held-out rows were not run then.
+# The runs of ensembles that were made at the same points of all parameters. Held-out rows were not
+# run then.
 with_known_runs <- function(model, ensembles) {
   n <- unique(vapply(ensembles, function(e) ncol(e$outputs), 0L))
   if (length(n) > 1) return(model)  # of some records runs failed
@@ -98,14 +108,16 @@ with_known_runs <- function(model, ensembles) {
 
 #' More runs where they matter
 #'
-#' A design spread over the priors has few runs where the posterior lies, the fewer the more the data say, and an
-#' emulator of it can be off there by more than it knows. This makes an ensemble of the region where a first posterior
-#' lies: the ellipsoid that holds it, in the coordinates in which the priors are standard normal, half as wide again
-#' where the posterior came near the end of the region before or the check by runs found the emulator surer than it was
-#' right. Its runs follow the axes of the ellipsoid, at all distances from its centre alike; runs of `ensemble` that lie
-#' inside join them, the last 40. An emulator of them holds in the region alone, and there a few dozen runs do what
-#' hundreds spread over the priors cannot. Parameters outside count as impossible; if the posterior comes near the end
-#' of the region, the check of [calibrate()] says so.
+#' A design spread over the priors has few runs where the posterior lies, the fewer the more the
+#' data say, and an emulator of it can be off there by more than it knows. This makes an ensemble of
+#' the region where a first posterior lies: the ellipsoid that holds it, in the coordinates in which
+#' the priors are standard normal, half as wide again where the posterior came near the end of the
+#' region before or the check by runs found the emulator surer than it was right. Its runs follow
+#' the axes of the ellipsoid, at all distances from its centre alike; runs of `ensemble` that lie
+#' inside join them, the last 40. An emulator of them holds in the region alone, and there a few
+#' dozen runs do what hundreds spread over the priors cannot. Parameters outside count as
+#' impossible; if the posterior comes near the end of the region, the check of [calibrate()] says
+#' so.
 #'
 #' @param ensemble An ensemble made by [simulate_design()], or by this.
 #' @param fit A calibration with the emulator trained on it ([calibrate()]).
@@ -135,20 +147,22 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
   threads <- check_threads(threads)
   if (is.null(ensemble$simulator)) {
     abort_input(c("The runs of this ensemble were made elsewhere, and so must more of them be.",
-                  i = "Run the simulator at draws of {.code fit$values} and give all runs to {.fun ensemble}."))
+                  i = paste("Run the simulator at draws of {.code fit$values} and give all runs to",
+                            "{.fun ensemble}.")))
   }
   if (!identical(names(ensemble$parameters), names(fit$emulator$parameters))) {
-    abort_input(paste("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the ensemble",
-                      "{.val {names(ensemble$parameters)}}."))
+    abort_input(paste("{.arg fit} has the parameters {.val {names(fit$emulator$parameters)}}, the",
+                      "ensemble {.val {names(ensemble$parameters)}}."))
   }
   if (nrow(ensemble$outputs) != length(fit$rows)) {
-    abort_input(
-      c("{.arg fit} was made on {length(fit$rows)} rows, the runs of {.arg ensemble} have {nrow(ensemble$outputs)}.",
+    abort_input(c(paste("{.arg fit} was made on {length(fit$rows)} rows, the runs of",
+                        "{.arg ensemble} have {nrow(ensemble$outputs)}."),
                   i = "Give the ensemble and the calibration of the same measurements."))
   }
   check_same_rows(ensemble$hours, fit$measurements)
-  # Where the posterior reached the end of its region, or the emulator was surer than it was right, it lies elsewhere in
-  # part. An emulator that knows how far it is off has widened the posterior already.
+  # Where the posterior reached the end of its region, or the emulator was surer than it was right,
+  # it lies elsewhere in part. An emulator that knows how far it is off has widened the posterior
+  # already.
   astray <- isTRUE(fit$check$border > rules$border || fit$check$z2 > 1)
   region <- posterior_region(fit, growth = if (astray) 1.5 else 1)
   regional_ensemble(ensemble, region, fit$emulator, fit$measurements, runs, threads)
@@ -163,8 +177,9 @@ regional_ensemble <- function(ensemble, region, emulator, measurements, runs, th
   inside <- utils::tail(which(in_region(region, ensemble$unit)), 40)
   new_ensemble(ensemble$parameters, rbind(ensemble$unit[inside, , drop = FALSE], unit),
                rbind(ensemble$values[inside, , drop = FALSE], values),
-               cbind(ensemble$outputs[, inside, drop = FALSE], outputs), ensemble$simulator, ensemble$seed, region,
-               without_simulator(emulator_over_priors(emulator)), hours = ensemble$hours)
+               cbind(ensemble$outputs[, inside, drop = FALSE], outputs), ensemble$simulator,
+               ensemble$seed, region, without_simulator(emulator_over_priors(emulator)),
+               hours = ensemble$hours)
 }
 
 # The simulator is kept once.

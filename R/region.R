@@ -8,8 +8,8 @@ new_region <- function(centre, root, radius, parameters) {
   list(centre = centre, root = root, radius = radius, uniform = are_flat(parameters))
 }
 
-# The straightened coordinates s of the engine's Region in those of coordinates.R: the point z at s = c, and dz/ds
-# there. Of a flat prior s is linear in z, of any other it is the normal quantile.
+# The straightened coordinates s of the engine's Region in those of coordinates.R: the point z at s
+# = c, and dz/ds there. Of a flat prior s is linear in z, of any other it is the normal quantile.
 straightened <- function(region, space) {
   spread <- sqrt(1 + rowSums(region$root^2))
   side <- stats::pnorm(region$centre / spread)
@@ -19,8 +19,8 @@ straightened <- function(region, space) {
        slope = ifelse(region$uniform, 2 * flat_limit * slope, per_normal(z, space)))
 }
 
-# Of points z (one a row), how far they lie from the centre of a region in its straightened coordinates, along its axes
-# (one a column).
+# Of points z (one a row), how far they lie from the centre of a region in its straightened
+# coordinates, along its axes (one a column).
 along_axes <- function(region, space, z) {
   straight <- straightened(region, space)
   apart <- t(to_normal(to_unit(z, space))) - region$centre
@@ -34,8 +34,8 @@ posterior_region <- function(fit, growth = 1) {
   region_of_draws(posterior_unit(fit), fit$weights, fit$emulator$parameters, growth)
 }
 
-# The ellipsoid that holds weighted draws in the unit cube. Tails that they do not show are allowed for
-# by their number and by the radius.
+# The ellipsoid that holds weighted draws in the unit cube. Tails that they do not show are allowed
+# for by their number and by the radius.
 region_of_draws <- function(unit, weights, parameters, growth = 1) {
   z <- to_normal(unit)
   w <- weights / sum(weights)
@@ -70,9 +70,9 @@ region_distance <- function(region, unit) {
 
 in_region <- function(region, unit) region_distance(region, unit) <= 1
 
-# n points of the unit cube for the emulator of a region: a Latin hypercube of directions and distances from the centre.
-# Spread evenly over the volume they would nearly all lie at its end: of seven parameters one run in a hundred would lie
-# as near to the centre as the posterior does.
+# n points of the unit cube for the emulator of a region: a Latin hypercube of directions and
+# distances from the centre. Spread evenly over the volume they would nearly all lie at its end: of
+# seven parameters one run in a hundred would lie as near to the centre as the posterior does.
 region_design <- function(region, n, seed) {
   p <- length(region$centre)
   u <- with_seed(seed, lhs::randomLHS(n, p + 1))

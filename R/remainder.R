@@ -1,5 +1,6 @@
-# What a model leaves of the calibration record, beside the stated noise, and whether the calendar shows in it: a
-# pattern that no boundary condition carries is of the clock (something at fixed hours) or of time itself (a drift).
+# What a model leaves of the calibration record, beside the stated noise, and whether the calendar
+# shows in it: a pattern that no boundary condition carries is of the clock (something at fixed
+# hours) or of time itself (a drift).
 
 remaining_error <- function(model, measurements) {
   p <- model$prediction[model$prediction$use == "calibrate", ]
@@ -10,13 +11,15 @@ remaining_error <- function(model, measurements) {
   list(ratio = ratio, large = ratio > rules$large_remainder,
        pattern = if (ratio > rules$large_remainder) {
          if (is_several(measurements)) worst_pattern(model, measurements)
-         else remainder_pattern(r, model$fit$rows, measurements, significant_conditions(model$attribution$table))
+         else remainder_pattern(r, model$fit$rows, measurements,
+                                significant_conditions(model$attribution$table))
        })
 }
 
 # The pattern in that of several records of which most remains.
 worst_pattern <- function(model, measurements) {
-  each <- lapply(each_view(model, measurements), function(view) remaining_error(view$model, view$measurements))
+  each <- lapply(each_view(model, measurements),
+                 function(view) remaining_error(view$model, view$measurements))
   seen <- Filter(function(left) !is.null(left$pattern), each)
   if (!length(seen)) return(NULL)
   worst <- names(which.max(vapply(seen, `[[`, 0, "ratio")))
@@ -24,8 +27,8 @@ worst_pattern <- function(model, measurements) {
   list(what = paste0("in ", worst, ": ", pattern$what), where = pattern$where)
 }
 
-# What it is and where to look, in words; NULL if the calendar explains less than half. What the error `answers` to may
-# be as slow as a drift.
+# What it is and where to look, in words; NULL if the calendar explains less than half. What the
+# error `answers` to may be as slow as a drift.
 remainder_pattern <- function(r, rows, measurements, answers) {
   hours <- measurements$hours[rows]
   clock <- clock_hour(measurements$time[rows])
@@ -35,19 +38,22 @@ remainder_pattern <- function(r, rows, measurements, answers) {
   if (!shares[best] > 0.5) return(NULL)
   if (names(shares)[best] == "drift") {
     ends <- stats::fitted(stats::lm(r ~ stats::poly(hours, 2)))[c(1, length(r))]
-    return(list(what = sprintf("it drifts, by %s from the beginning to the end of the calibration",
-                               with_unit(signed(unname(diff(ends))), unit)),
-                where = if (length(answers)) paste("It may be slow as", listed(answers), "may be, to which it answers.")
-                        else "Suspect a drifting sensor, or something slow that the inputs do not hold."))
+    return(list(
+      what = sprintf("it drifts, by %s from the beginning to the end of the calibration",
+                     with_unit(signed(unname(diff(ends))), unit)),
+      where = if (length(answers))
+                paste("It may be slow as", listed(answers), "may be, to which it answers.")
+              else "Suspect a drifting sensor, or something slow that the inputs do not hold."))
   }
   profile <- tapply(r, clock, mean)
   peak <- which.max(abs(profile - mean(r)))
   hour <- as.numeric(names(profile)[peak])
-  list(what = sprintf("every day around %s the measured %s is on average %s %s than simulated", clock_words(hour),
-                      measurements$target, with_unit(short(abs(profile[[peak]])), unit),
+  list(what = sprintf("every day around %s the measured %s is on average %s %s than simulated",
+                      clock_words(hour), measurements$target,
+                      with_unit(short(abs(profile[[peak]])), unit),
                       if (profile[[peak]] > 0) "higher" else "lower"),
-       where = paste("Look for something that follows the clock and is not among the inputs: a schedule, a switch, a",
-                     "habit."))
+       where = paste("Look for something that follows the clock and is not among the inputs: a",
+                     "schedule, a switch, a habit."))
 }
 
 # Hour of the day as the record's own clock shows it.
@@ -64,16 +70,17 @@ drift_share <- function(r, hours) {
   1 - sum(left^2) / sum((r - mean(r))^2)
 }
 
-# Share of the variance that a profile over the day explains, adjusted for its number of values; three days at least.
+# Share of the variance that a profile over the day explains, adjusted for its number of values;
+# three days at least.
 daily_share <- function(r, hours, clock) {
   bin <- factor(clock)
   if (diff(range(hours)) < 72 || nlevels(bin) < 4 || length(r) <= 2 * nlevels(bin)) return(0)
   summary(stats::lm(r ~ bin))$adj.r.squared
 }
 
-# TRUE where the evidence for all that was adopted is not decisively above that for a drift: a parabola in time beside
-# the base model, in amounts of the order of what that leaves or less (responses_factor()); of several records in those
-# that ask for it, in one at least.
+# TRUE where the evidence for all that was adopted is not decisively above that for a drift: a
+# parabola in time beside the base model, in amounts of the order of what that leaves or less
+# (responses_factor()); of several records in those that ask for it, in one at least.
 drift_rivals <- function(models, control, threads) {
   base <- models[[1]]$fit
   of_record <- unlist(lapply(record_fits(base), drift_evidence, threads))
@@ -82,7 +89,8 @@ drift_rivals <- function(models, control, threads) {
   bayes_factor(models[[length(models)]]$fit, base)$log10_bf < drift + control$decisive
 }
 
-# Whether a parabola in time holds nearly all that an extension of a model changes, at the centre of its posterior.
+# Whether a parabola in time holds nearly all that an extension of a model changes, at the centre of
+# its posterior.
 acts_as_drift <- function(parent, fit, threads) {
   slow <- mapply(function(before, after) {
     if (is.null(after$emulator$simulator)) return(FALSE)
@@ -90,10 +98,12 @@ acts_as_drift <- function(parent, fit, threads) {
     values <- unit_to_values(stats::pnorm(matrix(posterior_centre(after), 1)), parameters)
     run <- function(fit) {
       own <- values[, names(fit$emulator$parameters), drop = FALSE]
-      suppress_run_warnings(simulate_measured(fit$emulator$simulator, own, fit$measurements, "calibrate", threads))[, 1]
+      suppress_run_warnings(simulate_measured(fit$emulator$simulator, own, fit$measurements,
+                                              "calibrate", threads))[, 1]
     }
     change <- run(after) - run(before)
-    all(is.finite(change)) && any(change != 0) && drift_share(change, after$measurements$hours[after$rows]) > 0.99
+    all(is.finite(change)) && any(change != 0) &&
+      drift_share(change, after$measurements$hours[after$rows]) > 0.99
   }, record_fits(parent), record_fits(fit))
   all(slow)
 }
@@ -111,14 +121,15 @@ response_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps =
 
 response_scales <- c(1, 0.25, 0.0625)
 
-# What the record says of responses (rows x k) beside the model of a calibration, taken as its tangent: their
-# log10 Bayes factor against none, its 95 % interval and the word. Amounts are N(0, 1) times the scale that suits
-# the record best.
+# What the record says of responses (rows x k) beside the model of a calibration, taken as its
+# tangent: their log10 Bayes factor against none, its 95 % interval and the word. Amounts are N(0,
+# 1) times the scale that suits the record best.
 responses_factor <- function(fit, responses, threads, scales = response_scales) {
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   ais <- fill_ais_control(utils::modifyList(fit$control$ais, response_ais))
   evidence <- function(responses) {
-    call_engine(response_evidence_(data, fit$priors, fit$tangent, responses, ais, engine_context(fit$seed, threads)))
+    call_engine(response_evidence_(data, fit$priors, fit$tangent, responses, ais,
+                                   engine_context(fit$seed, threads)))
   }
   of <- lapply(scales, function(scale) evidence(scale * responses))
   nothing <- evidence(matrix(0, length(fit$rows), 0))

@@ -2,14 +2,16 @@
 
 #' Give parameters of a simulator other names
 #'
-#' Records that are calibrated together share the parameters of the same name ([calibrate_jointly()]): of two houses
-#' with the same walls and each its own doors, the doors' parameter takes another name in one of them.
+#' Records that are calibrated together share the parameters of the same name
+#' ([calibrate_jointly()]): of two houses with the same walls and each its own doors, the doors'
+#' parameter takes another name in one of them.
 #'
 #' @param simulator Any simulator.
 #' @param ... New names by the old ones: `door = "door of O5"`.
-#' @return An object of class `amiss_renamed`: a simulator that is the same but for the names. The `edit` of a
-#'   [mechanism()] gets the simulator with its own names.
-#' @section Errors: `amiss_error_input` if the simulator has no such parameter, or a new name is there already.
+#' @return An object of class `amiss_renamed`: a simulator that is the same but for the names. The
+#'   `edit` of a [mechanism()] gets the simulator with its own names.
+#' @section Errors: `amiss_error_input` if the simulator has no such parameter, or a new name is
+#'   there already.
 #' @examples
 #' linear <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 2)), boundary = "Te")
@@ -18,9 +20,11 @@
 rename_parameters <- function(simulator, ...) {
   check_simulator(simulator)
   to <- list(...)
-  check_input(checkmate::check_list(to, names = "unique", min.len = 1), "...", "Give new names by the old ones.")
+  check_input(checkmate::check_list(to, names = "unique", min.len = 1), "...",
+              "Give new names by the old ones.")
   for (name in names(to)) {
-    check_input(checkmate::check_string(to[[name]], min.chars = 1), name, "Give the new name of this parameter.")
+    check_input(checkmate::check_string(to[[name]], min.chars = 1), name,
+                "Give the new name of this parameter.")
   }
   to <- unlist(to)
   parameters <- free_parameters(simulator)
@@ -31,8 +35,8 @@ rename_parameters <- function(simulator, ...) {
   }
   twice <- c(to[to %in% setdiff(names(parameters), names(to))], to[duplicated(to)])
   if (length(twice)) abort_input("There would be two parameters {.val {unname(twice[1])}}.")
-  structure(list(name = if (is.character(simulator$name)) simulator$name else "simulator", simulator = simulator,
-                 to = to), class = "amiss_renamed")
+  structure(list(name = if (is.character(simulator$name)) simulator$name else "simulator",
+                 simulator = simulator, to = to), class = "amiss_renamed")
 }
 
 #' @export
@@ -49,15 +53,16 @@ free_parameters.amiss_renamed <- function(simulator) {
   names(parameters)[at] <- simulator$to
   for (name in simulator$to) {
     parameter <- parameters[[name]]
-    if (identical(parameter$label, parameter$name)) parameter$label <- name  # it had none of its own
+    # it had none of its own
+    if (identical(parameter$label, parameter$name)) parameter$label <- name
     parameter$name <- name
     parameters[[name]] <- parameter
   }
   parameters
 }
 
-# What an edit makes of a simulator: of one whose parameters go by other names, the simulator itself is edited, which is
-# what the edit knows, and those that it keeps go by the other names again.
+# What an edit makes of a simulator: of one whose parameters go by other names, the simulator itself
+# is edited, which is what the edit knows, and those that it keeps go by the other names again.
 edited <- function(simulator, edit, call = rlang::caller_env()) {
   if (class(simulator)[1] != "amiss_renamed") return(edit(simulator))
   inside <- edited(simulator$simulator, edit, call)
@@ -74,7 +79,8 @@ edited <- function(simulator, edit, call = rlang::caller_env()) {
 driver_names.amiss_renamed <- function(simulator) named_drivers(simulator$simulator)
 
 #' @export
-simulate_runs.amiss_renamed <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L, ...) {
+simulate_runs.amiss_renamed <- function(simulator, values, drivers, step_h, hold = NULL,
+                                        threads = 1L, ...) {
   at <- match(simulator$to, colnames(values))
   colnames(values)[at] <- names(simulator$to)
   simulate_runs(simulator$simulator, values, drivers, step_h, hold, threads, ...)

@@ -1,8 +1,8 @@
 #' One run's directory, to look at
 #'
-#' Writes what a run of a [program_simulator()] would read into a folder, and runs nothing: the files of the model, the
-#' templates with their numbers, and the drivers if measurements are given. Start the commands there by hand until they
-#' do what they should.
+#' Writes what a run of a [program_simulator()] would read into a folder, and runs nothing: the
+#' files of the model, the templates with their numbers, and the drivers if measurements are given.
+#' Start the commands there by hand until they do what they should.
 #'
 #' @param simulator A [program_simulator()].
 #' @param values Named numeric vector of the parameters; by default the medians of their priors.
@@ -20,7 +20,8 @@
 #' readLines(file.path(folder, "model.awk"))
 #' @export
 render_run <- function(simulator, values = NULL, folder, measurements = NULL, segment = 1) {
-  check_object(simulator, "amiss_program_simulator", "simulator", "Make one with {.fun program_simulator}.")
+  check_object(simulator, "amiss_program_simulator", "simulator",
+               "Make one with {.fun program_simulator}.")
   check_present(folder)
   check_input(checkmate::check_string(folder, min.chars = 1), "folder")
   if (length(dir(folder, all.files = TRUE, no.. = TRUE))) {
@@ -37,8 +38,8 @@ render_run <- function(simulator, values = NULL, folder, measurements = NULL, se
   make_folder(plan, plan$jobs[[1]], folder)
   commands <- Map(function(step, words) {
     step$command <- words
-    paste0(step_words_of(step), if (is.list(step$input)) paste(" <", step$input$file), if (!is.null(step$folder))
-      paste0("   (in ", step$folder, ")"))
+    paste0(step_words_of(step), if (is.list(step$input)) paste(" <", step$input$file),
+           if (!is.null(step$folder)) paste0("   (in ", step$folder, ")"))
   }, plan$steps, plan$jobs[[1]]$commands)
   cli::cli_inform(c("{.file {folder}} holds what a run reads. Start there:",
                     stats::setNames(as_said(unlist(commands)), rep("*", length(commands)))),
@@ -48,8 +49,10 @@ render_run <- function(simulator, values = NULL, folder, measurements = NULL, se
 
 run_values <- function(simulator, values, call = rlang::caller_env()) {
   parameters <- simulator$parameters
-  if (is.null(values)) values <- vapply(parameters, function(parameter) prior_quantile(parameter$prior, 0.5), 0)
-  check_input(checkmate::check_numeric(values, any.missing = FALSE, finite = TRUE), "values", call = call)
+  if (is.null(values))
+    values <- vapply(parameters, function(parameter) prior_quantile(parameter$prior, 0.5), 0)
+  check_input(checkmate::check_numeric(values, any.missing = FALSE, finite = TRUE), "values",
+              call = call)
   if (!setequal(names(values), names(parameters)) || anyDuplicated(names(values))) {
     abort_input(c("{.arg values} has the names {.val {names(values)}}.",
                   i = "Give a value for each parameter: {.val {names(parameters)}}."), call = call)

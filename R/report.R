@@ -1,27 +1,31 @@
 #' Write a report
 #'
-#' First what was found in plain words, then what to inspect next, then the figures and tables behind it. `report()`
-#' writes a file of its own; `report_fragment()` is for a chunk of a document of yours, of any format that R Markdown
-#' knows. RStudio offers the R Markdown template of the report under *New File, From Template: Report of amiss*.
+#' First what was found in plain words, then what to inspect next, then the figures and tables
+#' behind it. `report()` writes a file of its own; `report_fragment()` is for a chunk of a document
+#' of yours, of any format that R Markdown knows. RStudio offers the R Markdown template of the
+#' report under *New File, From Template: Report of amiss*.
 #'
-#' @section Formats:
-#' The end of the file's name chooses: `.html`, one file that needs nothing from outside; `.pdf`, the same page printed
-#' by Chromium, Chrome or Edge (Debian: `apt-get install chromium`; the environment variable `CHROMOTE_CHROME` may name
-#' the program); `.docx`, a Word document with the same text, tables and figures.
+#' @section Formats: The end of the file's name chooses: `.html`, one file that needs nothing from
+#' outside; `.pdf`, the same page printed by Chromium, Chrome or Edge (Debian: `apt-get install
+#' chromium`; the environment variable `CHROMOTE_CHROME` may name the program); `.docx`, a Word
+#' document with the same text, tables and figures.
 #'
-#' @param x An upgrade ([upgrade_model()]), a comparison ([compare_models()]) or a calibration ([calibrate()],
-#'   [calibrate_paper()]). The simulator of a calibration is run again to predict its record.
-#' @param file Name of the file, ending in `.html`, `.pdf` or `.docx`; its folder must exist. The file appears only when
-#'   it is complete.
+#' @param x An upgrade ([upgrade_model()]), a comparison ([compare_models()]) or a calibration
+#'   ([calibrate()], [calibrate_paper()]). The simulator of a calibration is run again to predict
+#'   its record.
+#' @param file Name of the file, ending in `.html`, `.pdf` or `.docx`; its folder must exist. The
+#'   file appears only when it is complete.
 #' @param quiet No messages of R Markdown.
-#' @param parts Which parts, in their order; `NULL` for all. Of an upgrade: `"summary"`, `"mechanisms"`, `"fit"`,
-#'   `"drivers"`, `"trials"`, `"parameters"`, `"lack"`, `"trust"`, `"method"` and `"words"`. Of a comparison:
-#'   `"summary"`, `"evidence"`, `"drivers"`, `"fit"`, `"parameters"`, `"practice"` and `"method"`. Of a calibration:
-#'   `"summary"`, `"fit"`, `"parameters"`, `"lack"` and `"trust"`.
+#' @param parts Which parts, in their order; `NULL` for all. Of an upgrade: `"summary"`,
+#'   `"mechanisms"`, `"fit"`, `"drivers"`, `"trials"`, `"parameters"`, `"lack"`, `"trust"`,
+#'   `"method"` and `"words"`. Of a comparison: `"summary"`, `"evidence"`, `"drivers"`, `"fit"`,
+#'   `"parameters"`, `"practice"` and `"method"`. Of a calibration: `"summary"`, `"fit"`,
+#'   `"parameters"`, `"lack"` and `"trust"`.
 #' @param level Level of the headings of the parts, 1 to 4.
-#' @return `report()`: `file`, invisibly. `report_fragment()`: text for knitr, which a chunk shows as it is.
-#' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone, [figures] for the
-#'   figures.
+#' @return `report()`: `file`, invisibly. `report_fragment()`: text for knitr, which a chunk shows
+#'   as it is.
+#' @seealso [summary.amiss_upgrade()] and [summary.amiss_comparison()] for the words alone,
+#'   [figures] for the figures.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
@@ -56,9 +60,9 @@ report <- function(x, file, quiet = TRUE) {
 }
 
 render_report <- function(x, source, work, kind, quiet) {
-  rmarkdown::render(source, if (kind == "docx") "word_document" else "html_document", output_dir = work,
-                    intermediates_dir = work, params = list(result = x), envir = new.env(parent = globalenv()),
-                    quiet = quiet)
+  rmarkdown::render(source, if (kind == "docx") "word_document" else "html_document",
+                    output_dir = work, intermediates_dir = work, params = list(result = x),
+                    envir = new.env(parent = globalenv()), quiet = quiet)
 }
 
 #' @rdname report
@@ -75,15 +79,17 @@ report_fragment <- function(x, parts = NULL, level = 2) {
   check_input(checkmate::check_subset(parts, names(all), empty.ok = FALSE), "parts")
   text <- c("::::::::: {.amiss}", unlist(all[parts]), ":::::::::")
   child <- knitr::knit_child(text = text, envir = report_environment(x), quiet = TRUE,
-                             options = list(echo = FALSE, message = FALSE, warning = FALSE, error = FALSE,
-                                            results = "asis", collapse = FALSE, comment = NA))
+                             options = list(echo = FALSE, message = FALSE, warning = FALSE,
+                                            error = FALSE, results = "asis", collapse = FALSE,
+                                            comment = NA))
   child <- gsub("(^|\n)##", paste0("\\1", strrep("#", level)), child)
   knitr::asis_output(paste(c(fragment_style(), child), collapse = "\n"))
 }
 
 check_reported <- function(x, call = rlang::caller_env()) {
   check_object(x, c("amiss_upgrade", "amiss_comparison", "amiss_fit"), "x",
-              "It is made by {.fun upgrade_model}, {.fun compare_models} or {.fun calibrate}.", call = call)
+               "It is made by {.fun upgrade_model}, {.fun compare_models} or {.fun calibrate}.",
+               call = call)
 }
 
 # html, pdf or docx, by the name of a file that can be written.
@@ -95,14 +101,17 @@ report_kind <- function(file, call = rlang::caller_env()) {
                   i = "Make it with {.fun dir.create}, or choose another."), call = call)
   }
   if (dir.exists(file)) {
-    abort_input(c("{.arg file} = {.file {file}} is a folder.", i = "Give the name of the file in it."), call = call)
+    abort_input(c("{.arg file} = {.file {file}} is a folder.",
+                  i = "Give the name of the file in it."), call = call)
   }
   kind <- tolower(tools::file_ext(file))
   if (!kind %in% c("html", "htm", "pdf", "docx")) {
     abort_input(c("{.arg file} = {.file {file}} does not say what to write.",
-                  i = "Give a name that ends in {.code .html}, {.code .pdf} or {.code .docx}."), call = call)
+                  i = "Give a name that ends in {.code .html}, {.code .pdf} or {.code .docx}."),
+                call = call)
   }
-  if (file.access(folder, 2) != 0) abort_input("The folder {.file {folder}} cannot be written.", call = call)
+  if (file.access(folder, 2) != 0)
+    abort_input("The folder {.file {folder}} cannot be written.", call = call)
   if (kind == "htm") "html" else kind
 }
 
@@ -115,8 +124,8 @@ check_report_tools <- function(call = rlang::caller_env()) {
   if (!tryCatch(rmarkdown::pandoc_available("2.0"), error = function(e) FALSE)) {
     abort_input(c("A report needs pandoc 2.0 or later, which was not found or cannot be started.",
                   i = paste("Install it (Debian: {.code apt-get install pandoc}; others:",
-                            "{.url https://pandoc.org/installing.html}), or work in RStudio, which brings it.")),
-                call = call)
+                            "{.url https://pandoc.org/installing.html}), or work in RStudio, which",
+                            "brings it.")), call = call)
   }
 }
 
@@ -133,7 +142,8 @@ template_parts <- function(x) {
   stats::setNames(parts, sub(mark, "\\1", text[starts]))
 }
 
-# What the chunks of a template see: the result, what is told of it, and the package's own functions.
+# What the chunks of a template see: the result, what is told of it, and the package's own
+# functions.
 report_environment <- function(x) {
   list2env(c(list(result = x), report_content(x)), parent = environment(report))
 }

@@ -3,7 +3,8 @@
 # The calibration as the only model of an upgrade, as the figures over time ask for one.
 as_only_model <- function(fit) {
   prediction <- stats::predict(fit, use = predictable_rows(fit))
-  model <- list(name = "the model", fit = fit, prediction = prediction, scores = prediction_scores(prediction))
+  model <- list(name = "the model", fit = fit, prediction = prediction,
+                scores = prediction_scores(prediction))
   list(models = list(model), measurements = fit$measurements)
 }
 
@@ -24,11 +25,12 @@ calibration_words <- function(fit, only) {
                           short(left$ratio)),
        sure = c(sprintf("Sampler: %s.", sampler_said(fit)$verdict),
                 if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
-       gain = gain_sentences(only),
-       remains = c(if (!is.null(left$pattern)) sprintf("The error that remains has a pattern: %s.", left$pattern$what),
-                   if (!is.null(fit$reach)) sub("^(.)(.*)$", "\\U\\1\\E\\2.", reach_words(fit), perl = TRUE),
-                   if (length(edge)) sprintf("At the edge of what was thought possible: %s.", listed(edge))
-                   else "No parameter is at the edge of its range."),
+       gain = gain_sentences(only), remains = c(
+         if (!is.null(left$pattern))
+           sprintf("The error that remains has a pattern: %s.", left$pattern$what),
+         if (!is.null(fit$reach)) sub("^(.)(.*)$", "\\U\\1\\E\\2.", reach_words(fit), perl = TRUE),
+         if (length(edge)) sprintf("At the edge of what was thought possible: %s.", listed(edge))
+         else "No parameter is at the edge of its range."),
        inspect = calibration_inspections(fit, model), parameters = parameters_words(fit),
        method = method_table(only), seed = fit$seed)
 }

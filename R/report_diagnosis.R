@@ -1,6 +1,7 @@
 #' @export
 report_content.amiss_upgrade <- function(x) {
-  list(upgrade = x, told = summary(x), one = length(x$models) < 2, several = is_several(x$measurements))
+  list(upgrade = x, told = summary(x), one = length(x$models) < 2,
+       several = is_several(x$measurements))
 }
 
 # Figures of the record or, of several, of each under its name.
@@ -14,7 +15,8 @@ record_figures <- function(upgrade, which) {
 
 # Runs behind the first model, and of what length each record is.
 first_runs_made <- function(upgrade) {
-  max(vapply(record_fits(upgrade$models[[1]]$fit), function(fit) nrow(fit$emulator$processes$inputs), 0L))
+  max(vapply(record_fits(upgrade$models[[1]]$fit),
+             function(fit) nrow(fit$emulator$processes$inputs), 0L))
 }
 
 record_words <- function(measurements) {
@@ -29,7 +31,8 @@ score_tiles <- function(upgrade) {
   number <- function(x) sub("\\.$", "", formatC(x, digits = 2, format = "fg", flag = "#"))
   arrow <- function(x) paste(x, collapse = " \u2192 ")
   held <- has_validation(upgrade)
-  rmse <- function(use) with_unit(arrow(number(score_of(upgrade, use, "rmse"))), upgrade$measurements$unit)
+  rmse <- function(use)
+    with_unit(arrow(number(score_of(upgrade, use, "rmse"))), upgrade$measurements$unit)
   inside <- round(100 * score_of(upgrade, if (held) "validate" else "calibrate", "coverage95"))
   list(value = c(if (held) rmse("validate"), rmse("calibrate"), paste(arrow(inside), "%")),
        words = c(if (held) "typical error, held-out data", "typical error, calibration",
@@ -38,15 +41,17 @@ score_tiles <- function(upgrade) {
 
 conditions_words <- function(table) {
   if (!is.null(table$records)) {
-    return(data.frame("boundary condition" = table$boundary,
-                      "log10 Bayes factor lost without it" = sprintf("%+.1f", table$log10_bf_dropped),
-                      "p-value" = format(round(table$p_value, 3)), significant = ifelse(table$significant, "yes", "no"),
-                      "in records" = table$records, estimate = ifelse(table$trusted, "sound", "rough"),
-                      check.names = FALSE))
+    return(
+      data.frame("boundary condition" = table$boundary,
+                 "log10 Bayes factor lost without it" = sprintf("%+.1f", table$log10_bf_dropped),
+                 "p-value" = format(round(table$p_value, 3)),
+                 significant = ifelse(table$significant, "yes", "no"), "in records" = table$records,
+                 estimate = ifelse(table$trusted, "sound", "rough"), check.names = FALSE))
   }
   data.frame("boundary condition" = table$boundary,
              "log10 Bayes factor lost without it" = sprintf("%+.1f", table$log10_bf_dropped),
-             "share of the error" = sprintf("%.0f %%", 100 * table$share), "p-value" = format(round(table$p_value, 3)),
-             significant = ifelse(table$significant, "yes", "no"), estimate = ifelse(table$trusted, "sound", "rough"),
-             check.names = FALSE)
+             "share of the error" = sprintf("%.0f %%", 100 * table$share),
+             "p-value" = format(round(table$p_value, 3)),
+             significant = ifelse(table$significant, "yes", "no"),
+             estimate = ifelse(table$trusted, "sound", "rough"), check.names = FALSE)
 }

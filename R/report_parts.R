@@ -1,9 +1,9 @@
-# What the templates are written with. Each of these writes markdown, and HTML where the document becomes HTML.
-# Text from data comes in through one function for each place: markdown_text(), html_text(), html_attribute(), and
-# file_stem() for the name of a file.
+# What the templates are written with. Each of these writes markdown, and HTML where the document
+# becomes HTML. Text from data comes in through one function for each place: markdown_text(),
+# html_text(), html_attribute(), and file_stem() for the name of a file.
 
-# Text as it is: nothing in it is markup, but 10^3 is set as a power. All signs of ASCII become entities, which pandoc
-# reads after everything that could be markup.
+# Text as it is: nothing in it is markup, but 10^3 is set as a power. All signs of ASCII become
+# entities, which pandoc reads after everything that could be markup.
 markdown_text <- function(x) {
   plain <- trimws(one_line(x))
   signs <- gregexpr("[!-/:-@[-`{-~]", plain, perl = TRUE)
@@ -14,20 +14,24 @@ markdown_text <- function(x) {
   gsub("([0-9]) &#37;", "\\1\u00a0&#37;", plain)
 }
 
-# Text of an element of HTML, and of an attribute in quotes. Three backticks would end the raw block that holds it.
+# Text of an element of HTML, and of an attribute in quotes. Three backticks would end the raw block
+# that holds it.
 html_text <- function(x) without_backticks(htmltools::htmlEscape(one_line(x)))
 
-html_attribute <- function(x) without_backticks(htmltools::htmlEscape(one_line(x), attribute = TRUE))
+html_attribute <- function(x)
+  without_backticks(htmltools::htmlEscape(one_line(x), attribute = TRUE))
 
 without_backticks <- function(html) gsub("`", "&#96;", html, fixed = TRUE)
 
-markdown_items <- function(x) if (length(x)) cat("\n", paste0("- ", markdown_text(x), "\n\n"), sep = "")
+markdown_items <- function(x)
+  if (length(x)) cat("\n", paste0("- ", markdown_text(x), "\n\n"), sep = "")
 
 markdown_paragraphs <- function(x) cat("\n", paste0(markdown_text(x), "\n\n"), sep = "")
 
 # The head of what is told of one mechanism.
 mechanism_head <- function(m) {
-  verdict <- if (knitr::is_html_output()) paste0(" [", m$verdict, "]{.chip}") else paste0(": ", m$verdict)
+  verdict <- if (knitr::is_html_output()) paste0(" [", m$verdict, "]{.chip}")
+             else paste0(": ", m$verdict)
   cat("\n\n### ", markdown_text(m$name), verdict, "\n\n", sep = "")
 }
 
@@ -46,22 +50,27 @@ report_table <- function(table, bold = rep(FALSE, nrow(table))) {
 html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
   cell <- function(x, tag) paste0("<", tag, ">", html_text(x), "</", tag, ">", collapse = "")
   rows <- vapply(seq_len(nrow(table)), function(i) {
-    paste0("<tr", if (bold[i]) " class=\"adopted\"", ">", cell(unlist(lapply(table[i, ], as.character)), "td"), "</tr>")
+    paste0("<tr", if (bold[i]) " class=\"adopted\"", ">",
+           cell(unlist(lapply(table[i, ], as.character)), "td"), "</tr>")
   }, "")
-  cat("\n```{=html}\n<div class=\"scroll\"><table><thead><tr>", cell(names(table), "th"), "</tr></thead><tbody>\n",
-      paste(rows, collapse = "\n"), "\n</tbody></table></div>\n```\n", sep = "")
+  cat("\n```{=html}\n<div class=\"scroll\"><table><thead><tr>", cell(names(table), "th"),
+      "</tr></thead><tbody>\n", paste(rows, collapse = "\n"), "\n</tbody></table></div>\n```\n",
+      sep = "")
 }
 
-# A pipe table; its dashes are the widths of the columns, by the longest word and the length of what they hold.
+# A pipe table; its dashes are the widths of the columns, by the longest word and the length of what
+# they hold.
 markdown_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
   cells <- rbind(names(table), as.matrix(data.frame(lapply(table, as.character))))
-  widths <- apply(cells, 2, function(x) max(nchar(unlist(strsplit(x, " "))) + 2, min(40, 0.7 * max(nchar(x)))))
+  widths <- apply(
+    cells, 2, function(x) max(nchar(unlist(strsplit(x, " "))) + 2, min(40, 0.7 * max(nchar(x)))))
   cells[] <- markdown_text(cells)
   strong <- c(FALSE, bold) & nzchar(cells)
   cells[strong] <- paste0("**", cells[strong], "**")
   row <- function(x) paste0("|", paste(x, collapse = "|"), "|")
   dashes <- row(strrep("-", ceiling(widths)))
-  cat("\n", paste0(c(row(cells[1, ]), dashes, apply(cells[-1, , drop = FALSE], 1, row)), "\n"), "\n", sep = "")
+  cat("\n", paste0(c(row(cells[1, ]), dashes, apply(cells[-1, , drop = FALSE], 1, row)), "\n"),
+      "\n", sep = "")
 }
 
 # Numbers with what they are: in HTML large, side by side.
@@ -73,8 +82,8 @@ report_tiles <- function(value, words) {
 
 narrow_canvas <- 4.2  # inches: of a figure on a phone
 
-# A figure of the result by its name, or one made already. In HTML it is drawn twice, also for a narrow
-# page, where letters of the wide one were too small.
+# A figure of the result by its name, or one made already. In HTML it is drawn twice, also for a
+# narrow page, where letters of the wide one were too small.
 report_figure <- function(x, which) {
   figure <- if (inherits(x, "ggplot")) x else ggplot2::autoplot(x, which)
   alt <- paste0(which, ": ", figure$labels$title)
@@ -96,8 +105,8 @@ html_figure <- function(figure, alt) {
   }
   cat("\n```{=html}\n<picture><source media=\"screen and (max-width: 620px)\" srcset=\"",
       drawn(narrow, narrow_canvas, 170), "\">",
-      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_attribute(alt), "\"></picture>\n```\n",
-      sep = "")
+      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_attribute(alt),
+      "\"></picture>\n```\n", sep = "")
 }
 
 # The style of a fragment goes with it, as others' documents know nothing of it.

@@ -1,5 +1,6 @@
-# Conditions of a study file, such as `phase == "rolbs" & hour <= 180`: a small language over the columns of the data.
-# R's parser reads it; what is not in this table is refused, and nothing is ever evaluated as R code.
+# Conditions of a study file, such as `phase == "rolbs" & hour <= 180`: a small language over the
+# columns of the data. R's parser reads it; what is not in this table is refused, and nothing is
+# ever evaluated as R code.
 
 row_operators <- list(
   "==" = 2, "!=" = 2, "<" = 2, "<=" = 2, ">" = 2, ">=" = 2, "&" = 2, "|" = 2, "!" = 1, "(" = 1,
@@ -11,24 +12,30 @@ row_condition <- function(text, data, what, clock = NULL, call = rlang::caller_e
   hint <- "Write one condition in the columns, for example {.code phase == \"rolbs\"}."
   check_input(checkmate::check_string(text, min.chars = 1), what, hint, call = call)
   # Longer ones could nest deeper than R's stack allows.
-  check_input(if (nchar(text) <= 2000) TRUE else "It is longer than 2000 characters", what, hint, call = call)
-  parsed <- tryCatch(parse(text = text, keep.source = FALSE, encoding = "UTF-8"), error = function(e) {
-    abort_input(c("{.arg {what}} = {.val {text}} cannot be read.", x = "{conditionMessage(e)}", i = hint), call = call)
-  })
-  if (length(parsed) != 1) abort_input(c("{.arg {what}} = {.val {text}} is not one condition.", i = hint), call = call)
+  check_input(if (nchar(text) <= 2000) TRUE else "It is longer than 2000 characters", what, hint,
+              call = call)
+  parsed <- tryCatch(parse(text = text, keep.source = FALSE, encoding = "UTF-8"),
+                     error = function(e) {
+                       abort_input(c("{.arg {what}} = {.val {text}} cannot be read.",
+                                     x = "{conditionMessage(e)}", i = hint), call = call)
+                     })
+  if (length(parsed) != 1)
+    abort_input(c("{.arg {what}} = {.val {text}} is not one condition.", i = hint), call = call)
   refuse <- function(part, why) {
     part <- paste(deparse(part), collapse = " ")
     abort_input(c("{.arg {what}} = {.val {text}} cannot be used: {.code {part}} {why}.",
-                  i = paste("A condition may hold columns, numbers, texts in quotes, {.code c()} after {.code %in%}",
-                            "and {.code {names(row_operators)}}.")),
+                  i = paste("A condition may hold columns, numbers, texts in quotes, {.code c()}",
+                            "after {.code %in%} and {.code {names(row_operators)}}.")),
                 call = call)
   }
-  rows <- tryCatch(suppressWarnings(row_value(parsed[[1]], data, refuse, comparisons(clock))), error = function(e) {
-    if (inherits(e, "amiss_error")) stop(e)
-    abort_input(c("{.arg {what}} = {.val {text}} has no value: {conditionMessage(e)}.", i = hint), call = call)
-  })
-  check_input(checkmate::check_logical(rows, len = nrow(data)), what, "One TRUE or FALSE for every row of the data.",
-              call = call)
+  rows <- tryCatch(suppressWarnings(row_value(parsed[[1]], data, refuse, comparisons(clock))),
+                   error = function(e) {
+                     if (inherits(e, "amiss_error")) stop(e)
+                     abort_input(c(paste("{.arg {what}} = {.val {text}} has no value:",
+                                         "{conditionMessage(e)}."), i = hint), call = call)
+                   })
+  check_input(checkmate::check_logical(rows, len = nrow(data)), what,
+              "One TRUE or FALSE for every row of the data.", call = call)
   rows
 }
 
@@ -44,7 +51,8 @@ row_value <- function(part, data, refuse, operators) {
   if (is.numeric(part) || is.character(part)) return(part)
   if (!is.call(part)) refuse(part, "is not allowed")
   name <- if (is.symbol(part[[1]])) as.character(part[[1]]) else ""
-  if (!(length(part) - 1) %in% row_operators[[name]] || !is.null(names(part))) refuse(part, "is not allowed")
+  if (!(length(part) - 1) %in% row_operators[[name]] || !is.null(names(part)))
+    refuse(part, "is not allowed")
   values <- if (name == "%in%") {
     list(row_value(part[[2]], data, refuse, operators), row_set(part[[3]], refuse))
   } else {
@@ -55,7 +63,8 @@ row_value <- function(part, data, refuse, operators) {
 
 # The right side of %in%: c() of numbers or texts.
 row_set <- function(part, refuse) {
-  listed <- is.call(part) && identical(part[[1]], quote(c)) && is.null(names(part)) && length(part) > 1
+  listed <- is.call(part) && identical(part[[1]], quote(c)) && is.null(names(part)) &&
+    length(part) > 1
   if (!listed || length(all.vars(part))) refuse(part, "is not c() of numbers or texts")
   unlist(lapply(as.list(part)[-1], row_value, data = list(), refuse, list()))
 }

@@ -1,19 +1,21 @@
-# Where the parameters lie, by the simulator itself: least squares, first in units of the noise, then by the error and
-# the discrepancy that remain, with the prior, by steps within a trusted distance (Levenberg 1944; More 1978). About its
-# best run a search knows the simulator by slopes, and by the least curvature that the runs near it ask for. Each run
-# corrects both, so that a step costs one run.
+# Where the parameters lie, by the simulator itself: least squares, first in units of the noise,
+# then by the error and the discrepancy that remain, with the prior, by steps within a trusted
+# distance (Levenberg 1944; More 1978). About its best run a search knows the simulator by slopes,
+# and by the least curvature that the runs near it ask for. Each run corrects both, so that a step
+# costs one run.
 
 # A search from run `at` of a model. `slopes` are right at that run to within what they change over
-# `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is switched off; the search
-# ends if all that it promises beyond that could not make evidence.
+# `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is
+# switched off; the search ends if all that it promises beyond that could not make evidence.
 begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL) {
-  list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0, poor = 0, since = 0,
-       weighted = FALSE, reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes,
+  list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0,
+       poor = 0, since = 0, weighted = FALSE,
+       reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes,
        status = "going")
 }
 
-# `least`: the run of least squares, where the simulation is at its best, and the slopes there: what the discrepancy
-# keeps out of.
+# `least`: the run of least squares, where the simulation is at its best, and the slopes there: what
+# the discrepancy keeps out of.
 run_search <- function(search, context) {
   search <- descend(search, context)
   search$least <- search[c("at", "slopes")]
@@ -56,8 +58,8 @@ with_given_slopes <- function(search) {
   search
 }
 
-# Slopes by differences cost a run a parameter: they are worth it if steps failed in a row, or if as many were made and
-# some of them were poor.
+# Slopes by differences cost a run a parameter: they are worth it if steps failed in a row, or if as
+# many were made and some of them were poor.
 needs_slopes <- function(search) {
   enough <- search$since >= length(search$model$parameters)
   search$failed == rules$renew_after || search$poor >= rules$renew_after && enough
@@ -65,21 +67,23 @@ needs_slopes <- function(search) {
 
 # The posterior under the tangent, with error and discrepancy sampled under it.
 look <- function(search, context) {
-  search[c("mean", "covariance", "history", "moves")] <-
-    tangent_at(search$model, search$at, search$slopes, moves_of(search$model, search$least), context)
+  search[c("mean", "covariance", "history", "moves")] <- tangent_at(
+    search$model, search$at, search$slopes, moves_of(search$model, search$least), context)
   search
 }
 
-# How far a model moves about its run of least squares: its slopes there for a unit of the normal quantile of each
-# parameter (Plumlee 2017), in the mean over what least squares leaves open, so that neighbours on a ridge move alike. A
-# parameter that is pressed against the end of a flat prior moves little: what it cannot do any more, the discrepancy
-# may. They hang on simulator and record alone.
+# How far a model moves about its run of least squares: its slopes there for a unit of the normal
+# quantile of each parameter (Plumlee 2017), in the mean over what least squares leaves open, so
+# that neighbours on a ridge move alike. A parameter that is pressed against the end of a flat prior
+# moves little: what it cannot do any more, the discrepancy may. They hang on simulator and record
+# alone.
 moves_of <- function(model, least) sweep(least$slopes, 2, normal_units(model, least), "*")
 
 normal_units <- function(model, least) {
   open <- left_open(model, least)
   draws <- draws_within(open$mean, open$covariance, model$space, rules$open_draws, 1)
-  vapply(seq_len(ncol(draws)), function(j) sqrt(mean(per_normal(draws[, j], model$space[j, ])^2)), 0)
+  vapply(seq_len(ncol(draws)), function(j) sqrt(mean(per_normal(draws[, j], model$space[j, ])^2)),
+         0)
 }
 
 # The parameters by least squares in units of the noise.
@@ -92,11 +96,13 @@ left_open <- function(model, least) {
 # What its optimum would gain.
 promised_by <- function(search) {
   precision <- solve(search$covariance)
-  way <- within_limits(search$mean, precision, search$model$space) - search$model$runs$z[search$at, ]
+  way <- within_limits(search$mean, precision, search$model$space) -
+    search$model$runs$z[search$at, ]
   sum(way * (precision %*% way)) / 2
 }
 
-# The next run: the optimum of the bent line within the trusted distance, by Gauss-Newton steps on it.
+# The next run: the optimum of the bent line within the trusted distance, by Gauss-Newton steps on
+# it.
 propose <- function(search, context) {
   model <- search$model
   z <- model$runs$z[search$at, ]
@@ -127,12 +133,14 @@ propose <- function(search, context) {
   if (open < rules$search_gain * nats) search$status <- "converged"
   # A search that cannot come nearer to the record than the run without the mechanism is.
   if (!search$weighted && search$step > 0 && !is.null(search$off) &&
-      misfit[1] - search$promised > squared_misfit(model)[search$off] - rules$futile_gain) search$status <- "behind"
+      misfit[1] - search$promised > squared_misfit(model)[search$off] - rules$futile_gain)
+    search$status <- "behind"
   search
 }
 
-# Minus the log posterior density of runs: at first as if all of the error were white noise of the stated size, so that
-# a search goes wherever the simulation comes nearest to the record; then by draws of error and discrepancy.
+# Minus the log posterior density of runs: at first as if all of the error were white noise of the
+# stated size, so that a search goes wherever the simulation comes nearest to the record; then by
+# draws of error and discrepancy.
 misfit_of <- function(search, outputs, z, context) {
   if (search$weighted) -values_of(search$model, outputs, z, search$history, search$moves, context)
   else squared_misfit(search$model, outputs, z)
@@ -153,7 +161,8 @@ squared_nats <- function(model, misfit) max(1, 2 * misfit / length(model$target)
 squares_of_line <- function(search, z, line, context) {
   model <- search$model
   if (search$weighted) {
-    found <- tangent_given(model, z, line$output, line$slopes, search$history, search$moves, context)
+    found <- tangent_given(model, z, line$output, line$slopes, search$history, search$moves,
+                           context)
     precision <- solve(found$covariance)
     mean <- found$mean
   } else {
@@ -186,7 +195,8 @@ step_within <- function(squares, z, trusted, space, scale) {
   damped(10^ends[2])
 }
 
-# Whether the evidence could not exceed that of the run without the mechanism by much, if all went as the tangent says.
+# Whether the evidence could not exceed that of the run without the mechanism by much, if all went
+# as the tangent says.
 is_futile <- function(search, context) {
   if (is.null(search$off)) return(FALSE)
   value <- values_at(search$model, c(search$at, search$off), search$history, search$moves, context)
@@ -222,7 +232,8 @@ accept <- function(search, made, context) {
   search
 }
 
-# By how much: to the least value of the parabola that falls as predicted and ends at what the run says.
+# By how much: to the least value of the parabola that falls as predicted and ends at what the run
+# says.
 shrinkage <- function(predicted, gain) {
   least <- if (is.finite(gain)) predicted / (2 * predicted - min(gain, 0)) else 0
   min(max(least, rules$least_shrinkage), 1 / rules$trust_changes)
@@ -239,8 +250,8 @@ renew_slopes <- function(search, context) {
   search
 }
 
-# Slopes by differences, on the same side wherever the priors allow it; where a small one shows nothing, by larger
-# ones on both sides: list(model, slopes), no slopes if the budget ends.
+# Slopes by differences, on the same side wherever the priors allow it; where a small one shows
+# nothing, by larger ones on both sides: list(model, slopes), no slopes if the budget ends.
 difference_slopes <- function(model, at, context) {
   z <- model$runs$z[at, ]
   known <- given_slopes(model, z)
@@ -293,12 +304,12 @@ difference_side <- function(z, space) {
   ifelse(z > pmax(pmin(1, space$upper - room), space$lower + room), -1, 1)
 }
 
-# The simulator about a run, from slopes known elsewhere and from the runs near it. With s the way from the run, J0 the
-# reference slopes and A fitted to the runs,
-#     f(z + s) = f(z) + J0 s + sum_i A_i k(s, s_i),   k(s, s') = 4 d^2 s's' + (s's')^2.
-# A simulator bends by c |s|^2 over a way s. So its slopes turn by 2 c d over the way d from where the reference held;
-# the bend itself has the second term for a prior, as in minimum-norm quadratic models (Powell 2004); and as the bend
-# turns over a way L, run i fits to within c |s_i|^3 / L. c cancels.
+# The simulator about a run, from slopes known elsewhere and from the runs near it. With s the way
+# from the run, J0 the reference slopes and A fitted to the runs, f(z + s) = f(z) + J0 s + sum_i A_i
+# k(s, s_i), k(s, s') = 4 d^2 s's' + (s's')^2. A simulator bends by c |s|^2 over a way s. So its
+# slopes turn by 2 c d over the way d from where the reference held; the bend itself has the second
+# term for a prior, as in minimum-norm quadratic models (Powell 2004); and as the bend turns over a
+# way L, run i fits to within c |s_i|^3 / L. c cancels.
 bent_line <- function(model, at, reference) {
   z <- model$runs$z[at, ]
   scale <- way_scale(reference)
@@ -306,19 +317,22 @@ bent_line <- function(model, at, reference) {
   squared <- rowSums(ways^2)
   near <- which(succeeded(model) & squared > 1e-8)
   near <- utils::head(near[order(squared[near])], rules$bent_runs * length(z))
-  bent <- list(output = model$runs$outputs[, at], slopes = sweep(reference$slopes, 2, scale, "/"), scale = scale,
-               d2 = 4 * (sum((scale * (z - reference$z))^2) + reference$stale^2), ways = ways[near, , drop = FALSE])
+  bent <- list(output = model$runs$outputs[, at], slopes = sweep(reference$slopes, 2, scale, "/"),
+               scale = scale, d2 = 4 * (sum((scale * (z - reference$z))^2) + reference$stale^2),
+               ways = ways[near, , drop = FALSE])
   dot <- tcrossprod(bent$ways)
   of_way <- squared[near]  # rows and columns in units of |s|^2: near and far runs have one size
   covariance <- (bent$d2 * dot + dot^2) / outer(of_way, of_way)
   diag(covariance) <- diag(covariance) * (1 + 1e-8) + of_way / rules$bend_length^2
-  missed <- model$runs$outputs[, near, drop = FALSE] - bent$output - tcrossprod(bent$slopes, bent$ways)
+  missed <- model$runs$outputs[, near, drop = FALSE] - bent$output -
+    tcrossprod(bent$slopes, bent$ways)
   bent$weights <- missed
   if (length(near)) bent$weights <- t(solve(covariance, t(missed) / of_way) / of_way)
   bent
 }
 
-# A way counts as long as the simulator moves along it, beside the parameter that moves it most (More 1978).
+# A way counts as long as the simulator moves along it, beside the parameter that moves it most
+# (More 1978).
 way_scale <- function(reference) {
   moves <- sqrt(colSums(reference$slopes^2))
   if (all(moves == 0)) moves[] <- 1
@@ -355,8 +369,8 @@ regression_slopes <- function(model, at) {
 search_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 4, precision = 1,
                    importance_draws = 300, ess_drop = 0.3)
 
-# list(mean, covariance, history, moves) of the parameters under the tangent of run `at`: with draws of error and
-# discrepancy of each record, which keeps out of `moves`.
+# list(mean, covariance, history, moves) of the parameters under the tangent of run `at`: with draws
+# of error and discrepancy of each record, which keeps out of `moves`.
 tangent_at <- function(model, at, slopes, moves, context) {
   engine <- engine_context(context$seed, context$threads)
   z <- model$runs$z[at, ]
@@ -365,7 +379,8 @@ tangent_at <- function(model, at, slopes, moves, context) {
     steep <- unname(slopes[rows, own, drop = FALSE])
     out <- unname(moves[rows, own, drop = FALSE])
     call_engine(tangent_posterior_(c(record$data, list(moves = out)), record$priors, z[own],
-                                   model$runs$outputs[rows, at], steep, rules$search_draws, ais, engine))
+                                   model$runs$outputs[rows, at], steep, rules$search_draws, ais,
+                                   engine))
   }, model$records, model$own, model$rows)
   joint <- joint_tangent(each, model$own, length(z))
   list(mean = joint$mean, covariance = joint$covariance,
@@ -383,9 +398,11 @@ tangent_given <- function(model, z, output, slopes, history, moves, context) {
   joint_tangent(unname(each), model$own, length(z))
 }
 
-# log posterior density of runs, averaged over draws of error and discrepancy that keeps out of `moves`.
+# log posterior density of runs, averaged over draws of error and discrepancy that keeps out of
+# `moves`.
 values_at <- function(model, at, history, moves, context) {
-  values_of(model, model$runs$outputs[, at, drop = FALSE], model$runs$z[at, , drop = FALSE], history, moves, context)
+  values_of(model, model$runs$outputs[, at, drop = FALSE], model$runs$z[at, , drop = FALSE],
+            history, moves, context)
 }
 
 values_of <- function(model, outputs, z, history, moves, context) {
@@ -396,7 +413,8 @@ values_of <- function(model, outputs, z, history, moves, context) {
     rows <- model$rows[[k]]
     draws <- length(history[[k]]$setting)
     repeated <- rep(seq_len(draws), length(fine))
-    points <- list(setting = history[[k]]$setting[repeated], variance = history[[k]]$variance[repeated],
+    points <- list(setting = history[[k]]$setting[repeated],
+                   variance = history[[k]]$variance[repeated],
                    t = history[[k]]$t[repeated, , drop = FALSE])
     data <- c(model$records[[k]]$data, list(moves = moves[rows, model$own[[k]], drop = FALSE]))
     log_l <- call_engine(run_likelihood_(data, model$records[[k]]$priors, points,
@@ -408,8 +426,8 @@ values_of <- function(model, outputs, z, history, moves, context) {
   values
 }
 
-# The Gaussian that the tangents of several records make together of p parameters, whose prior N(0, I)
-# each of them holds: precisions add up, that of the prior counted once.
+# The Gaussian that the tangents of several records make together of p parameters, whose prior N(0,
+# I) each of them holds: precisions add up, that of the prior counted once.
 joint_tangent <- function(tangents, own, p) {
   if (length(tangents) == 1) return(tangents[[1]])
   precision <- diag(p)

@@ -1,27 +1,32 @@
 #' A simulator that is an R function
 #'
-#' Any function of parameters and boundary conditions can be calibrated. The built-in [zone()] is another simulator;
-#' runs that were made elsewhere enter by [ensemble()].
+#' Any function of parameters and boundary conditions can be calibrated. The built-in [zone()] is
+#' another simulator; runs that were made elsewhere enter by [ensemble()].
 #'
-#' `with_parameters()` extends such a simulator by parameters of a mechanism: its function has the simulator before the
-#' edit as `base`, so that edits stack in any order. Make every [mechanism()] of a function in this way: an edit that
-#' writes the model anew would lose what was adopted before it.
+#' `with_parameters()` extends such a simulator by parameters of a mechanism: its function has the
+#' simulator before the edit as `base`, so that edits stack in any order. Make every [mechanism()]
+#' of a function in this way: an edit that writes the model anew would lose what was adopted before
+#' it.
 #'
-#' A simulator that integrates in steps should take their length from `info$step_h`: [upgrade_model()] then runs it
-#' with rows a half and a quarter as long. Where its own steps err by a third of what a mechanism mends, or finer ones
-#' would take that back by a third, it is not named; parameters that they would move are told. One with steps of its
-#' own, or an output that does not settle so, is taken at its word: see that half the step changes its output by little
+#' A simulator that integrates in steps should take their length from `info$step_h`:
+#' [upgrade_model()] then runs it with rows a half and a quarter as long. Where its own steps err by
+#' a third of what a mechanism mends, or finer ones would take that back by a third, it is not
+#' named; parameters that they would move are told. One with steps of its own, or an output that
+#' does not settle so, is taken at its word: see that half the step changes its output by little
 #' beside the noise.
 #'
-#' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with the columns of `boundary`,
-#'   one row per interval of one unbroken segment), returning one number per row. If it has an argument `info`, it is
-#'   given a list of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`, or hours), `segment`
-#'   (its number) and `hold` (the target as measured in the rows that warm up, `NA` in the others). `with_parameters()`:
-#'   if it has an argument `base`, it is given the simulator before the edit, as a function of `values` and, if they are
-#'   to differ, `drivers` and `info`; to change what the simulator does not read is an error. `NULL` leaves the function
-#'   as it is: the parameters are for the one that was there first, which uses them where it is given them.
+#' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with the
+#'   columns of `boundary`, one row per interval of one unbroken segment), returning one number per
+#'   row. If it has an argument `info`, it is given a list of `step_h` (length of an interval in
+#'   hours), `time` (of each row: `POSIXct`, or hours), `segment` (its number) and `hold` (the
+#'   target as measured in the rows that warm up, `NA` in the others). `with_parameters()`: if it
+#'   has an argument `base`, it is given the simulator before the edit, as a function of `values`
+#'   and, if they are to differ, `drivers` and `info`; to change what the simulator does not read is
+#'   an error. `NULL` leaves the function as it is: the parameters are for the one that was there
+#'   first, which uses them where it is given them.
 #' @param ... The parameters, each made by [free()]. Those of `model` stay.
-#' @param boundary Names of the driver columns that the function needs; `with_parameters()`: beside those of `model`.
+#' @param boundary Names of the driver columns that the function needs; `with_parameters()`: beside
+#'   those of `model`.
 #' @param name A name for people.
 #' @return An object of class `amiss_function_simulator`.
 #' @examples
@@ -73,7 +78,8 @@ with_parameters <- function(model, ..., f = NULL, boundary = character(), name =
   for (parameter in added[names(added) %in% names(model$parameters)]) {
     if (identical(parameter$prior, model$parameters[[parameter$name]]$prior)) next
     abort_input(c("Parameter {.val {parameter$name}} is in the model already, with another prior.",
-                  i = "Give the new one a name of its own; to share one, give both the same prior."))
+                  i = paste("Give the new one a name of its own; to share one, give both the same",
+                            "prior.")))
   }
   edited <- model
   edited$name <- name
@@ -85,7 +91,8 @@ with_parameters <- function(model, ..., f = NULL, boundary = character(), name =
   else on_top_of(edited, model$edit, with_parameters(model$base, ..., boundary = boundary))
 }
 
-# The simulator whose function is `f` on top of that of `base`. Both stay in sight, for keys of kept results.
+# The simulator whose function is `f` on top of that of `base`. Both stay in sight, for keys of kept
+# results.
 on_top_of <- function(edited, f, base) {
   edited$f <- function(values, drivers, info = NULL) {
     call_run_function(f, values, drivers, info = info, base = as_base(base, drivers, info))
@@ -99,7 +106,8 @@ on_top_of <- function(edited, f, base) {
 as_base <- function(model, its_drivers, its_info) {
   function(values, drivers = its_drivers, info = its_info) {
     if (!missing(drivers)) check_drivers_read(model, drivers, its_drivers)
-    call_run_function(model$f, values[names(model$parameters)], drivers[, model$boundary, drop = FALSE], info = info)
+    call_run_function(model$f, values[names(model$parameters)],
+                      drivers[, model$boundary, drop = FALSE], info = info)
   }
 }
 
@@ -107,12 +115,14 @@ as_base <- function(model, its_drivers, its_info) {
 check_drivers_read <- function(model, drivers, its_drivers) {
   check_named_columns(drivers, "drivers", model$boundary)
   beyond <- setdiff(colnames(drivers), model$boundary)
-  as_it_was <- function(name) name %in% colnames(its_drivers) && identical(drivers[, name], its_drivers[, name])
+  as_it_was <- function(name)
+    name %in% colnames(its_drivers) && identical(drivers[, name], its_drivers[, name])
   changed <- beyond[!vapply(beyond, as_it_was, NA)]
   if (length(changed)) {
-    abort_input(c(paste("{.code base()} was given a {.val {changed}} of its own, which {.val {model$name}} does not",
-                        "read: it would change nothing."),
-                  i = if (length(model$boundary)) "It reads {.val {model$boundary}}." else "It reads no drivers.",
+    abort_input(c(paste("{.code base()} was given a {.val {changed}} of its own, which",
+                        "{.val {model$name}} does not read: it would change nothing."),
+                  i = if (length(model$boundary)) "It reads {.val {model$boundary}}."
+                      else "It reads no drivers.",
                   i = "What it does not read must act in {.arg f} itself."), call = NULL)
   }
 }
@@ -125,19 +135,24 @@ call_run_function <- function(f, values, drivers, ...) {
   do.call(f, c(list(values, drivers), further), quote = TRUE)
 }
 
-# A function of two arguments, and of those of `offered` that it names; any other must have a default.
+# A function of two arguments, and of those of `offered` that it names; any other must have a
+# default.
 check_run_function <- function(f, offered, call = rlang::caller_env()) {
   check_input(checkmate::check_function(f), "f", call = call)
   arguments <- names(formals(args(f)))
   needed <- arguments[vapply(formals(args(f)), rlang::is_missing, NA)]
   unknown <- setdiff(needed, c(arguments[1:2], offered, "..."))
   if (length(arguments) < 2 || any(arguments[1:2] %in% offered)) {
-    abort_input(c("{.arg f} has the argument{?s} {.arg {arguments}}; its first two must be values and drivers.",
-                  i = "Write {.code function(values, drivers) ...}; it may have {.arg {offered}} too."), call = call)
+    abort_input(c(
+      "{.arg f} has the argument{?s} {.arg {arguments}}; its first two must be values and drivers.",
+      i = "Write {.code function(values, drivers) ...}; it may have {.arg {offered}} too."),
+                call = call)
   }
   if (length(unknown)) {
-    abort_input(c("{.arg f} has {cli::qty(unknown)}argument{?s} {.arg {unknown}} that nothing is known to give to.",
-                  i = "Beside values and drivers it may have {.arg {offered}}; others need a default."), call = call)
+    abort_input(c(paste("{.arg f} has {cli::qty(unknown)}argument{?s} {.arg {unknown}} that",
+                        "nothing is known to give to."),
+                  i = paste("Beside values and drivers it may have {.arg {offered}}; others need a",
+                            "default.")), call = call)
   }
 }
 
@@ -152,7 +167,8 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
   other <- Filter(function(x) !inherits(x, "amiss_free"), parameters)
   for (one in parameters) if (inherits(one, "amiss_free")) check_whole(one, "...", call = call)
   if (!length(parameters) || length(other)) {
-    abort_input(c("Every parameter must be made by {.fun free}; got {if (length(other)) seen(other[[1]]) else 'none'}.",
+    abort_input(c(paste("Every parameter must be made by {.fun free}; got",
+                        "{if (length(other)) seen(other[[1]]) else 'none'}."),
                   i = "For example {.code free(\"gain\", uniform(0, 2))}."), call = call)
   }
   names(parameters) <- vapply(parameters, `[[`, "", "name")
@@ -163,7 +179,8 @@ named_parameters <- function(parameters, call = rlang::caller_env()) {
 
 #' @export
 print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
-  cli::cli_text("{.strong Simulator} {.val {x$name}} (an R function) with {length(x$parameters)} free parameter{?s}")
+  cli::cli_text(paste("{.strong Simulator} {.val {x$name}} (an R function) with",
+                      "{length(x$parameters)} free parameter{?s}"))
   say_bullets(vapply(utils::head(x$parameters, 10), format, ""))
   cli::cli_bullets(c("*" = if (length(x$boundary)) "driven by {.field {x$boundary}}",
                      ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
@@ -177,13 +194,14 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @param values Matrix of parameter values, one run a row, named columns.
 #' @param drivers Numeric matrix with named columns: one row per interval of one unbroken segment.
 #' @param step_h Length of an interval in hours.
-#' @param hold Values at which the target is held during warm-up, `NA` where it is free; a simulator that cannot be
-#'   held ignores it.
+#' @param hold Values at which the target is held during warm-up, `NA` where it is free; a simulator
+#'   that cannot be held ignores it.
 #' @param threads Number of threads.
-#' @param ... What a method may use or ignore: `time` of each row (`POSIXct`, or hours) and the number of the `segment`.
-#'   Every method must have it.
-#' @return `free_parameters()`: named list of [free()]; `driver_names()`: names of the columns that it needs;
-#'   `simulate_runs()`: matrix with one row per interval and one column per run, `NaN` columns where a run failed.
+#' @param ... What a method may use or ignore: `time` of each row (`POSIXct`, or hours) and the
+#'   number of the `segment`. Every method must have it.
+#' @return `free_parameters()`: named list of [free()]; `driver_names()`: names of the columns that
+#'   it needs; `simulate_runs()`: matrix with one row per interval and one column per run, `NaN`
+#'   columns where a run failed.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
@@ -198,7 +216,8 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @export
 free_parameters <- function(simulator) {
   present(simulator)
-  if (inherits(simulator, "amiss_ensemble")) check_whole(simulator, "simulator") else check_simulator(simulator)
+  if (inherits(simulator, "amiss_ensemble")) check_whole(simulator, "simulator")
+  else check_simulator(simulator)
   UseMethod("free_parameters")
 }
 
@@ -216,49 +235,52 @@ simulate_runs <- function(simulator, values, drivers, step_h, hold = NULL, threa
   UseMethod("simulate_runs")
 }
 
-# The same generics for simulators that have been checked: a run need not check its simulator thrice.
+# The same generics for simulators that have been checked: a run need not check its simulator
+# thrice.
 parameters_of <- function(simulator) UseMethod("free_parameters")
 
 named_drivers <- function(simulator) UseMethod("driver_names")
 
-check_run_request <- function(simulator, values, drivers, step_h, hold, threads, call = rlang::caller_env()) {
+check_run_request <- function(simulator, values, drivers, step_h, hold, threads,
+                              call = rlang::caller_env()) {
   check_simulator(simulator, call)
   check_named_columns(values, "values", names(parameters_of(simulator)), call)
   check_named_columns(drivers, "drivers", named_drivers(simulator), call)
   check_input(checkmate::check_number(step_h, lower = 1e-9, finite = TRUE), "step_h", call = call)
   check_input(checkmate::check_numeric(hold, null.ok = TRUE), "hold", call = call)
   if (!length(hold) %in% c(0, nrow(drivers))) {
-    abort_input(
-      "{.arg hold} has {length(hold)} value{?s}; one for each of the {nrow(drivers)} row{?s} of the drivers is needed.",
-                call = call)
+    abort_input(paste("{.arg hold} has {length(hold)} value{?s}; one for each of the",
+                      "{nrow(drivers)} row{?s} of the drivers is needed."), call = call)
   }
   check_threads(threads, call)
 }
 
 # A matrix of numbers with these columns among its own.
 check_named_columns <- function(x, name, needed, call = rlang::caller_env()) {
-  check_input(checkmate::check_matrix(x, if (NCOL(x) > 0) "numeric", min.rows = 1), name, call = call)
+  check_input(checkmate::check_matrix(x, if (NCOL(x) > 0) "numeric", min.rows = 1), name,
+              call = call)
   absent <- setdiff(needed, colnames(x))
   if (length(absent)) {
-    abort_input(c("{.arg {name}} has no column {.val {absent}}.", i = "Columns there: {.val {colnames(x)}}."),
-                call = call)
+    abort_input(c("{.arg {name}} has no column {.val {absent}}.",
+                  i = "Columns there: {.val {colnames(x)}}."), call = call)
   }
   twice <- colnames(x)[duplicated(colnames(x))]
-  if (length(twice)) abort_input("{.arg {name}} has the column {.val {twice[1]}} twice.", call = call)
+  if (length(twice))
+    abort_input("{.arg {name}} has the column {.val {twice[1]}} twice.", call = call)
 }
 
 # Beside what the method knows, only what every simulator is given.
 check_run_dots <- function(..., call = rlang::caller_env()) {
   unknown <- setdiff(rlang::names2(list(...)), c("time", "segment"))
-  if (length(unknown)) abort_input("{.fun simulate_runs} has no argument {.arg {unknown}}.", call = call)
+  if (length(unknown))
+    abort_input("{.fun simulate_runs} has no argument {.arg {unknown}}.", call = call)
 }
 
 # One time for each row.
 check_row_times <- function(time, rows, call = rlang::caller_env()) {
   if (length(time) != rows) {
-    abort_input(
-      "{.arg time} has {length(time)} value{?s}; one for each of the {rows} row{?s} of the drivers is needed.",
-                call = call)
+    abort_input(paste("{.arg time} has {length(time)} value{?s}; one for each of the {rows}",
+                      "row{?s} of the drivers is needed."), call = call)
   }
 }
 
@@ -275,16 +297,20 @@ free_parameters.amiss_function_simulator <- function(simulator) simulator$parame
 driver_names.amiss_function_simulator <- function(simulator) simulator$boundary
 
 #' @export
-simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, step_h, hold = NULL, threads = 1L,
-                                                   time = step_h * seq_len(nrow(drivers)), segment = 1L, ...) {
+simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, step_h, hold = NULL,
+                                                   threads = 1L,
+                                                   time = step_h * seq_len(nrow(drivers)),
+                                                   segment = 1L, ...) {
   check_run_dots(...)
   check_row_times(time, nrow(drivers))
-  info <- list(step_h = step_h, time = time, segment = segment, hold = hold %||% rep(NA_real_, nrow(drivers)))
+  info <- list(step_h = step_h, time = time, segment = segment,
+               hold = hold %||% rep(NA_real_, nrow(drivers)))
   runs <- matrix(NaN, nrow(drivers), nrow(values))
   stopped <- list()
   for (m in seq_len(nrow(values))) {
     point <- stats::setNames(values[m, ], colnames(values))
-    out <- tryCatch(call_run_function(simulator$f, point, drivers, info = info), error = function(e) e)
+    out <- tryCatch(call_run_function(simulator$f, point, drivers, info = info),
+                    error = function(e) e)
     piece_done()
     if (inherits(out, "amiss_error_input")) rlang::cnd_signal(out)
     if (inherits(out, "error")) {
@@ -297,11 +323,12 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
   }
   if (length(stopped)) {
     first <- as.integer(names(stopped)[1])
-    warn_input(c("{length(stopped)} of {nrow(values)} run{?s} of {.val {simulator$name}} stopped with an error.",
+    warn_input(c(paste("{length(stopped)} of {nrow(values)} run{?s} of {.val {simulator$name}}",
+                       "stopped with an error."),
                  x = "Run {first} at {point_words(values[first, , drop = FALSE])}: {stopped[[1]]}",
                  i = subscript_hint(stopped[[1]]),
-                 i = paste("It was given the parameters {.field {colnames(values)}} and the columns",
-                           "{.field {colnames(drivers)}}.")))
+                 i = paste("It was given the parameters {.field {colnames(values)}} and the",
+                           "columns {.field {colnames(drivers)}}.")))
   }
   runs
 }
@@ -309,16 +336,19 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
 # What to write where R says that something is not there, or not to be had in this way.
 subscript_hint <- function(message) {
   if (grepl("subscript out of bounds", message, fixed = TRUE))
-    "A column of the drivers is there only if {.arg boundary} names it, a parameter only if {.fun free} declares it."
+    paste("A column of the drivers is there only if {.arg boundary} names it, a parameter only if",
+          "{.fun free} declares it.")
   else if (grepl("$ operator", message, fixed = TRUE))
-    "Values are a vector and drivers a matrix: write {.code values[[\"k\"]]} and {.code drivers[, \"Te\"]}."
+    paste("Values are a vector and drivers a matrix: write {.code values[[\"k\"]]} and",
+          "{.code drivers[, \"Te\"]}.")
 }
 
 check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()) {
   if (is.numeric(out) && length(out) == rows) return(invisible())
   seen <- trimws(utils::capture.output(utils::str(out, give.attr = FALSE)))[1]
-  abort_input(c(paste("Run {m} of {.val {simulator$name}} returned {length(out)} value{?s} of class",
-                      "{.cls {class(out)}}; {rows} numbers were expected, one for each row of the drivers."),
+  abort_input(c(paste("Run {m} of {.val {simulator$name}} returned {length(out)} value{?s} of",
+                      "class {.cls {class(out)}}; {rows} numbers were expected, one for each row",
+                      "of the drivers."),
                 x = "At {point_words(point)} it returned: {seen}",
                 i = "Let the simulator return its output at every row."), call = call)
 }
@@ -328,8 +358,8 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
   known <- function(class) !is.null(utils::getS3method("simulate_runs", class, optional = TRUE))
   if (!any(vapply(class(simulator), known, NA))) {
     abort_input(c("{.arg simulator} is of class {.cls {class(simulator)}}, which is no simulator.",
-                  i = "Make one with {.fun zone} or {.fun function_simulator}, or give runs with {.fun ensemble}."),
-                  call = call)
+                  i = paste("Make one with {.fun zone} or {.fun function_simulator}, or give runs",
+                            "with {.fun ensemble}.")), call = call)
   }
   check_whole(simulator, "simulator", call = call)
 }
@@ -347,8 +377,8 @@ count_runs <- function(runs) ledger$runs <- ledger$runs + runs
 # Runs that were not made, as a program's cache had them.
 found_so_far <- function() ledger$found
 
-# A method of simulate_runs() that keeps runs notes of each whether it was found, and the seconds that it took when it
-# was made.
+# A method of simulate_runs() that keeps runs notes of each whether it was found, and the seconds
+# that it took when it was made.
 note_found <- function(found, seconds) {
   ledger$last <- found
   ledger$seconds <- ledger$seconds + sum(seconds)
@@ -357,8 +387,8 @@ note_found <- function(found, seconds) {
 # Seconds of the runs that were counted last, when they were made; 0 for simulators that keep none.
 last_seconds <- function() ledger$seconds
 
-# Evaluates the code that makes `runs` runs, and counts those of which a part had to be made. `found()` is to be called
-# after each part. If the code stops, all count.
+# Evaluates the code that makes `runs` runs, and counts those of which a part had to be made.
+# `found()` is to be called after each part. If the code stops, all count.
 counting_runs <- function(runs, code) {
   all_found <- rep(TRUE, runs)
   ledger$seconds <- 0
@@ -376,26 +406,31 @@ counting_runs <- function(runs, code) {
   result
 }
 
-# Runs over the segments that hold rows of the wanted uses, averaged like the measurements: one row for each used row.
-simulate_measured <- function(simulator, values, measurements, uses, threads, call = rlang::caller_env()) {
+# Runs over the segments that hold rows of the wanted uses, averaged like the measurements: one row
+# for each used row.
+simulate_measured <- function(simulator, values, measurements, uses, threads,
+                              call = rlang::caller_env()) {
   check_driver_columns(simulator, measurements, call)
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
   out <- matrix(NaN, length(measurements$y), nrow(values))
   pieces <- simulated_rows(measurements, rows)
   over <- if (length(pieces) > 1) paste0(" (", length(pieces), " segments)")
   counting_runs(nrow(values), function(part) {
-    counted(paste0("runs of the simulator", over), length(pieces) * nrow(values), for (i in seq_along(pieces)) {
-      within <- pieces[[i]]
-      fine <- part(simulate_rows(simulator, values, measurements$raw, within, threads, call))
-      averaged <- block_means(fine, measurements$block[within], measurements$per_step)
-      out[as.integer(rownames(averaged)), ] <<- averaged
-      piece_done(i * nrow(values))
-    })
+    counted(paste0("runs of the simulator", over), length(pieces) * nrow(values),
+            for (i in seq_along(pieces)) {
+              within <- pieces[[i]]
+              fine <- part(simulate_rows(simulator, values, measurements$raw, within,
+                                         threads, call))
+              averaged <- block_means(fine, measurements$block[within], measurements$per_step)
+              out[as.integer(rownames(averaged)), ] <<- averaged
+              piece_done(i * nrow(values))
+            })
   })
   out[rows, , drop = FALSE]
 }
 
-# The rows of the raw record, segment by segment, that a simulator runs over to give these rows of the averaged one.
+# The rows of the raw record, segment by segment, that a simulator runs over to give these rows of
+# the averaged one.
 simulated_rows <- function(measurements, rows) {
   wanted <- which(measurements$block %in% rows)
   lapply(unique(measurements$segment[rows]), function(segment) {
@@ -408,8 +443,9 @@ check_driver_columns <- function(simulator, measurements, call) {
   present <- colnames(measurements$raw$drivers)
   absent <- setdiff(named_drivers(simulator), present)
   if (!length(absent)) return(invisible())
-  abort_input(c("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the measurements do not have.",
-                i = "Columns there: {.val {present}}."), call = call)
+  abort_input(c(paste("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the",
+                      "measurements do not have."), i = "Columns there: {.val {present}}."),
+              call = call)
 }
 
 # Runs over rows of the raw record, all of one segment.
@@ -418,19 +454,20 @@ simulate_rows <- function(simulator, values, raw, rows, threads, call) {
   for (column in needed) {
     bad <- rows[!is.finite(raw$drivers[rows, column])]
     if (length(bad)) {
-      abort_input(c(paste("Driver {.val {column}} has {length(bad)} missing value{?s}; the first is in row {bad[1]}",
-                          "({format(raw$time[bad[1]])})."),
-                    i = paste("A simulator needs every value of what drives it: fill the gap, or remove these rows",
-                              "as a whole.")), call = call)
+      abort_input(c(paste("Driver {.val {column}} has {length(bad)} missing value{?s}; the first",
+                          "is in row {bad[1]} ({format(raw$time[bad[1]])})."),
+                    i = paste("A simulator needs every value of what drives it: fill the gap, or",
+                              "remove these rows as a whole.")), call = call)
     }
   }
   given <- segment_drivers(simulator, raw, rows, needed)
-  runs <- simulate_runs(simulator, values, given$drivers, raw$step_h, given$hold, threads, time = given$time,
-                        segment = raw$segment[rows[1]])
+  runs <- simulate_runs(simulator, values, given$drivers, raw$step_h, given$hold, threads,
+                        time = given$time, segment = raw$segment[rows[1]])
   if (given$lead) runs[-seq_len(given$lead), , drop = FALSE] else runs
 }
 
-# Rows of the raw record averaged like the measurements; the names of the rows are those of the blocks.
+# Rows of the raw record averaged like the measurements; the names of the rows are those of the
+# blocks.
 block_means <- function(fine, block, per_step) {
   whole <- !is.na(block)
   rowsum(fine[whole, , drop = FALSE], block[whole], reorder = TRUE) / per_step

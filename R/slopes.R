@@ -1,13 +1,14 @@
 #' Slopes that a simulator can give itself
 #'
-#' A search needs the slopes of the output with respect to the parameters. By differences they cost a run for each
-#' parameter. A simulator that knows them (by its adjoint, by forward differentiation) gives them by a method of this
-#' generic, and its searches need no runs for them. The default gives none.
+#' A search needs the slopes of the output with respect to the parameters. By differences they cost
+#' a run for each parameter. A simulator that knows them (by its adjoint, by forward
+#' differentiation) gives them by a method of this generic, and its searches need no runs for them.
+#' The default gives none.
 #'
 #' @inheritParams simulate_runs
 #' @param values A matrix of one row, its columns the free parameters.
-#' @return A matrix with a row for each row of the drivers and a column for each free parameter, in units of the output
-#'   for a unit of the parameter; or `NULL`.
+#' @return A matrix with a row for each row of the drivers and a column for each free parameter, in
+#'   units of the output for a unit of the parameter; or `NULL`.
 #' @examples
 #' slopes.my_linear <- function(simulator, values, drivers, step_h, hold = NULL, ...) {
 #'   cbind(gain = drivers[, "Te"])
@@ -20,7 +21,8 @@ slopes <- function(simulator, values, drivers, step_h, hold = NULL, ...) UseMeth
 #' @export
 slopes.default <- function(simulator, values, drivers, step_h, hold = NULL, ...) NULL
 
-# At the rows used in calibration (rows x parameters), averaged like the measurements; NULL if the simulator gives none.
+# At the rows used in calibration (rows x parameters), averaged like the measurements; NULL if the
+# simulator gives none.
 measured_slopes <- function(simulator, values, measurements) {
   rows <- used_rows(measurements, "calibrate")
   out <- matrix(0, length(measurements$y), ncol(values), dimnames = list(NULL, colnames(values)))

@@ -1,5 +1,5 @@
-# Readings that stand apart from those before and after them: errors of a sensor, or events of a single step. Errors
-# count as normal, so that a few such readings weigh like many good ones.
+# Readings that stand apart from those before and after them: errors of a sensor, or events of a
+# single step. Errors count as normal, so that a few such readings weigh like many good ones.
 
 # Rows of the errors r that stand apart, beside rows of the same unbroken part.
 spikes <- function(r, hours, step_h) {
@@ -13,8 +13,10 @@ spikes <- function(r, hours, step_h) {
 
 spike_inspection <- function(model, measurements) {
   if (is_several(measurements)) {
-    told <- lapply(each_view(model, measurements), function(view) spike_inspection(view$model, view$measurements))
-    if (length(unlist(told))) return(c(spikes = paste(names(unlist(told)), unlist(told), sep = ": ", collapse = " ")))
+    told <- lapply(each_view(model, measurements),
+                   function(view) spike_inspection(view$model, view$measurements))
+    if (length(unlist(told)))
+      return(c(spikes = paste(names(unlist(told)), unlist(told), sep = ": ", collapse = " ")))
     return(NULL)
   }
   p <- model$prediction[model$prediction$use == "calibrate", ]
@@ -24,9 +26,10 @@ spike_inspection <- function(model, measurements) {
   apart <- apart[!rows[apart] %in% measurements$faulty]
   if (!length(apart)) return(NULL)
   at <- measurements$time[rows][apart[1]]
-  c(spikes = sprintf(paste("%d of %d readings, the first at %s, %s apart from those before and after: a sensor that",
-                           "fails now and then, or something that lasts a single step. What is the sensor's, mark as",
-                           "NA: a few such readings weigh like many good ones."),
+  c(spikes = sprintf(paste("%d of %d readings, the first at %s, %s apart from those before and",
+                           "after: a sensor that fails now and then, or something that lasts a",
+                           "single step. What is the sensor's, mark as NA: a few such readings",
+                           "weigh like many good ones."),
                      length(apart), length(r), paste0(if (is.numeric(at)) "hour ", format(at)),
                      if (length(apart) > 1) "stand" else "stands"))
 }

@@ -1,5 +1,5 @@
-# The loop: a state that is passed on from step to step. A step tries what is left of the catalogue on the
-# present model, verifies what could win, and adopts the winner or says why there is none.
+# The loop: a state that is passed on from step to step. A step tries what is left of the catalogue
+# on the present model, verifies what could win, and adopts the winner or says why there is none.
 
 first_state <- function(started, catalogue, runs, context) {
   context$say("Calibrating the base model")
@@ -40,7 +40,8 @@ next_step <- function(state, context) {
   state
 }
 
-# Whether nothing was adopted yet, though so much of the error is left that mechanisms of the catalogue may be missed.
+# Whether nothing was adopted yet, though so much of the error is left that mechanisms of the
+# catalogue may be missed.
 asks_again <- function(state) length(state$models) == 1 && leaves_much(state$present)
 
 # Mechanisms that were not adopted and can be applied on top of what was.
@@ -67,7 +68,8 @@ reason_to_stop <- function(state, context) {
 }
 
 budget_words <- function(context) {
-  sprintf("the budget of %d runs of the simulator was spent", as.integer(context$control$runs_total))
+  sprintf("the budget of %d runs of the simulator was spent",
+          as.integer(context$control$runs_total))
 }
 
 # ---- trials
@@ -96,7 +98,8 @@ try_one <- function(state, name, simulators, bar, context) {
   }
   tryCatch(try_mechanism(present, name, simulators, state$off[[name]], bar, context),
            amiss_error_numerical = function(e) {
-    failed <- new_model(simulators, present$records, paste(present$name, "+", name), present$name, name)
+    failed <- new_model(simulators, present$records, paste(present$name, "+", name),
+                        present$name, name)
     utils::modifyList(failed, list(level = "failed", reason = conditionMessage(e)))
   })
 }
@@ -111,7 +114,8 @@ trial_order <- function(catalogue, attribution) {
   names(catalogue)[order(-weight)]
 }
 
-# The present simulators with a mechanism, of each record in turn; what was adopted may act on some of them.
+# The present simulators with a mechanism, of each record in turn; what was adopted may act on some
+# of them.
 extended_simulators <- function(mechanism, state) {
   brought <- setdiff(names(state$present$parameters), state$base)
   simulators <- state$present$simulators
@@ -122,16 +126,17 @@ extended_simulators <- function(mechanism, state) {
   extended
 }
 
-# An edit that could be made on the base model may not be possible on top of what was adopted: then the loop
-# goes on without it.
+# An edit that could be made on the base model may not be possible on top of what was adopted: then
+# the loop goes on without it.
 can_extend <- function(mechanism, state, brought) {
   if (!length(brought)) return(TRUE)
   tryCatch({
     extended_simulators(mechanism, state)
     TRUE
   }, amiss_error_edit = function(e) {
-    warn_result(c("Mechanism {.val {mechanism$name}} is left out: it cannot be applied on top of what was adopted.",
-                  x = "{conditionMessage(e)}"), class = "amiss_warning_edit")
+    warn_result(c(paste("Mechanism {.val {mechanism$name}} is left out: it cannot be applied on",
+                        "top of what was adopted."), x = "{conditionMessage(e)}"),
+                class = "amiss_warning_edit")
     FALSE
   })
 }
@@ -147,7 +152,8 @@ report_model <- function(model, context) {
   first <- utils::head(model$attribution$table[model$attribution$table$significant, ], 1)
   context$say(paste(
     "{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
-    "{signif(model$scores$validate[['rmse']], 3)} held out; {runs_spent(context)} runs so far; discrepancy",
+    "{signif(model$scores$validate[['rmse']], 3)} held out; {runs_spent(context)} runs so far;",
+    "discrepancy",
     if (nrow(first)) paste("responds most to {.field {first$boundary}}",
                            "(log10 Bayes factor {round(first$log10_bf_dropped, 1)})")
     else "shows no response to a boundary condition"))
@@ -159,7 +165,8 @@ no_winner <- function(table, present, context) {
   reason <- why_not(table, decisive, context)
   significant <- significant_conditions(present$attribution$table)
   open <- if (!length(significant)) " and no boundary condition is significant"
-          else paste0("; what responds to ", paste(significant, collapse = ", "), " remains unexplained")
+          else paste0("; what responds to ", paste(significant, collapse = ", "),
+                      " remains unexplained")
   list(id = reason$id, words = paste0(reason$words, open), reason = reason$words)
 }
 
@@ -170,13 +177,15 @@ why_not <- function(table, decisive, context) {
   highest <- seen[which.max(seen$log10_bf), ]
   if (keeps_error(highest) && highest$log10_bf >= decisive) {
     return(list(id = "keeps_error", words = sprintf(
-      "no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but does not lower it)",
-      highest$mechanism, highest$log10_bf)))
+      paste("no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but",
+            "does not lower it)"), highest$mechanism, highest$log10_bf)))
   }
   if (is_refuted(highest) && highest$log10_bf >= decisive) {
-    return(list(id = "imitated", words = sprintf(
-      paste("no mechanism is decisive (%s has a log10 Bayes factor of %.1f, but one of %.1f beside an unknown response",
-            "to what drives it)"), highest$mechanism, highest$log10_bf, highest$beside_unknown)))
+    return(list(id = "imitated",
+                words = sprintf(paste("no mechanism is decisive (%s has a log10 Bayes factor of",
+                                      "%.1f, but one of %.1f beside an unknown response to what",
+                                      "drives it)"), highest$mechanism, highest$log10_bf,
+                                highest$beside_unknown)))
   }
   if (!nrow(best) || highest$log10_bf < decisive) best <- highest
   # As many digits as it takes to see that it is less than what is needed.

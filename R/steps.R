@@ -1,13 +1,14 @@
-# What a simulator's own steps err by: its output at the posterior's centre where every row of the drivers is given as
-# several shorter ones, against that of the rows as they are.
+# What a simulator's own steps err by: its output at the posterior's centre where every row of the
+# drivers is given as several shorter ones, against that of the rows as they are.
 
-# What steps a quarter as long change in calibration: list(error, moved), the RMS in the target's unit of what the
-# parameters cannot take up, and by how many of its standard deviations each would move. NULL where that is not known:
-# of runs that are given, of a simulator whose steps are not those of its rows, or one whose output does not settle as
-# they get shorter.
+# What steps a quarter as long change in calibration: list(error, moved), the RMS in the target's
+# unit of what the parameters cannot take up, and by how many of its standard deviations each would
+# move. NULL where that is not known: of runs that are given, of a simulator whose steps are not
+# those of its rows, or one whose output does not settle as they get shorter.
 step_effect <- function(fit, threads) {
   if (!follows_step(fit$emulator$simulator)) return(NULL)
-  change <- tryCatch(suppress_run_warnings(suppressWarnings(step_change(fit, threads))), error = function(e) NULL)
+  change <- tryCatch(suppress_run_warnings(suppressWarnings(step_change(fit, threads))),
+                     error = function(e) NULL)
   if (!is.null(change)) taken_up(fit, change)
 }
 
@@ -29,11 +30,13 @@ step_change <- function(fit, threads) {
     settles <- rms(quarter - half) <= 0.75 * rms(half)  # a half in a scheme of first order
     if (isTRUE(settles || rms(quarter) < rules$negligible_step * m$noise_sd)) quarter
   }
-  settled(character()) %||% settled(likely_amounts(driver_names(simulator), function(amounts) rms(change(2, amounts))))
+  settled(character()) %||% settled(likely_amounts(driver_names(simulator),
+                                                   function(amounts) rms(change(2, amounts))))
 }
 
-# Which drivers are amounts of a row, to be shared among shorter ones, and not what holds over it: those with which the
-# output changes least (`off`) of none, each and all, and of what then differs by one where that at least halves it.
+# Which drivers are amounts of a row, to be shared among shorter ones, and not what holds over it:
+# those with which the output changes least (`off`) of none, each and all, and of what then differs
+# by one where that at least halves it.
 likely_amounts <- function(drivers, off) {
   tried <- c(list(character(), drivers), as.list(drivers))
   amounts <- NULL
@@ -43,33 +46,40 @@ likely_amounts <- function(drivers, off) {
     if (!is.null(amounts) && min(each) >= 0.5 * least) return(amounts)
     least <- min(each)
     amounts <- tried[[which.min(each)]]
-    tried <- lapply(drivers, function(name) if (name %in% amounts) setdiff(amounts, name) else c(amounts, name))
+    tried <- lapply(drivers, function(name) if (name %in% amounts) setdiff(amounts, name)
+                                            else c(amounts, name))
   }
 }
 
-# Slopes of the emulated output at the posterior's centre, in the target's unit for a standard deviation of each prior.
+# Slopes of the emulated output at the posterior's centre, in the target's unit for a standard
+# deviation of each prior.
 emulated_slopes <- function(fit) {
   centre <- posterior_centre(fit)
   p <- length(centre)
   by <- 0.05  # standard deviations of the prior
   coefficients <- function(x) predict_emulator_(fit$emulator$processes, x)$mean
   around <- matrix(centre, p, p, byrow = TRUE)
-  fit$emulator$basis$vectors %*% t(coefficients(around + diag(by, p)) - coefficients(around - diag(by, p))) / (2 * by)
+  fit$emulator$basis$vectors %*% t(
+    coefficients(around + diag(by, p)) - coefficients(around - diag(by, p))) / (2 * by)
 }
 
-# A change of the output, seen by least squares under the priors, white noise and the emulator's slopes.
+# A change of the output, seen by least squares under the priors, white noise and the emulator's
+# slopes.
 taken_up <- function(fit, change) {
   slopes <- emulated_slopes(fit)
   weight <- 1 / fit$measurements$noise_sd^2
-  move <- solve(weight * crossprod(slopes) + diag(ncol(slopes)), weight * crossprod(slopes, change))[, 1]
-  sd <- sqrt(colSums(fit$weights * sweep(to_normal(posterior_unit(fit)), 2, posterior_centre(fit))^2))
-  list(error = rms(change - slopes %*% move), moved = stats::setNames(move / sd, names(fit$emulator$parameters)))
+  move <- solve(weight * crossprod(slopes) + diag(ncol(slopes)),
+                weight * crossprod(slopes, change))[, 1]
+  sd <- sqrt(
+    colSums(fit$weights * sweep(to_normal(posterior_unit(fit)), 2, posterior_centre(fit))^2))
+  list(error = rms(change - slopes %*% move),
+       moved = stats::setNames(move / sd, names(fit$emulator$parameters)))
 }
 
 rms <- function(x) sqrt(mean(x^2))
 
-# Whether the steps of a simulator get shorter with the rows of its drivers: those of a function do that reads their
-# length, itself or by a function that it calls. A zone() has steps of its own.
+# Whether the steps of a simulator get shorter with the rows of its drivers: those of a function do
+# that reads their length, itself or by a function that it calls. A zone() has steps of its own.
 follows_step <- function(simulator) {
   if (!inherits(simulator, "amiss_function_simulator")) return(FALSE)
   while (!is.null(simulator$base)) simulator <- simulator$base
@@ -90,22 +100,25 @@ reads_step <- function(f, known = list()) {
   FALSE
 }
 
-# One run at the rows used in calibration with every row of the drivers given as several shorter ones: two columns, the
-# means of those and the last of them, each averaged like the measurements.
+# One run at the rows used in calibration with every row of the drivers given as several shorter
+# ones: two columns, the means of those and the last of them, each averaged like the measurements.
 simulate_in_steps <- function(simulator, values, measurements, times, amounts, threads) {
   rows <- which(measurements$use == "calibrate" & !is.na(measurements$y))
   out <- matrix(NaN, length(measurements$y), 2)
   count_runs(1)
   for (within in simulated_rows(measurements, rows)) {
     raw <- shorter_rows(measurements$raw, within, times, amounts)
-    run <- matrix(simulate_rows(simulator, values, raw, seq_along(raw$y), threads, rlang::caller_env()), times)
-    averaged <- block_means(cbind(colMeans(run), run[times, ]), measurements$block[within], measurements$per_step)
+    run <- matrix(
+      simulate_rows(simulator, values, raw, seq_along(raw$y), threads, rlang::caller_env()), times)
+    averaged <- block_means(cbind(colMeans(run), run[times, ]), measurements$block[within],
+                            measurements$per_step)
     out[as.integer(rownames(averaged)), ] <- averaged
   }
   out[rows, , drop = FALSE]
 }
 
-# These rows of a raw record, each as several that share its length and the `amounts` among its drivers, about its time.
+# These rows of a raw record, each as several that share its length and the `amounts` among its
+# drivers, about its time.
 shorter_rows <- function(raw, rows, times, amounts) {
   each <- rep(rows, each = times)
   offset <- (rep_len(seq_len(times), length(each)) - (times + 1) / 2) / times * raw$step_h
@@ -118,9 +131,10 @@ shorter_rows <- function(raw, rows, times, amounts) {
 
 # ---- what it says
 
-# In words, where the steps may be the cause instead of the parameters `new` that a model has beside its parent: what it
-# mends is not clearly more than what the parent's own steps err by, or shorter ones would move it by a good part of its
-# distance from no effect. Evidence of ln B is that of z^2 / 2 = ln B at z standard deviations.
+# In words, where the steps may be the cause instead of the parameters `new` that a model has beside
+# its parent: what it mends is not clearly more than what the parent's own steps err by, or shorter
+# ones would move it by a good part of its distance from no effect. Evidence of ln B is that of z^2
+# / 2 = ln B at z standard deviations.
 step_doubt <- function(parent, model, new, log10_bf, measurements) {
   known <- !is.na(step_error(parent))
   squares <- function(model) {
@@ -131,17 +145,18 @@ step_doubt <- function(parent, model, new, log10_bf, measurements) {
   error <- sqrt(sum(step_error(parent)^2, na.rm = TRUE))
   mended <- sqrt(max(0, sum((squares(parent) - squares(model))[known])))
   if (any(known) && error >= rules$largest_step_share * mended)
-    return(sprintf("shorter steps of the simulator change %s of the noise where it mends %s", short(error),
-                   short(mended)))
+    return(sprintf("shorter steps of the simulator change %s of the noise where it mends %s",
+                   short(error), short(mended)))
   moved <- step_moves(model)
   move <- max(0, abs(moved[names(moved) %in% new]))
   away <- sqrt(2 * log(10) * max(0, log10_bf))
   if (move > 0 && move >= rules$largest_step_share * away)
-    sprintf("shorter steps of the simulator move its values by %s standard deviations, where %s make its evidence",
-            short(move), short(away))
+    sprintf(paste("shorter steps of the simulator move its values by %s standard deviations, where",
+                  "%s make its evidence"), short(move), short(away))
 }
 
-step_moves <- function(model) do.call(c, c(list(numeric()), lapply(unname(model$steps), `[[`, "moved")))
+step_moves <- function(model)
+  do.call(c, c(list(numeric()), lapply(unname(model$steps), `[[`, "moved")))
 
 # Of each record what shorter steps change, over the noise; NA where that is not known.
 step_error <- function(model) {

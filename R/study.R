@@ -2,93 +2,104 @@ study_fields <- list(
   needed = c("study", "data", "time", "target", "boundary"),
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
-  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
-               "fill_gaps_h", "missing", "range", "separator", "decimal", "runs", "seed", "control", "title",
-               "records"))
+  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format",
+               "time_zone", "fill_gaps_h", "missing", "range", "separator", "decimal", "runs",
+               "seed", "control", "title", "records"))
 
 # What each of several records may have of its own.
-record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h", "calibrate", "validate",
-                   "warmup_h", "unit", "time_format", "time_zone", "fill_gaps_h", "missing", "range", "separator",
-                   "decimal")
+record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h",
+                   "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
+                   "fill_gaps_h", "missing", "range", "separator", "decimal")
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
 
 #' Run a study from its file
 #'
-#' A study is a YAML file: what was measured, which rows calibrate and validate, what is to be done with which models
-#' (R files that return them), and the control. `read_study()` checks it and prepares the pieces; `run_study()` does the
-#' work and writes the results. Paths in the file are relative to the file.
+#' A study is a YAML file: what was measured, which rows calibrate and validate, what is to be done
+#' with which models (R files that return them), and the control. `read_study()` checks it and
+#' prepares the pieces; `run_study()` does the work and writes the results. Paths in the file are
+#' relative to the file.
 #'
-#' A study that names a `model` and a `catalogue` runs the loop of [upgrade_model()]; one that names `models` (an R file
-#' whose value is a named list of simulators) compares them by [compare_models()], with `method` (`paper` or `history`)
-#' and, where the record is synthetic, `truth` (an R file whose value is a list of a `simulator` and its `values`).
+#' A study that names a `model` and a `catalogue` runs the loop of [upgrade_model()]; one that names
+#' `models` (an R file whose value is a named list of simulators) compares them by
+#' [compare_models()], with `method` (`paper` or `history`) and, where the record is synthetic,
+#' `truth` (an R file whose value is a list of a `simulator` and its `values`).
 #'
-#' The value of `model` and of `catalogue` may also be a function of the [measurements()] that returns the piece: so a
-#' study can have given runs ([ensemble()]) as its model, and [responses()] as its catalogue.
+#' The value of `model` and of `catalogue` may also be a function of the [measurements()] that
+#' returns the piece: so a study can have given runs ([ensemble()]) as its model, and [responses()]
+#' as its catalogue.
 #'
-#' Needed are `study` (a name), `data`, `time`, `target` and `boundary`, and `model` with `catalogue`, or `models`.
-#' R files are evaluated in their own folder.
-#' * `data`: a table (see *Tables*) or an R file whose value is a data frame; `separator` and `decimal` of the
-#'   table.
-#' * `time`, `target`, `boundary`: columns of it; `boundary` is a list, with `circular(Wd)` for degrees.
+#' Needed are `study` (a name), `data`, `time`, `target` and `boundary`, and `model` with
+#' `catalogue`, or `models`. R files are evaluated in their own folder.
+#' * `data`: a table (see *Tables*) or an R file whose value is a data frame; `separator` and
+#'   `decimal` of the table.
+#' * `time`, `target`, `boundary`: columns of it; `boundary` is a list, with `circular(Wd)` for
+#'   degrees.
 #' * `calibrate` and `validate`: conditions in the columns of the data.
-#' * `noise_sd`, `unit`, `time_format`, `time_zone`, as in [measurements()]; `average_h` (the step of the data if it
-#'   is not given), `warmup_h` and `fill_gaps_h` (0) in hours.
-#' * `missing`: codes for a missing value, as `[-9999, 85]`, or `none`. `range`: ends of the target's sensor, as
-#'   `[-.inf, 27]`.
-#' * `title` (that of `study`), `seed`, `control` and `runs`, as in [upgrade_model()] or [compare_models()] (150
-#'   runs); `method` (`paper`) of a comparison.
+#' * `noise_sd`, `unit`, `time_format`, `time_zone`, as in [measurements()]; `average_h` (the step
+#'   of the data if it is not given), `warmup_h` and `fill_gaps_h` (0) in hours.
+#' * `missing`: codes for a missing value, as `[-9999, 85]`, or `none`. `range`: ends of the
+#'   target's sensor, as `[-.inf, 27]`.
+#' * `title` (that of `study`), `seed`, `control` and `runs`, as in [upgrade_model()] or
+#'   [compare_models()] (150 runs); `method` (`paper`) of a comparison.
 #'
-#' *Several records.* `records` maps the name of each record to the fields that it has of its own. Fields outside
-#' are for all records that do not say otherwise. Of its own a record may have its model, and all that says what was
-#' measured. The value of a `model` may also be a list of simulators by the names of the records ([outputs_of()]). A
-#' catalogue that is a function gets the list of measurements. The loop is then that of [upgrade_model()] over
-#' several records.
+#' *Several records.* `records` maps the name of each record to the fields that it has of its own.
+#' Fields outside are for all records that do not say otherwise. Of its own a record may have its
+#' model, and all that says what was measured. The value of a `model` may also be a list of
+#' simulators by the names of the records ([outputs_of()]). A catalogue that is a function gets the
+#' list of measurements. The loop is then that of [upgrade_model()] over several records.
 #'
-#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false` are logical, and
-#' numbers are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text). Conditions are no R code: they may hold
-#' columns, numbers, texts in quotes, comparisons, `&`, `|`, `!`, brackets, the four operations of arithmetic and `%in%
-#' c(...)`. Texts are compared as in [measurements()]. One that begins with `!` needs quotes around it: `validate:
-#' '!(hour > 72)'`.
+#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false`
+#' are logical, and numbers are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text).
+#' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`,
+#' `!`, brackets, the four operations of arithmetic and `%in% c(...)`. Texts are compared as in
+#' [measurements()]. One that begins with `!` needs quotes around it: `validate: '!(hour > 72)'`.
 #'
-#' *result.json* of a loop holds `schema`, `study`, `seed`, `wall_s` (seconds), `runs_total`, `diagnosis` (`verdict`:
-#' `"named"`, `"likely"`, `"unexplained"` or `"nothing"`; `tag`, `headline`), `named_cause` (`null` if there is none; a
-#' likely cause stands here too), `gain` (`log10_bf`, `interval` and the scores of the first and the last model),
-#' `stopped_because`, `candidates` (as in [upgrade_model()]) and `models`: of each `name`, `parent`, `mechanism`, `N`
-#' rows, `M` runs, `Q` basis vectors, its evidence, `trusted` and why (`trust`), `verdict`, `doubts`, `confounded_with`,
-#' `held_out_gain`, `step_error` (what shorter steps of the simulator change, as in
-#' [upgrade_model()]), what the check by runs said (`emulator_error`, `emulator_ratio`, `emulator_checked`),
-#' `refinements`, `reach`, scores, `parameters` and `attribution`. What is not there is `null`. An exit status of 0, of
-#' the command `amiss`, says that the work was done, not that a cause was found or that numbers are trusted.
+#' *result.json* of a loop holds `schema`, `study`, `seed`, `wall_s` (seconds), `runs_total`,
+#' `diagnosis` (`verdict`: `"named"`, `"likely"`, `"unexplained"` or `"nothing"`; `tag`,
+#' `headline`), `named_cause` (`null` if there is none; a likely cause stands here too), `gain`
+#' (`log10_bf`, `interval` and the scores of the first and the last model), `stopped_because`,
+#' `candidates` (as in [upgrade_model()]) and `models`: of each `name`, `parent`, `mechanism`, `N`
+#' rows, `M` runs, `Q` basis vectors, its evidence, `trusted` and why (`trust`), `verdict`,
+#' `doubts`, `confounded_with`, `held_out_gain`, `step_error` (what shorter steps of the simulator
+#' change, as in [upgrade_model()]), what the check by runs said (`emulator_error`,
+#' `emulator_ratio`, `emulator_checked`), `refinements`, `reach`, scores, `parameters` and
+#' `attribution`. What is not there is `null`. An exit status of 0, of the command `amiss`, says
+#' that the work was done, not that a cause was found or that numbers are trusted.
 #'
-#' @section Tables:
-#' The table in `data` is a text file. Its header is the line that holds `time`, `target` and `boundary`; what stands
-#' above it is left out, as are lines that begin with `#` and rows of units below the header. Fields are separated by
-#' commas, semicolons, tabs, bars or spaces, whichever separates the names in the header; `separator` says it if that
-#' fails (`comma`, `semicolon`, `tab`, `bar`, `space`, or the sign itself). Decimals may have a comma; if columns
-#' disagree, `decimal` says `","` or `"."`, and the other sign then separates thousands. Exponents may be `E` or `D`.
-#' Empty fields and words such as `NA`, `NaN` and `null` are missing values. A column without a name gets that of its
-#' place, such as `column_1`. A row with more or fewer fields than the header has names is an error. Text that is not
-#' UTF-8 is read as UTF-16 or Windows-1252, with a message.
+#' @section Tables: The table in `data` is a text file. Its header is the line that holds `time`,
+#' `target` and `boundary`; what stands above it is left out, as are lines that begin with `#` and
+#' rows of units below the header. Fields are separated by commas, semicolons, tabs, bars or spaces,
+#' whichever separates the names in the header; `separator` says it if that fails (`comma`,
+#' `semicolon`, `tab`, `bar`, `space`, or the sign itself). Decimals may have a comma; if columns
+#' disagree, `decimal` says `","` or `"."`, and the other sign then separates thousands. Exponents
+#' may be `E` or `D`. Empty fields and words such as `NA`, `NaN` and `null` are missing values. A
+#' column without a name gets that of its place, such as `column_1`. A row with more or fewer fields
+#' than the header has names is an error. Text that is not UTF-8 is read as UTF-16 or Windows-1252,
+#' with a message.
 #'
 #' @param path The YAML file.
-#' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL` writes nothing. It
-#'   is filled only when all is computed; until then its folder `stages` holds the finished models, and the same call
-#'   goes on from there if it was interrupted, as long as the code of the study's R files is the same. What has these
-#'   names before, such as earlier results, is moved into a folder `earlier-` with the time. One run at a time can use
-#'   the folder. If the report or a figure cannot be made, a warning (`amiss_warning_missing`) says which and why; the
+#' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL`
+#'   writes nothing. It is filled only when all is computed; until then its folder `stages` holds
+#'   the finished models, and the same call goes on from there if it was interrupted, as long as the
+#'   code of the study's R files is the same. What has these names before, such as earlier results,
+#'   is moved into a folder `earlier-` with the time. One run at a time can use the folder. If the
+#'   report or a figure cannot be made, a warning (`amiss_warning_missing`) says which and why; the
 #'   others are written, and the same call makes what is missing.
-#' @param seed Overrides the seed of the file; with neither R's generator draws one, which is kept with the stages.
+#' @param seed Overrides the seed of the file; with neither R's generator draws one, which is kept
+#'   with the stages.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
-#' @param trust Whether the R files that the study names may run, and files outside its folder be read: both can do
-#'   whatever you can. If not, such a study is refused, or you are asked at a terminal. Studies that ship with the
-#'   package need no trust.
-#' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], with `study`, `title` and `wall_s`,
-#'   invisibly. `read_study()`: a list of `study`, `title`, `seed`, `runs`, `control`, `measurements` (of several
-#'   records a named list), `model` and `catalogue`, or `models`, `method` and `truth`.
-#' @seealso `help("amiss-package")` for options that a batch job may set, and for the classes of conditions.
+#' @param trust Whether the R files that the study names may run, and files outside its folder be
+#'   read: both can do whatever you can. If not, such a study is refused, or you are asked at a
+#'   terminal. Studies that ship with the package need no trust.
+#' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], with `study`,
+#'   `title` and `wall_s`, invisibly. `read_study()`: a list of `study`, `title`, `seed`, `runs`,
+#'   `control`, `measurements` (of several records a named list), `model` and `catalogue`, or
+#'   `models`, `method` and `truth`.
+#' @seealso `help("amiss-package")` for options that a batch job may set, and for the classes of
+#'   conditions.
 #' @examples
 #' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
 #' @export
@@ -109,11 +120,13 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
   }
   seed <- kept_seed(seed %||% study$seed, stages)
   result <- staged(paste("study", study$study), if (is.null(study$models)) {
-    upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs, control = study$control,
-                  seed = seed, threads = threads, quiet = quiet, checkpoint = stages)
+    upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs,
+                  control = study$control, seed = seed, threads = threads, quiet = quiet,
+                  checkpoint = stages)
   } else {
-    compare_models(study$models, study$measurements, study$method, runs = study$runs %||% 150, control = study$control,
-                   seed = seed, threads = threads, quiet = quiet, checkpoint = stages, truth = study$truth)
+    compare_models(study$models, study$measurements, study$method, runs = study$runs %||% 150,
+                   control = study$control, seed = seed, threads = threads, quiet = quiet,
+                   checkpoint = stages, truth = study$truth)
   })
   result$study <- study$study
   result$title <- study$title
@@ -143,10 +156,12 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
   }, records, of_each, names(records) %||% "")
   measured <- if (quiet) suppressMessages(measure(), classes = "amiss_message_gap") else measure()
   if (is.null(study$records)) measured <- measured[[1]]
-  pieces <- if (is.null(study$models)) upgrade_pieces(of_each, measured) else comparison_pieces(files, study$method)
-  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed, runs = study$runs,
-         control = study$control),
-    pieces, list(measurements = measured, code = content_hash(lapply(files[is_code(files)], study_code))))
+  pieces <- if (is.null(study$models)) upgrade_pieces(of_each, measured)
+            else comparison_pieces(files, study$method)
+  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed,
+         runs = study$runs, control = study$control),
+    pieces,
+    list(measurements = measured, code = content_hash(lapply(files[is_code(files)], study_code))))
 }
 
 # The fields of each record, checked; of a study without `records` its own.
@@ -157,22 +172,24 @@ study_records <- function(study, path, call = rlang::caller_env()) {
   }
   own <- study$records
   if (!is.list(own) || !length(own) || !checkmate::test_named(own, "unique") ||
-        !all(vapply(own, function(x) is.null(x) || checkmate::test_list(x, names = "unique"), NA))) {
-    abort_input(c("{.field records} of the study file {.file {path}} is no mapping of names to fields.",
-                  i = "Write the name of each record, and indented below it what is its own."), call = call)
+      !all(vapply(own, function(x) is.null(x) || checkmate::test_list(x, names = "unique"), NA))) {
+    abort_input(
+      c("{.field records} of the study file {.file {path}} is no mapping of names to fields.",
+        i = "Write the name of each record, and indented below it what is its own."), call = call)
   }
   foreign <- intersect(names(study), study_fields$comparison)
   if (length(foreign)) {
     abort_input(c("The study file {.file {path}} has {.field records} and {.field {foreign}}.",
-                  i = "Several records go through the loop only: name {.field model} and {.field catalogue}."),
-                call = call)
+                  i = paste("Several records go through the loop only: name {.field model} and",
+                            "{.field catalogue}.")), call = call)
   }
   Map(function(fields, name) {
     unknown <- setdiff(names(fields), record_fields)
     if (length(unknown)) {
-      abort_input(c(paste("The record {.val {name}} of the study file {.file {path}} has {cli::qty(unknown)}unknown",
-                          "field{?s} {.field {unknown}}."),
-                    i = "What a record can have of its own: {.field {record_fields}}."), call = call)
+      abort_input(c(paste("The record {.val {name}} of the study file {.file {path}} has",
+                          "{cli::qty(unknown)}unknown field{?s} {.field {unknown}}."),
+                    i = "What a record can have of its own: {.field {record_fields}}."),
+                  call = call)
     }
     record <- study[names(study) != "records"]
     record[names(fields)] <- fields
@@ -186,22 +203,26 @@ study_records <- function(study, path, call = rlang::caller_env()) {
 naming_record <- function(name, code, call = rlang::caller_env()) {
   if (!nzchar(name)) return(code)
   tryCatch(code, amiss_error_input = function(e) {
-    abort_input(c("The record {.val {name}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
+    abort_input(c("The record {.val {name}} cannot be read.", x = "{conditionMessage(e)}"),
+                call = call)
   })
 }
 
 study_measurements <- function(study, files) {
   data <- study_data(study, files[["data"]])
   rows <- function(field) {
-    if (!is.null(study[[field]])) structure(list(text = study[[field]]), class = "amiss_row_condition")
+    if (!is.null(study[[field]]))
+      structure(list(text = study[[field]]), class = "amiss_row_condition")
   }
-  measurements(data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
-               noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
-               validate = rows("validate"),
-               warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
-               time_format = study$time_format, time_zone = study$time_zone, fill_gaps = study$fill_gaps_h %||% 0,
-               missing = if (identical(study$missing, "none")) NA else unlist(study$missing),
-               range = unlist(study$range))
+  measurements(
+    data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
+    noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
+    validate = rows("validate"),
+    warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
+    time_format = study$time_format, time_zone = study$time_zone,
+    fill_gaps = study$fill_gaps_h %||% 0,
+    missing = if (identical(study$missing, "none")) NA else unlist(study$missing),
+    range = unlist(study$range))
 }
 
 # The options that can be checked before anything is computed.
@@ -214,30 +235,36 @@ check_study_control <- function(study, call = rlang::caller_env()) {
 check_study_fields <- function(study, path, of = "", call = rlang::caller_env()) {
   if (!is.list(study) || !checkmate::test_named(study, "unique")) {
     abort_input(c("The study file {.file {path}} is no mapping of fields to values.",
-                  i = "Write a line for each field, as {.code target: Ti}, each field once."), call = call)
+                  i = "Write a line for each field, as {.code target: Ti}, each field once."),
+                call = call)
   }
   unknown <- setdiff(names(study), unlist(study_fields))
   if (length(unknown)) {
-    abort_input(c("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s} {.field {unknown}}.",
-                  i = "Known fields: {.field {unlist(study_fields, use.names = FALSE)}}."), call = call)
+    abort_input(c(paste("The study file {.file {path}} has {cli::qty(unknown)}unknown field{?s}",
+                        "{.field {unknown}}."),
+                  i = "Known fields: {.field {unlist(study_fields, use.names = FALSE)}}."),
+                call = call)
   }
   compares <- "models" %in% names(study)
-  foreign <- intersect(names(study), if (compares) study_fields$upgrade else study_fields$comparison)
+  foreign <- intersect(names(study),
+                       if (compares) study_fields$upgrade else study_fields$comparison)
   if (length(foreign)) {
     partner <- if (compares) "catalogue" else "models"
-    abort_input(c(paste("The study file {.file {path}} has {cli::qty(foreign)}field{?s} {.field {foreign}}, which",
-                        "{?goes/go} with {.field {partner}} only."),
-                  i = "Name either {.field model} and {.field catalogue}, or {.field models}."), call = call)
+    abort_input(c(paste("The study file {.file {path}} has {cli::qty(foreign)}field{?s}",
+                        "{.field {foreign}}, which {?goes/go} with {.field {partner}} only."),
+                  i = "Name either {.field model} and {.field catalogue}, or {.field models}."),
+                call = call)
   }
   absent <- setdiff(c(study_fields$needed, if (!compares) study_fields$upgrade), names(study))
   if (length(absent)) {
-    abort_input(c("The study file {.file {path}}{of} lacks {cli::qty(absent)}field{?s} {.field {absent}}.",
-                  i = if (any(absent %in% study_fields$upgrade)) "Or name {.field models}, to compare several."),
-                  call = call)
+    abort_input(
+      c("The study file {.file {path}}{of} lacks {cli::qty(absent)}field{?s} {.field {absent}}.",
+        i = if (any(absent %in% study_fields$upgrade))
+              "Or name {.field models}, to compare several."), call = call)
   }
   for (field in c("study", "title", "unit", "time", "target")) {
-    check_input(checkmate::check_string(study[[field]], null.ok = field %in% c("title", "unit")), field,
-                "Numbers and dates are text in quotes only.", call = call)
+    check_input(checkmate::check_string(study[[field]], null.ok = field %in% c("title", "unit")),
+                field, "Numbers and dates are text in quotes only.", call = call)
   }
 }
 
@@ -262,21 +289,25 @@ require_trust <- function(files, folder, trust, call = rlang::caller_env()) {
                        paste(c(code, other), collapse = "\n"), "\nTrust it?")
     if (isTRUE(utils::askYesNo(question, default = FALSE))) return(invisible())
   }
-  cli::cli_abort(c("The study asks for trust that was not given.",
-                   x = if (length(code)) "{cli::qty(code)}It runs the R code of {.file {code}}.",
-                   x = if (length(other)) "{cli::qty(other)}It reads {.file {other}}, outside its folder.",
-                   i = "If you trust its author, say {.code trust = TRUE}, or {.code --trust} on the command line."),
-                 class = c("amiss_error_trust", "amiss_error_input", "amiss_error"), call = short_call(call))
+  cli::cli_abort(
+    c("The study asks for trust that was not given.",
+      x = if (length(code)) "{cli::qty(code)}It runs the R code of {.file {code}}.",
+      x = if (length(other)) "{cli::qty(other)}It reads {.file {other}}, outside its folder.",
+      i = paste("If you trust its author, say {.code trust = TRUE}, or {.code --trust} on the",
+                "command line.")),
+    class = c("amiss_error_trust", "amiss_error_input", "amiss_error"), call = short_call(call))
 }
 
 study_data <- function(study, path, call = rlang::caller_env()) {
   if (is_code(c(data = path))) {
     data <- source_value(path, "data", call)
-    check_input(checkmate::check_data_frame(data), "data", "Let the R file end with a data frame.", call = call)
+    check_input(checkmate::check_data_frame(data), "data", "Let the R file end with a data frame.",
+                call = call)
     return(data)
   }
   conditions <- boundary_terms(as.character(unlist(study$boundary)), call)$name
-  read_table_file(path, c(study$time, study$target, conditions), study$separator, study$decimal, call)
+  read_table_file(path, c(study$time, study$target, conditions), study$separator,
+                  study$decimal, call)
 }
 
 # `files`: those of each record.
@@ -284,13 +315,15 @@ upgrade_pieces <- function(files, measurements, call = rlang::caller_env()) {
   several <- !is.object(measurements)
   model <- if (several) record_models(files, measurements, call)
            else source_value(files[[1]][["model"]], "model", call, measurements)
-  for (one in if (several) model else list(model)) if (!inherits(one, "amiss_ensemble")) check_simulator(one, call)
+  for (one in if (several) model
+              else list(model)) if (!inherits(one, "amiss_ensemble")) check_simulator(one, call)
   catalogue <- source_value(files[[1]][["catalogue"]], "catalogue", call, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", call = call)
   list(model = model, catalogue = catalogue)
 }
 
-# A file that several records name is evaluated once, so that simulators that share their runs go on doing so.
+# A file that several records name is evaluated once, so that simulators that share their runs go on
+# doing so.
 record_models <- function(files, measurements, call) {
   paths <- vapply(files, `[[`, "", "model")
   made <- lapply(stats::setNames(nm = unique(paths)), source_value, "model", call)
@@ -299,8 +332,9 @@ record_models <- function(files, measurements, call) {
     if (is.function(value)) return(source_value(path, "model", call, measurements[[name]]))
     if (!rlang::is_bare_list(value)) return(value)
     if (!name %in% names(value)) {
-      abort_input(c("The {.field model} file {.file {path}} has no simulator of the record {.val {name}}.",
-                    i = "Those of its list are of {.val {names(value)}}."), call = call)
+      abort_input(c(paste("The {.field model} file {.file {path}} has no simulator of the record",
+                          "{.val {name}}."), i = "Those of its list are of {.val {names(value)}}."),
+                  call = call)
     }
     value[[name]]
   }, paths, names(paths))
@@ -326,13 +360,14 @@ study_path <- function(path, folder, field, call = rlang::caller_env()) {
   full
 }
 
-# The value of the last expression of an R file, evaluated in its folder, where it sees the package and nothing of the
-# session. Where it is a function and the measurements are known, what it makes of them.
+# The value of the last expression of an R file, evaluated in its folder, where it sees the package
+# and nothing of the session. Where it is a function and the measurements are known, what it makes
+# of them.
 source_value <- function(path, field, call = rlang::caller_env(), measurements = NULL) {
   tryCatch(sys.source_value(path, measurements), error = function(e) {
     if (inherits(e, "amiss_error")) stop(e)
-    abort_input(c("The {.field {field}} file {.file {path}} stopped with an error.", x = "{conditionMessage(e)}"),
-                call = call)
+    abort_input(c("The {.field {field}} file {.file {path}} stopped with an error.",
+                  x = "{conditionMessage(e)}"), call = call)
   })
 }
 
@@ -347,4 +382,5 @@ sys.source_value <- function(path, measurements = NULL) {
 }
 
 # The parsed expressions of an R file: its comments and layout make no difference.
-study_code <- function(path) as.list(parse(text = read_utf8(path, "code"), keep.source = FALSE, encoding = "UTF-8"))
+study_code <- function(path)
+  as.list(parse(text = read_utf8(path, "code"), keep.source = FALSE, encoding = "UTF-8"))

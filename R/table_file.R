@@ -1,11 +1,12 @@
-# Tables in text files, as loggers, spreadsheets and programs write them: the header is the line that holds the names
-# that are looked for, and its fields say what separates them.
+# Tables in text files, as loggers, spreadsheets and programs write them: the header is the line
+# that holds the names that are looked for, and its fields say what separates them.
 
 separators <- c(comma = ",", semicolon = ";", tab = "\t", bar = "|", space = "")
 
-# `names`: columns that should be there, the first of them time and target. `separator`, `decimal`: as a study says
-# them, or NULL.
-read_table_file <- function(path, names, separator = NULL, decimal = NULL, call = rlang::caller_env()) {
+# `names`: columns that should be there, the first of them time and target. `separator`, `decimal`:
+# as a study says them, or NULL.
+read_table_file <- function(path, names, separator = NULL, decimal = NULL,
+                            call = rlang::caller_env()) {
   check_table_options(separator, decimal, call)
   text <- read_any_text(path, "data", call)
   lines <- strsplit(gsub("\r\n?", "\n", text), "\n", fixed = TRUE)[[1]]
@@ -14,7 +15,8 @@ read_table_file <- function(path, names, separator = NULL, decimal = NULL, call 
     abort_input(c("The data file {.file {path}} cannot be read.", x = "{why}"), call = call)
   }
   if (!any(nzchar(trimws(lines)))) refuse("It holds no lines.")
-  header <- find_header(lines, names, if (is.null(separator)) separators else known_separator(separator))
+  header <- find_header(lines, names,
+                        if (is.null(separator)) separators else known_separator(separator))
   body <- body_lines(lines, header$line)
   columns <- body_fields(body, header, refuse)
   columns <- without_units(columns, names, path)
@@ -25,7 +27,8 @@ read_table_file <- function(path, names, separator = NULL, decimal = NULL, call 
 
 check_table_options <- function(separator, decimal, call) {
   check_input(checkmate::check_string(separator, min.chars = 1, null.ok = TRUE), "separator",
-              "Give the sign between two fields, or one of {.val {names(separators)}}.", call = call)
+              "Give the sign between two fields, or one of {.val {names(separators)}}.",
+              call = call)
   if (!is.null(separator) && !can_separate(known_separator(separator))) {
     abort_input(c("{.arg separator} = {.val {separator}} is no sign that can stand between fields.",
                   i = "Give one sign, or one of {.val {names(separators)}}."), call = call)
@@ -35,26 +38,29 @@ check_table_options <- function(separator, decimal, call) {
 }
 
 # One sign that no field begins or ends with; "" stands for spaces.
-can_separate <- function(sign) !nzchar(sign) || grepl("^([[:punct:]]|\t)$", sign) && !grepl("[\"'#]", sign) &&
-  nchar(sign, "bytes") == 1
+can_separate <- function(sign) !nzchar(sign) ||
+  grepl("^([[:punct:]]|\t)$", sign) && !grepl("[\"'#]", sign) && nchar(sign, "bytes") == 1
 
 known_separator <- function(separator) {
   if (separator %in% names(separators)) return(separators[[separator]])
   if (grepl("^ +$", separator)) "" else separator
 }
 
-# list(line, fields, separator): the first line with most of the names. A header may stand in a comment.
+# list(line, fields, separator): the first line with most of the names. A header may stand in a
+# comment.
 find_header <- function(lines, names, separators) {
   first <- utils::head(which(nzchar(trimws(lines))), 200)
   best <- list(found = -1)
-  for (line in first) for (bare in unique(c(lines[line], sub("^\\s*[#%!]+\\s*", "", lines[line])))) {
-    for (separator in separators) {
-      fields <- split_line(bare, separator)
-      found <- sum(names %in% fields)
-      if (found > best$found) best <- list(found = found, line = line, fields = fields, separator = separator)
+  for (line in first)
+    for (bare in unique(c(lines[line], sub("^\\s*[#%!]+\\s*", "", lines[line])))) {
+      for (separator in separators) {
+        fields <- split_line(bare, separator)
+        found <- sum(names %in% fields)
+        if (found > best$found)
+          best <- list(found = found, line = line, fields = fields, separator = separator)
+      }
+      if (best$found == length(names)) return(best)
     }
-    if (best$found == length(names)) return(best)
-  }
   if (best$found > 0) return(best)
   # None of the names is there: the first line that is no comment, as it says most.
   line <- c(first[!is_comment(lines[first])], first)[1]
@@ -66,8 +72,9 @@ find_header <- function(lines, names, separators) {
 is_comment <- function(lines) grepl("^\\s*#", lines)
 
 split_line <- function(line, separator) {
-  fields <- suppressWarnings(scan(text = line, what = "", sep = separator, quote = "\"", quiet = TRUE,
-                                  na.strings = character(), comment.char = "", encoding = "UTF-8"))
+  fields <- suppressWarnings(scan(text = line, what = "", sep = separator, quote = "\"",
+                                  quiet = TRUE, na.strings = character(), comment.char = "",
+                                  encoding = "UTF-8"))
   trimws(fields)
 }
 
@@ -83,19 +90,23 @@ body_fields <- function(body, header, refuse) {
   names <- header$fields
   named <- max(which(nzchar(names)), 0)
   if (!named) refuse("Line ", header$line, " holds no names of columns.")
-  if (!length(body$text)) refuse("It has no rows below the names of its columns, in line ", header$line, ".")
+  if (!length(body$text))
+    refuse("It has no rows below the names of its columns, in line ", header$line, ".")
   ends <- fields_of_lines(body$text, header$separator)
   line <- body$number[!is.na(ends)]
   counts <- ends[!is.na(ends)]
   far <- which(counts > most_fields(names))[1]
-  if (!is.na(far)) refuse("Line ", line[far], " has ", counts[far], " fields, its header ", length(names), ".")
+  if (!is.na(far))
+    refuse("Line ", line[far], " has ", counts[far], " fields, its header ", length(names), ".")
   width <- max(counts, length(names))
   open <- function(w) refuse("A quotation mark is opened and not closed, perhaps in line ",
                              body$number[c(which(is.na(ends)), 1)[1]], ".")
   columns <- tryCatch(scan_fields(body$text, width, header$separator), warning = open)
   over <- Reduce(`|`, lapply(columns[-seq_len(length(names))], nzchar), rep(FALSE, length(counts)))
-  # Nothing may stand after a last separator, unless what stands first could be a number for each row.
-  counted <- identical(columns[[1]], format(seq_along(counts) - (columns[[1]][1] == "0"), trim = TRUE))
+  # Nothing may stand after a last separator, unless what stands first could be a number for each
+  # row.
+  counted <- identical(columns[[1]],
+                       format(seq_along(counts) - (columns[[1]][1] == "0"), trim = TRUE))
   bad <- which(over | counts < named | counted & counts > length(names))
   if (length(bad)) refuse_fields(bad[1], line, counts, columns, header, refuse)
   columns <- stats::setNames(columns[seq_along(names)], filled_names(names))
@@ -106,12 +117,14 @@ body_fields <- function(body, header, refuse) {
 }
 
 scan_fields <- function(text, width, separator) {
-  fields <- scan(text = text, what = rep(list(""), width), sep = separator, quote = "\"", quiet = TRUE, fill = TRUE,
-                 multi.line = FALSE, na.strings = character(), comment.char = "", encoding = "UTF-8")
+  fields <- scan(text = text, what = rep(list(""), width), sep = separator, quote = "\"",
+                 quiet = TRUE, fill = TRUE, multi.line = FALSE, na.strings = character(),
+                 comment.char = "", encoding = "UTF-8")
   lapply(fields, trimws)
 }
 
-# Nothing but separators may stand behind the last name. Of very many of them a table would be made first.
+# Nothing but separators may stand behind the last name. Of very many of them a table would be made
+# first.
 most_fields <- function(names) 2 * length(names) + 1000
 
 # NA for a line that ends inside of a quotation.
@@ -127,11 +140,11 @@ refuse_fields <- function(row, line, counts, columns, header, refuse) {
   what <- if (counts[row] < length(header$fields)) {
     "a row is cut off, or what separates its fields is another sign"
   } else {
-    paste("a first column without a name needs one in the header, a comma that is no separator (a decimal comma) needs",
-          "quotes around its field")
+    paste("a first column without a name needs one in the header, a comma that is no separator (a",
+          "decimal comma) needs quotes around its field")
   }
-  refuse("Row ", row, " (line ", line[row], ") has ", counts[row], " fields, its header ", length(header$fields), ": ",
-         values, ". Each row needs a field for each name: ", what,
+  refuse("Row ", row, " (line ", line[row], ") has ", counts[row], " fields, its header ",
+         length(header$fields), ": ", values, ". Each row needs a field for each name: ", what,
          ", or say `separator` in the study.")
 }
 
@@ -148,7 +161,7 @@ without_units <- function(columns, names, path) {
   unit <- unit | types & grepl("[sdn]$", time[first])
   above <- sum(cumprod(unit))
   if (!above) return(columns)
-  cli::cli_inform("The data file {.file {path}}: {above} row{?s} of units below the header {?is/are} left out.",
-                  class = "amiss_message_file")
+  cli::cli_inform(paste("The data file {.file {path}}: {above} row{?s} of units below the header",
+                        "{?is/are} left out."), class = "amiss_message_file")
   lapply(columns, function(x) x[-seq_len(above)])
 }

@@ -7,14 +7,17 @@ read_utf8 <- function(path, field, call = rlang::caller_env()) {
     abort_input(c("The {.field {field}} file {.file {path}} is not UTF-8 text: line {line}.",
                   i = "Save it with the encoding UTF-8."), call = call)
   }
-  if (any(bytes == as.raw(0))) invalid(1 + sum(bytes[seq_len(which(bytes == as.raw(0))[1])] == as.raw(10)))
+  if (any(bytes == as.raw(0)))
+    invalid(1 + sum(bytes[seq_len(which(bytes == as.raw(0))[1])] == as.raw(10)))
   text <- rawToChar(bytes)
-  if (!validUTF8(text)) invalid(which(!validUTF8(strsplit(text, "\n", fixed = TRUE, useBytes = TRUE)[[1]]))[1])
+  if (!validUTF8(text))
+    invalid(which(!validUTF8(strsplit(text, "\n", fixed = TRUE, useBytes = TRUE)[[1]]))[1])
   Encoding(text) <- "UTF-8"
   text
 }
 
-# The same of a table, which spreadsheets and loggers also write in UTF-16, and in Windows-1252, which holds Latin-1.
+# The same of a table, which spreadsheets and loggers also write in UTF-16, and in Windows-1252,
+# which holds Latin-1.
 read_any_text <- function(path, field, call = rlang::caller_env()) {
   bytes <- checked_bytes(path, field, call)
   from <- if (identical(utils::head(bytes, 2), as.raw(c(0xff, 0xfe)))) "UTF-16LE"
@@ -36,7 +39,8 @@ checked_bytes <- function(path, field, call) {
                 call = call)
   }
   bytes <- tryCatch(suppressWarnings(readBin(path, "raw", file.size(path))), error = function(e) {
-    abort_input(c("The {.field {field}} file {.file {path}} cannot be read.", x = "{conditionMessage(e)}"), call = call)
+    abort_input(c("The {.field {field}} file {.file {path}} cannot be read.",
+                  x = "{conditionMessage(e)}"), call = call)
   })
   mark <- as.raw(c(0xef, 0xbb, 0xbf))
   if (identical(utils::head(bytes, 3), mark)) bytes[-(1:3)] else bytes

@@ -1,5 +1,5 @@
-# Time as people have it, read into the one form that all later stages use: POSIXct where the date is known, numbers
-# (hours) where it is not.
+# Time as people have it, read into the one form that all later stages use: POSIXct where the date
+# is known, numbers (hours) where it is not.
 
 time_units <- c(seconds = 1 / 3600, minutes = 1 / 60, hours = 1, days = 24)
 # The number that each way to count days gives 1 January 1970.
@@ -34,7 +34,8 @@ is_span <- function(values) inherits(values, c("difftime", "ITime"))
 # By the unit that the values say: hms has methods of its own that do not convert.
 span_hours <- function(values) {
   unit <- if (inherits(values, "ITime")) "secs" else attr(values, "units")
-  as.numeric(unclass(values)) * c(secs = 1 / 3600, mins = 1 / 60, hours = 1, days = 24, weeks = 168)[[unit]]
+  as.numeric(unclass(values)) * c(secs = 1 / 3600, mins = 1 / 60, hours = 1, days = 24,
+                                  weeks = 168)[[unit]]
 }
 
 utc <- function(seconds) as.POSIXct(seconds, origin = "1970-01-01", tz = "UTC")
@@ -49,7 +50,8 @@ parse_numbers <- function(numbers, name, format, zone, call) {
   if (format %in% names(time_units)) return(numbers * time_units[[format]])
   if (format == "unix") return(on_clock(utc(unix_seconds(numbers)), zone %||% "UTC"))
   seconds <- serial_seconds(numbers, format)
-  if (format %in% c("excel", "matlab")) local_time(seconds, format(numbers, digits = 15), name, zone, call)
+  if (format %in% c("excel", "matlab"))
+    local_time(seconds, format(numbers, digits = 15), name, zone, call)
   else on_clock(utc(seconds), zone %||% "UTC")
 }
 
@@ -93,7 +95,8 @@ parse_text <- function(text, name, format, zone, call) {
   if (is_pattern(format)) return(pattern_time(text, name, format, zone, call))
   numbers <- text_numbers(text)
   if (is.null(numbers)) stamps_time(text, name, format, zone, call)
-  else parse_numbers(numbers, name, if (isTRUE(format %in% number_formats)) format else "hours", zone, call)
+  else parse_numbers(numbers, name, if (isTRUE(format %in% number_formats)) format else "hours",
+                     zone, call)
 }
 
 clean_text <- function(text) {
@@ -111,10 +114,11 @@ text_numbers <- function(text) {
 require_read <- function(unread, text, name, call) {
   bad <- which(unread & !is.na(text))
   if (!length(bad)) return(invisible())
-  abort_input(c("Time column {.val {name}} cannot be read: row {bad[1]} holds {.val {text[bad[1]]}}.",
-                i = paste("Use ISO 8601, for example 2013-08-30T00:10:00, or say by {.arg time_format} what it is, for",
-                          "example {.val %d.%m.%Y %H:%M}.")),
-              call = call)
+  abort_input(
+    c("Time column {.val {name}} cannot be read: row {bad[1]} holds {.val {text[bad[1]]}}.",
+      i = paste("Use ISO 8601, for example 2013-08-30T00:10:00, or say by {.arg time_format} what",
+                "it is, for example {.val %d.%m.%Y %H:%M}.")),
+    call = call)
 }
 
 # Months begin on their first day, where strptime() would take the day of today.
@@ -134,27 +138,32 @@ pattern_time <- function(text, name, format, zone, call) {
   # strptime() reads the beginning of a text alone: an end of its own shows what is left.
   rest <- which(is.na(pattern_seconds(paste0(text, "|"), paste0(format, "|"))) & !is.na(text))
   if (length(rest)) {
-    abort_input(c(paste("Time column {.val {name}}: {.arg time_format} = {.val {format}} reads only the beginning of",
-                        "{.val {text[rest[1]]}} in row {rest[1]}."),
-                  i = paste("Give a format of all of it ({.val %OS} for seconds with a fraction, {.val %Y} for a year",
-                            "of four digits); ISO 8601 needs none.")), call = call)
+    abort_input(c(paste("Time column {.val {name}}: {.arg time_format} = {.val {format}} reads",
+                        "only the beginning of {.val {text[rest[1]]}} in row {rest[1]}."),
+                  i = paste("Give a format of all of it ({.val %OS} for seconds with a fraction,",
+                            "{.val %Y} for a year of four digits); ISO 8601 needs none.")),
+                call = call)
   }
-  if (grepl("%z", format, fixed = TRUE)) on_clock(utc(seconds), zone) else local_time(seconds, text, name, zone, call)
+  if (grepl("%z", format, fixed = TRUE)) on_clock(utc(seconds), zone)
+  else local_time(seconds, text, name, zone, call)
 }
 
 # The forms of a date, the first for which all rows stand; a date without a year is EnergyPlus'.
-date_forms <- c(ymd = "(\\d{4})[-/.](\\d{1,2})[-/.](\\d{1,2})", day_month = "(\\d{1,2})([-/.])(\\d{1,2})\\2(\\d{4})",
+date_forms <- c(ymd = "(\\d{4})[-/.](\\d{1,2})[-/.](\\d{1,2})",
+                day_month = "(\\d{1,2})([-/.])(\\d{1,2})\\2(\\d{4})",
                 dotted = "(\\d{1,2})(\\.)(\\d{1,2})\\.(\\d{2})", no_year = "(\\d{1,2})/(\\d{1,2})")
-clock_form <- paste0("(?:(?:T|,?\\s+)(\\d{1,2}):(\\d{2})(?::(\\d{2}(?:[.,]\\d+)?))?\\s*([AaPp][Mm])?",
-                     "\\s*(Z|UTC|GMT|[+-]\\d{2}(?::?\\d{2})?)?)?")
+clock_form <- paste0(
+  "(?:(?:T|,?\\s+)(\\d{1,2}):(\\d{2})(?::(\\d{2}(?:[.,]\\d+)?))?\\s*([AaPp][Mm])?",
+  "\\s*(Z|UTC|GMT|[+-]\\d{2}(?::?\\d{2})?)?)?")
 
 stamps_time <- function(text, name, format, zone, call) {
   stamps <- stamp_parts(text, name, call)
   parts <- stamps$parts
   clock <- parts[, ncol(parts) - 4:0, drop = FALSE]
   seconds <- clock_seconds(clock)
-  date <- switch(stamps$form, ymd = parts[, 1:3, drop = FALSE], no_year = cbind(NA, parts[, 1:2, drop = FALSE]),
-                 ordered_date(parts, if (said_order(format)) format else day_order(stamps, name, call)))
+  date <- switch(
+    stamps$form, ymd = parts[, 1:3, drop = FALSE], no_year = cbind(NA, parts[, 1:2, drop = FALSE]),
+    ordered_date(parts, if (said_order(format)) format else day_order(stamps, name, call)))
   if (stamps$form == "no_year") {
     hours <- hours_of_year(date, seconds)
     require_read(is.na(hours), text, name, call)
@@ -166,9 +175,10 @@ stamps_time <- function(text, name, format, zone, call) {
   without <- is.na(offset) & !is.na(text)
   if (!any(without)) return(on_clock(utc(seconds - offset), zone %||% "UTC"))
   if (!all(is.na(offset))) {
-    abort_input(c(paste("Time column {.val {name}}: some rows state their offset from UTC and others do not; the first",
-                        "without is row {which(without)[1]}, {.val {text[without][1]}}."),
-                  i = "State it in all rows or in none."), call = call)
+    abort_input(c(paste("Time column {.val {name}}: some rows state their offset from UTC and",
+                        "others do not; the first without is row {which(without)[1]},",
+                        "{.val {text[without][1]}}."), i = "State it in all rows or in none."),
+                call = call)
   }
   local_time(seconds, text, name, zone, call)
 }
@@ -183,7 +193,8 @@ stamp_parts <- function(text, name, call) {
   list(form = names(date_forms)[k], parts = parts)
 }
 
-# The groups of a pattern: a matrix of text, NA where a row does not match, "" where a group is not there.
+# The groups of a pattern: a matrix of text, NA where a row does not match, "" where a group is not
+# there.
 captures <- function(pattern, text) {
   found <- regexpr(pattern, text, perl = TRUE)
   start <- attr(found, "capture.start")
@@ -194,25 +205,29 @@ captures <- function(pattern, text) {
 
 # Seconds since midnight; 24:00:00 ends the day.
 clock_seconds <- function(clock) {
-  number <- function(k) as.numeric(sub(",", ".", ifelse(is.na(clock[, k]) | nzchar(clock[, k]), clock[, k], "0"),
-                                       fixed = TRUE))
+  number <- function(k) as.numeric(
+    sub(",", ".", ifelse(is.na(clock[, k]) | nzchar(clock[, k]), clock[, k], "0"), fixed = TRUE))
   half <- tolower(clock[, 4])
   twelve <- half %in% c("am", "pm")
   hour <- number(1)
-  seconds <- 3600 * ifelse(twelve, hour %% 12 + 12 * (half == "pm"), hour) + 60 * number(2) + number(3)
-  seconds[which(number(2) > 59 | number(3) >= 61 | seconds > 86400 | twelve & (hour < 1 | hour > 12))] <- NA
+  seconds <- 3600 * ifelse(twelve, hour %% 12 + 12 * (half == "pm"), hour) + 60 * number(2) +
+    number(3)
+  seconds[which(
+    number(2) > 59 | number(3) >= 61 | seconds > 86400 | twelve & (hour < 1 | hour > 12))] <- NA
   seconds
 }
 
 offset_seconds <- function(offset) {
   offset[offset %in% c("Z", "UTC", "GMT")] <- "+0000"
   offset <- sub(":", "", offset, fixed = TRUE)
-  minutes <- as.numeric(substr(offset, 2, 3)) * 60 + ifelse(nchar(offset) > 3, as.numeric(substr(offset, 4, 5)), 0)
+  minutes <- as.numeric(substr(offset, 2, 3)) * 60 +
+    ifelse(nchar(offset) > 3, as.numeric(substr(offset, 4, 5)), 0)
   ifelse(startsWith(offset, "-"), -60, 60) * minutes
 }
 
 # Days since 1970 of year, month and day; NA where there is no such day.
-day_number <- function(date) as.numeric(as.Date(paste(date[, 1], date[, 2], date[, 3]), format = "%Y %m %d"))
+day_number <- function(date)
+  as.numeric(as.Date(paste(date[, 1], date[, 2], date[, 3]), format = "%Y %m %d"))
 
 said_order <- function(format) isTRUE(format %in% c("dmy", "mdy"))
 
@@ -222,8 +237,8 @@ ordered_date <- function(parts, order) {
   if (order == "mdy") cbind(year, parts[, 1], parts[, 3]) else cbind(year, parts[, 3], parts[, 1])
 }
 
-# "dmy" or "mdy", or NULL for stamps that need neither. Dots are day first; else the column itself decides: there is no
-# 13th month, and days follow each other.
+# "dmy" or "mdy", or NULL for stamps that need neither. Dots are day first; else the column itself
+# decides: there is no 13th month, and days follow each other.
 day_order <- function(stamps, name, call) {
   if (stamps$form %in% c("ymd", "no_year")) return(NULL)
   parts <- stamps$parts
@@ -236,9 +251,10 @@ day_order <- function(stamps, name, call) {
   if (sum(possible) == 1) return(orders[possible])
   first <- which(given)[1]
   date <- paste(parts[first, c(1, 2, 3, 2, 4)], collapse = "")
-  abort_input(c(paste("Time column {.val {name}}: whether the day or the month comes first in {.val {date}}",
-                      "(row {first}) cannot be told from the column."),
-                i = "Say {.code time_format = \"dmy\"} (day first) or {.code time_format = \"mdy\"}."), call = call)
+  abort_input(c(paste("Time column {.val {name}}: whether the day or the month comes first in",
+                      "{.val {date}} (row {first}) cannot be told from the column."),
+                i = paste("Say {.code time_format = \"dmy\"} (day first) or",
+                          "{.code time_format = \"mdy\"}.")), call = call)
 }
 
 # Hours since the beginning of the year in which the column starts, as the year itself is not known.
@@ -250,7 +266,8 @@ hours_of_year <- function(date, seconds) {
   24 * (day + (365 + leap) * year) + seconds / 3600
 }
 
-# Text without offset in a zone: `local` are its seconds as if in UTC, in which it is read if no zone is given.
+# Text without offset in a zone: `local` are its seconds as if in UTC, in which it is read if no
+# zone is given.
 local_time <- function(local, text, name, zone, call) {
   if (is.null(zone)) {
     require_even_clock(local, text, name, call)
@@ -261,16 +278,18 @@ local_time <- function(local, text, name, zone, call) {
   if (length(absent)) {
     hours <- both$offset[absent[1]] / 3600
     winter <- if (hours == round(hours)) sprintf("Etc/GMT%+d", -as.integer(hours)) else "UTC"
-    abort_input(c(paste("Time column {.val {name}}: row {absent[1]} holds {.val {text[absent[1]]}}, which the clocks",
-                        "of {.val {zone}} leave out when daylight saving begins."),
-                  i = paste("If the record's clock was not changed, give the zone that it stayed in, such as",
-                            "{.code time_zone = \"{winter}\"}.")),
-                  call = call)
+    abort_input(c(paste("Time column {.val {name}}: row {absent[1]} holds",
+                        "{.val {text[absent[1]]}}, which the clocks of {.val {zone}} leave out",
+                        "when daylight saving begins."),
+                  i = paste("If the record's clock was not changed, give the zone that it stayed",
+                            "in, such as {.code time_zone = \"{winter}\"}.")),
+                call = call)
   }
   on_clock(utc(repeated_hours(local, both, text, name, zone, call)), zone)
 }
 
-# The two readings of local time in a zone, by its offsets before and after; NA where the clock never showed it so.
+# The two readings of local time in a zone, by its offsets before and after; NA where the clock
+# never showed it so.
 zone_readings <- function(local, zone) {
   offset_at <- function(seconds) {
     offset <- as.POSIXlt(on_clock(utc(seconds), zone))$gmtoff
@@ -281,35 +300,37 @@ zone_readings <- function(local, zone) {
   list(first = reading(before), second = reading(offset_at(local + 86400)), offset = before)
 }
 
-# What the clock shows twice when daylight saving ends: up to where the column goes back it is the first time, from
-# there the second. Where it does not go back, that which follows the row before or leads to the row after without a
-# gap.
+# What the clock shows twice when daylight saving ends: up to where the column goes back it is the
+# first time, from there the second. Where it does not go back, that which follows the row before or
+# leads to the row after without a gap.
 repeated_hours <- function(local, both, text, name, zone, call) {
   seconds <- ifelse(is.na(both$first), both$second, both$first)
   rows <- which(both$first != both$second)
-  for (part in split(rows, cumsum(c(TRUE, diff(rows) > 1 | diff(local[rows]) > 86400))[seq_along(rows)])) {
-    back <- which(diff(local[part]) <= 0)
-    if (length(back) > 1) {
-      abort_input(c(paste("Time column {.val {name}} goes back more than once in the hour that {.val {zone}} has twice",
-                          "when daylight saving ends; again in row {part[back[2] + 1]},",
-                          "{.val {text[part[back[2] + 1]]}}."),
-                    i = "Sort the rows as they were measured, or give time in UTC."), call = call)
+  for (part in split(
+    rows, cumsum(c(TRUE, diff(rows) > 1 | diff(local[rows]) > 86400))[seq_along(rows)])) {
+      back <- which(diff(local[part]) <= 0)
+      if (length(back) > 1) {
+        abort_input(c(paste("Time column {.val {name}} goes back more than once in the hour that",
+                            "{.val {zone}} has twice when daylight saving ends; again in row",
+                            "{part[back[2] + 1]}, {.val {text[part[back[2] + 1]]}}."),
+                      i = "Sort the rows as they were measured, or give time in UTC."), call = call)
+      }
+      second <- if (length(back)) part[seq_along(part) > back] else {
+        to_before <- both$first[part[1]] - c(NA, seconds)[part[1]]
+        to_after <- c(seconds, NA)[part[length(part)] + 1] - both$second[part[length(part)]]
+        if (isTRUE(to_after < to_before) || is.na(to_before) && !is.na(to_after)) part
+      }
+      seconds[second] <- both$second[second]
     }
-    second <- if (length(back)) part[seq_along(part) > back] else {
-      to_before <- both$first[part[1]] - c(NA, seconds)[part[1]]
-      to_after <- c(seconds, NA)[part[length(part)] + 1] - both$second[part[length(part)]]
-      if (isTRUE(to_after < to_before) || is.na(to_before) && !is.na(to_after)) part
-    }
-    seconds[second] <- both$second[second]
-  }
   seconds
 }
 
 # Zones for the rules by which clocks are changed in most of the world.
-changing_zones <- c("Europe/Berlin", "Europe/London", "Europe/Helsinki", "America/New_York", "America/Santiago",
-                    "Australia/Sydney", "Pacific/Auckland")
+changing_zones <- c("Europe/Berlin", "Europe/London", "Europe/Helsinki", "America/New_York",
+                    "America/Santiago", "Australia/Sydney", "Pacific/Auckland")
 
-# Text that steps by an hour more or less just where a zone changes its clocks is local, and not read as UTC unasked.
+# Text that steps by an hour more or less just where a zone changes its clocks is local, and not
+# read as UTC unasked.
 require_even_clock <- function(local, text, name, call) {
   steps <- diff(local)
   step <- stats::median(steps, na.rm = TRUE)
@@ -319,7 +340,8 @@ require_even_clock <- function(local, text, name, call) {
   explained <- vapply(changing_zones, function(zone) {
     from <- zone_readings(local[jumps], zone)
     to <- zone_readings(local[jumps + 1], zone)
-    ways <- cbind(to$first - from$first, to$second - from$second, to$first - from$second, to$second - from$first)
+    ways <- cbind(to$first - from$first, to$second - from$second, to$first - from$second,
+                  to$second - from$first)
     rowSums(abs(ways - step) < near, na.rm = TRUE) > 0
   }, logical(length(jumps)))
   explained <- matrix(explained, length(jumps), dimnames = list(NULL, changing_zones))
@@ -327,10 +349,11 @@ require_even_clock <- function(local, text, name, call) {
   row <- jumps[rowSums(explained) > 0][1]
   likely <- colnames(explained)[colSums(explained) == max(colSums(explained))]
   others <- if (length(likely) > 1) paste0(" (or that of ", paste(likely[-1], collapse = ", "), ")")
-  abort_input(c(paste("Time column {.val {name}} states no zone, and from row {row} to {row + 1} ({.val {text[row]}}",
-                      "to {.val {text[row + 1]}}) it steps as clocks do where daylight saving",
-                      "{if (steps[row] > step) 'begins' else 'ends'}."),
-                i = paste("If it is local, give its zone, such as {.code time_zone = \"{likely[1]}\"}{others}; if it",
-                          "is not, {.code time_zone = \"UTC\"}.")),
+  abort_input(c(paste("Time column {.val {name}} states no zone, and from row {row} to {row + 1}",
+                      "({.val {text[row]}} to {.val {text[row + 1]}}) it steps as clocks do where",
+                      "daylight saving {if (steps[row] > step) 'begins' else 'ends'}."),
+                i = paste("If it is local, give its zone, such as",
+                          "{.code time_zone = \"{likely[1]}\"}{others}; if it is not,",
+                          "{.code time_zone = \"UTC\"}.")),
               call = call)
 }

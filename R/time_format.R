@@ -1,11 +1,12 @@
-# What a time column holds: what its people say, or what it can be alone. A column that could be several things is
-# refused, with the `time_format` of each.
+# What a time column holds: what its people say, or what it can be alone. A column that could be
+# several things is refused, with the `time_format` of each.
 
 read_time <- function(values, name, format = NULL, zone = NULL, call = rlang::caller_env()) {
   time_reading(values, name, format, zone, call)$time
 }
 
-# list(time, format), the format as it was settled, in which other values of the same record are read.
+# list(time, format), the format as it was settled, in which other values of the same record are
+# read.
 time_reading <- function(values, name, format = NULL, zone = NULL, call = rlang::caller_env()) {
   check_time_options(format, zone, call)
   values <- plain_time(values, name, call)
@@ -20,21 +21,23 @@ check_time_options <- function(format, zone, call) {
   known <- c(day_orders, number_formats)
   if (!is.null(format) && !format %in% known && !is_pattern(format)) {
     abort_input(c("{.arg time_format} = {.val {format}} is not known.",
-                  i = "Give one of {.val {known}}, or a format of {.fun strptime} such as {.val %d.%m.%Y %H:%M}."),
-                  call = call)
+                  i = paste("Give one of {.val {known}}, or a format of {.fun strptime} such as",
+                            "{.val %d.%m.%Y %H:%M}.")), call = call)
   }
   absent <- if (is_pattern(format)) pattern_lacks(format)
   if (length(setdiff(absent, "day"))) {
-    abort_input(c(paste("{.arg time_format} = {.val {format}} has no {listed(absent)}, for which {.fun strptime} takes",
-                        "those of today."),
-                  i = "Put the date in front of the time of day in {.arg data}, and its format here."), call = call)
+    abort_input(c(paste("{.arg time_format} = {.val {format}} has no {listed(absent)}, for which",
+                        "{.fun strptime} takes those of today."),
+                  i = paste("Put the date in front of the time of day in {.arg data}, and its",
+                            "format here.")), call = call)
   }
   check_input(checkmate::check_string(zone, null.ok = TRUE), "time_zone", call = call)
   if (!is.null(zone) && !zone %in% zone_names()) {
     abort_input(c("{.arg time_zone} = {.val {zone}} is not known.",
-                  i = paste("Give {.val UTC} or a name such as {.val Europe/Berlin} ({.fun OlsonNames} lists them);",
-                            "for one hour ahead of UTC all year {.val Etc/GMT-1}, with that sign.")),
-                  call = call)
+                  i = paste("Give {.val UTC} or a name such as {.val Europe/Berlin}",
+                            "({.fun OlsonNames} lists them); for one hour ahead of UTC all year",
+                            "{.val Etc/GMT-1}, with that sign.")),
+                call = call)
   }
 }
 
@@ -51,11 +54,13 @@ zone_names <- local({
 plain_time <- function(values, name, call) {
   values <- plain_numbers(values)
   if (is.factor(values)) return(as.character(values))
-  if (inherits(values, c("POSIXt", "Date")) || is_span(values) || is.character(values)) return(values)
+  if (inherits(values, c("POSIXt", "Date")) || is_span(values) || is.character(values))
+    return(values)
   if (is.numeric(values) && !is.object(values)) return(as.numeric(values))
   abort_input(c("Time column {.val {name}} is of class {.cls {class(values)}}.",
-                i = paste("Give text, numbers, {.cls POSIXct}, {.cls POSIXlt}, {.cls Date} or {.cls difftime}; most",
-                          "other classes become {.cls POSIXct} by {.fun as.POSIXct}, lengths of time hours by",
+                i = paste("Give text, numbers, {.cls POSIXct}, {.cls POSIXlt}, {.cls Date} or",
+                          "{.cls difftime}; most other classes become {.cls POSIXct} by",
+                          "{.fun as.POSIXct}, lengths of time hours by",
                           "{.code as.numeric(x, \"hours\")}.")), call = call)
 }
 
@@ -69,17 +74,18 @@ settled_format <- function(values, name, format, zone, call) {
   }
   if (is.null(format)) return(number_format(numbers, name, zone, call))
   if (!format %in% number_formats) {
-    abort_input(c(paste("Time column {.val {name}} holds numbers, which {.arg time_format} = {.val {format}} does not",
-                        "go with."),
-                  i = paste("For numbers it is one of {.val {number_formats}}, or a format of {.fun strptime} such as",
-                            "{.val %Y%m%d%H}.")), call = call)
+    abort_input(c(paste("Time column {.val {name}} holds numbers, which {.arg time_format} =",
+                        "{.val {format}} does not go with."),
+                  i = paste("For numbers it is one of {.val {number_formats}}, or a format of",
+                            "{.fun strptime} such as {.val %Y%m%d%H}.")), call = call)
   }
   format
 }
 
 largest_hours <- 1.8e7  # two thousand years
 # What people count in, as hours and days are written: steps of other lengths are hardly anybody's.
-usual_steps <- c(c(1, 2, 5, 6, 10, 12, 15, 20, 30) / 3600, c(1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30) / 60,
+usual_steps <- c(c(1, 2, 5, 6, 10, 12, 15, 20, 30) / 3600,
+                 c(1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30) / 60,
                  c(1, 2, 3, 4, 6, 8, 12), 24 * c(1, 2, 5, 7, 10, 14, 30, 31))
 
 # The share of the steps that are the usual one, 0 if that is none of people's.
@@ -103,7 +109,8 @@ number_format <- function(numbers, name, zone, call) {
     could_be <- c(dated[fit_of(dated, known) > 0.5], named_unit(name))
     if (!length(could_be)) return("hours")
   } else {
-    if (length(dated) == 1 && (!hours || fit_of(dated, known) > 0.5)) return(told_format(dated, known, name, zone))
+    if (length(dated) == 1 && (!hours || fit_of(dated, known) > 0.5))
+      return(told_format(dated, known, name, zone))
     units <- setdiff(names(time_units), "hours")
     could_be <- c(dated, if (hours) units[fit_of(units, known) > 0.5])
     if (hours && !length(could_be) && stats::median(diff(known)) <= 24) return("hours")
@@ -122,9 +129,10 @@ number_hours <- function(numbers, format) {
 }
 
 # Digits of a date without signs between them, those of a year of four first.
-digit_formats <- c("%Y%m%d", "%Y%m%d%H", "%Y%m%d%H%M", "%Y%m%d%H%M%S", "%Y%m", "%Y%j", "%Y%j%H", "%Y%j%H%M",
-                   "%y%m%d", "%y%m%d%H", "%y%m%d%H%M", "%y%m%d%H%M%S",
-                   "%d%m%Y", "%m%d%Y", "%d%m%Y%H", "%m%d%Y%H", "%d%m%Y%H%M", "%m%d%Y%H%M")
+digit_formats <- c(
+  "%Y%m%d", "%Y%m%d%H", "%Y%m%d%H%M", "%Y%m%d%H%M%S", "%Y%m", "%Y%j", "%Y%j%H", "%Y%j%H%M",
+  "%y%m%d", "%y%m%d%H", "%y%m%d%H%M", "%y%m%d%H%M%S",
+  "%d%m%Y", "%m%d%Y", "%d%m%Y%H", "%m%d%Y%H", "%d%m%Y%H%M", "%m%d%Y%H%M")
 
 # Hours since 1970, NA for what is no date of 1950 to 2099.
 digit_hours <- function(numbers, format) {
@@ -135,7 +143,8 @@ digit_hours <- function(numbers, format) {
 }
 
 # Days that are counted from a date: numbers of them that measurements of our time have.
-serial_ranges <- list(excel = c(25569, 50000), matlab = c(712224, 767000), julian = c(2433282, 2488070),
+serial_ranges <- list(excel = c(25569, 50000), matlab = c(712224, 767000),
+                      julian = c(2433282, 2488070),
                       mjd = c(50000, 70000), unix_days = c(12000, 25569))
 
 # The formats in which all these numbers are dates.
@@ -158,52 +167,60 @@ fitting_widths <- function(numbers) {
 # The unit that a column's name says, if it is not hours: "seconds", "t_min", "Time [d]", "doy".
 named_unit <- function(name) {
   words <- strsplit(tolower(name), "[^a-z]+")[[1]]
-  said <- c(s = "seconds", sec = "seconds", secs = "seconds", second = "seconds", seconds = "seconds", min = "minutes",
-            mins = "minutes", minute = "minutes", minutes = "minutes", d = "days", day = "days", days = "days",
-            doy = "days", jday = "days", yday = "days")
+  said <- c(s = "seconds", sec = "seconds", secs = "seconds", second = "seconds",
+            seconds = "seconds", min = "minutes", mins = "minutes", minute = "minutes",
+            minutes = "minutes", d = "days", day = "days", days = "days", doy = "days",
+            jday = "days", yday = "days")
   if (any(c("h", "hr", "hrs", "hour", "hours") %in% words)) return(NULL)
   unique(unname(said[words[words %in% names(said)]]))
 }
 
-format_words <- c(unix = "Unix time", excel = "days of Excel", matlab = "days of MATLAB", julian = "Julian days",
-                  mjd = "modified Julian days", unix_days = "days since 1970")
+format_words <- c(unix = "Unix time", excel = "days of Excel", matlab = "days of MATLAB",
+                  julian = "Julian days", mjd = "modified Julian days",
+                  unix_days = "days since 1970")
 
 # The first of the numbers in words, as a format reads it.
 first_shown <- function(format, numbers, zone) {
   hours <- number_hours(numbers, format)
   if (format %in% names(time_units)) return(paste("steps of", step_words(hours)))
   clock <- if (format == "unix") zone %||% "UTC" else "UTC"
-  first <- format(on_clock(utc(3600 * hours[1]), clock), if (format == "unix") "%Y-%m-%d %H:%M:%S %Z" else
-                    "%Y-%m-%d %H:%M")
+  first <- format(on_clock(utc(3600 * hours[1]), clock),
+                  if (format == "unix") "%Y-%m-%d %H:%M:%S %Z" else "%Y-%m-%d %H:%M")
   if (length(hours) < 2) first else paste0(first, ", steps of ", step_words(hours))
 }
 
 step_words <- function(hours) {
   step <- stats::median(diff(hours))
-  unit <- if (step >= 48) c(24, "d") else if (step >= 1) c(1, "h") else if (step >= 1 / 60) c(1 / 60, "min") else
-    c(1 / 3600, "s")
+  unit <- if (step >= 48) c(24, "d")
+          else if (step >= 1) c(1, "h")
+          else if (step >= 1 / 60) c(1 / 60, "min")
+          else c(1 / 3600, "s")
   paste(signif(step / as.numeric(unit[1]), 3), unit[2])
 }
 
 told_format <- function(format, numbers, name, zone) {
   what <- if (is_pattern(format)) "digits of a date" else format_words[[format]]
   shown <- first_shown(format, numbers, zone)
-  cli::cli_inform(c("Time column {.val {name}} is read as {what}, from {shown}: its numbers do not fit hours.",
-                    i = "{.code time_format = \"{format}\"} settles it."), class = "amiss_message_time")
+  cli::cli_inform(
+    c("Time column {.val {name}} is read as {what}, from {shown}: its numbers do not fit hours.",
+      i = "{.code time_format = \"{format}\"} settles it."), class = "amiss_message_time")
   format
 }
 
 refuse_numbers <- function(numbers, could_be, name, zone, call) {
   first <- format(numbers[1], digits = 15, scientific = FALSE)
   if (!length(could_be)) {
-    abort_input(c("Time column {.val {name}} holds numbers that are neither hours nor Unix time, such as {first}.",
-                  i = paste("Say by {.arg time_format} what they are, for example {.val %d%m%Y%H%M}, or one of",
-                            "{.val {number_formats}}.")), call = call)
+    abort_input(c(paste("Time column {.val {name}} holds numbers that are neither hours nor Unix",
+                        "time, such as {first}."),
+                  i = paste("Say by {.arg time_format} what they are, for example",
+                            "{.val %d%m%Y%H%M}, or one of {.val {number_formats}}.")), call = call)
   }
   if (identical(could_be, "hours")) could_be <- names(time_units)
   shown <- vapply(could_be, function(format) {
     sprintf("{.code time_format = \"%s\"}: %s", format, first_shown(format, numbers, zone))
   }, "")
-  abort_input(c("Time column {.val {name}} holds numbers, such as {first}, that could be several things.",
-                stats::setNames(shown, rep("*", length(shown))), i = "Say which by {.arg time_format}."), call = call)
+  abort_input(
+    c("Time column {.val {name}} holds numbers, such as {first}, that could be several things.",
+      stats::setNames(shown, rep("*", length(shown))), i = "Say which by {.arg time_format}."),
+    call = call)
 }

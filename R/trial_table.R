@@ -1,5 +1,5 @@
-# What trials are worth against the present model: Bayes factors, how far they may be off, and which may be
-# adopted.
+# What trials are worth against the present model: Bayes factors, how far they may be off, and which
+# may be adopted.
 
 # A row for each mechanism that was tried or left out by the budget.
 trial_table <- function(trials, present, left) {
@@ -24,17 +24,19 @@ trial_row <- function(trial, present) {
   factor$word <- evidence_word(factor$lower95, factor$upper95)
   if (!is_verified(trial)) factor <- as_tried(factor, trial)
   factor <- readable(factor)
-  row <- data.frame(from = present$name, mechanism = trial$mechanism, factor, beside_unknown = beside,
-                    error_ratio = error_ratio(trial$fit, present$fit), trusted = trial$fit$trust$trusted,
-                    judged_by = if (is_verified(trial)) "runs" else "trial", runs = trial$own_runs %||% 0)
+  row <- data.frame(
+    from = present$name, mechanism = trial$mechanism, factor, beside_unknown = beside,
+    error_ratio = error_ratio(trial$fit, present$fit), trusted = trial$fit$trust$trusted,
+    judged_by = if (is_verified(trial)) "runs" else "trial", runs = trial$own_runs %||% 0)
   row$parameters <- list(added_parameters(trial$fit, present$fit))
   row
 }
 
 empty_row <- function(mechanism, present, why, runs = NULL) {
-  row <- data.frame(from = present$name, mechanism = mechanism, log10_bf = NA_real_, lower95 = NA_real_,
-                    upper95 = NA_real_, word = NA_character_, beside_unknown = NA_real_, error_ratio = NA_real_,
-                    trusted = FALSE, judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
+  row <- data.frame(from = present$name, mechanism = mechanism, log10_bf = NA_real_,
+                    lower95 = NA_real_, upper95 = NA_real_, word = NA_character_,
+                    beside_unknown = NA_real_, error_ratio = NA_real_, trusted = FALSE,
+                    judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
   row$parameters <- list(added_parameters(present$fit, present$fit))
   row
 }
@@ -65,15 +67,16 @@ trial_margin <- function(model) {
 has_passed <- function(model) isTRUE(model$fit$check$passed)
 
 # Whether its check says what its evidence is, too.
-is_confirmed <- function(model) has_passed(model) && isTRUE(model$fit$check$effective >= rules$effective_trial)
+is_confirmed <- function(model)
+  has_passed(model) && isTRUE(model$fit$check$effective >= rules$effective_trial)
 
 # The simulation's own error in calibration over that of the fit `current`.
 error_ratio <- function(fit, current) {
   sqrt(mean(left_by_simulation(fit)^2) / mean(left_by_simulation(current)^2))
 }
 
-# Beside an unknown response to its conditions a mechanism that is the cause may gain little, as the response imitates
-# it; it must not lose decisively.
+# Beside an unknown response to its conditions a mechanism that is the cause may gain little, as the
+# response imitates it; it must not lose decisively.
 is_refuted <- function(table) !is.na(table$beside_unknown) & speaks_against(table$beside_unknown)
 
 speaks_against <- function(factor) factor < rules$against
@@ -86,14 +89,16 @@ added_parameters <- function(fit, parent) {
   table[!table$name %in% names(drawn_parameters(parent)), ]
 }
 
-# The row of highest evidence among the mechanisms that may be adopted: they were verified, the simulation's own error
-# falls with them, and they do not lose to an unknown response. Of decisive ones that it does not lead decisively, the
-# one that does best beside an unknown response: a stand-in explains no more than that does. No row if there is none.
+# The row of highest evidence among the mechanisms that may be adopted: they were verified, the
+# simulation's own error falls with them, and they do not lose to an unknown response. Of decisive
+# ones that it does not lead decisively, the one that does best beside an unknown response: a
+# stand-in explains no more than that does. No row if there is none.
 best_trial <- function(table) {
   open <- table[table$judged_by == "runs" & !keeps_error(table) & !is_refuted(table), ]
   lead <- open[which.max(open$log10_bf), ]
   if (!nrow(lead)) return(lead)
-  near <- open[open$log10_bf >= max(lead$log10_bf - rules$decisive, rules$decisive) & open$lower95 > 0, ]
+  near <- open[open$log10_bf >= max(lead$log10_bf - rules$decisive, rules$decisive) &
+               open$lower95 > 0, ]
   if (nrow(near)) near[which.max(near$beside_unknown), ] else lead
 }
 

@@ -4,62 +4,67 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 
 #' The loop: show, name the cause, extend, measure
 #'
-#' The model is calibrated and its discrepancy attributed. Every mechanism of the catalogue is tried as a real
-#' extension of the model. The mechanism with the highest evidence is adopted if its log10 Bayes factor is at
-#' least `decisive`, and the loop begins again with the extended model. A mechanism that raises the
-#' simulation's own error in calibration by more than 2 % is not adopted, whatever its evidence. Held-out rows
-#' do not decide what is adopted; they take part in the verdict: named, likely or a stand-in.
+#' The model is calibrated and its discrepancy attributed. Every mechanism of the catalogue is tried
+#' as a real extension of the model. The mechanism with the highest evidence is adopted if its log10
+#' Bayes factor is at least `decisive`, and the loop begins again with the extended model. A
+#' mechanism that raises the simulation's own error in calibration by more than 2 % is not adopted,
+#' whatever its evidence. Held-out rows do not decide what is adopted; they take part in the
+#' verdict: named, likely or a stand-in.
 #'
-#' *Runs.* The simulator is asked first. A few runs over the priors show where to begin; searches lead to the
-#' mode, with one run a step; about thirty runs in the region of the mode train an emulator, and runs at draws
-#' of its posterior check it ([calibrate_refined()]). A trial of a mechanism begins at the mode of the present
-#' model, takes the runs of that model for its own where the mechanism is switched off, and is checked by four
-#' runs. Trials that can still win are verified like the base model, the best first, until nobody can reach
-#' the leader. Two steps with eight mechanisms take about 400 runs. `candidates$judged_by` is `"runs"` for
-#' mechanisms that were verified, `"trial"` for the others, `"none"` for those that could not be tried.
+#' *Runs.* The simulator is asked first. A few runs over the priors show where to begin; searches
+#' lead to the mode, with one run a step; about thirty runs in the region of the mode train an
+#' emulator, and runs at draws of its posterior check it ([calibrate_refined()]). A trial of a
+#' mechanism begins at the mode of the present model, takes the runs of that model for its own where
+#' the mechanism is switched off, and is checked by four runs. Trials that can still win are
+#' verified like the base model, the best first, until nobody can reach the leader. Two steps with
+#' eight mechanisms take about 400 runs. `candidates$judged_by` is `"runs"` for mechanisms that were
+#' verified, `"trial"` for the others, `"none"` for those that could not be tried.
 #' [decision_rules()] lists every number that decides.
 #'
-#' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms others:
-#' see [mechanism()]. Then nothing is run, the emulators are checked by runs left out, and held-out rows are
-#' predicted by emulators of the runs given there.
+#' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and
+#' mechanisms others: see [mechanism()]. Then nothing is run, the emulators are checked by runs left
+#' out, and held-out rows are predicted by emulators of the runs given there.
 #'
-#' *Several records.* Two or more series that share parameters ([calibrate_jointly()]) go through the same
-#' loop: give named lists of simulators and measurements. The `edit` of a mechanism is applied to the simulator
-#' of each record in turn; if it has two arguments, the second is the record's name ([mechanism()]). Models are
-#' compared by the evidence of all records. Scores are in units of each record's noise. Runs count for each
-#' record.
+#' *Several records.* Two or more series that share parameters ([calibrate_jointly()]) go through
+#' the same loop: give named lists of simulators and measurements. The `edit` of a mechanism is
+#' applied to the simulator of each record in turn; if it has two arguments, the second is the
+#' record's name ([mechanism()]). Models are compared by the evidence of all records. Scores are in
+#' units of each record's noise. Runs count for each record.
 #'
-#' @param simulator The base model: a simulator, or an [ensemble()] of given runs; of several records a named
-#'   list.
+#' @param simulator The base model: a simulator, or an [ensemble()] of given runs; of several
+#'   records a named list.
 #' @param measurements The [measurements()]; of several records a list with the same names.
 #' @param catalogue A [catalogue()] of mechanisms.
-#' @param runs Runs over the priors of the base model before the search; `NULL`: two, and two for each
-#'   parameter. More are seldom needed. The budget of all runs is `control$runs_total`.
-#' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism must earn;
-#'   2), `runs_total` (budget of runs of the simulator; a verdict asks for about 100; `NULL`: none), `rounds`
-#'   (checks of a model before it is left as not trusted; 8), and lists `emulator`, `calibration` (without its
-#'   `check` and `exact`, which the loop sets itself) and `attribution` for the stages.
+#' @param runs Runs over the priors of the base model before the search; `NULL`: two, and two for
+#'   each parameter. More are seldom needed. The budget of all runs is `control$runs_total`.
+#' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism
+#'   must earn; 2), `runs_total` (budget of runs of the simulator; a verdict asks for about 100;
+#'   `NULL`: none), `rounds` (checks of a model before it is left as not trusted; 8), and lists
+#'   `emulator`, `calibration` (without its `check` and `exact`, which the loop sets itself) and
+#'   `attribution` for the stages.
 #' @param quiet No progress messages.
-#' @param checkpoint A folder in which all runs are kept (and the seed, if none is given), so that an
-#'   interrupted loop, called again with the same arguments, goes on where it stopped; `NULL` keeps nothing.
-#'   Delete it when the loop is done.
+#' @param checkpoint A folder in which all runs are kept (and the seed, if none is given), so that
+#'   an interrupted loop, called again with the same arguments, goes on where it stopped; `NULL`
+#'   keeps nothing. Delete it when the loop is done.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_upgrade`: the `models` adopted (first the base model), all `candidates`
-#'   tried (a row each: the model that it extends, `from`, the `mechanism`, `log10_bf` with `lower95` and
-#'   `upper95` and its `word`, its `probability`, the simulation's error in calibration over that before,
-#'   `error_ratio`, `trusted`, `judged_by`, its `runs`, and the estimates of its `parameters`). `log10_bf` is the log10
-#'   Bayes factor if neither model has an unknown response to the conditions of the mechanism; `beside_unknown` is that
-#'   with the response in both, which imitates the mechanism. If a trial is not trusted, both hold the second factor.
-#'   The result also has the `named_cause`, the `gain`, why the loop stopped (`stopped_because`, in a word
-#'   `stopped_id`) how many runs of the simulator it took (`runs_total`), and how
-#'   many more a program's cache had (`runs_found`). Each model that adopted a mechanism
-#'   has a `verdict`: `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks
-#'   against it; or `"stand-in"`, if held-out data do not improve (`held_out_gain`, with its standard error). `inert`
-#'   names parameters of the base model that the last model no longer uses. `steps` has, for each record, what
-#'   shorter steps of the simulator change: the RMS (`error`, in the target's unit) of what the parameters cannot
-#'   take up, and by how many of its standard deviations each would move (`moved`); `NULL` if that is not known
-#'   ([function_simulator()]). `confounded_with` names parameters that are correlated beyond 0.4 with those that it
-#'   brought. For several records `fit` is what [calibrate_jointly()] gives, and `records` of a model has
+#' @return An object of class `amiss_upgrade`: the `models` adopted (first the base model), all
+#'   `candidates` tried (a row each: the model that it extends, `from`, the `mechanism`, `log10_bf`
+#'   with `lower95` and `upper95` and its `word`, its `probability`, the simulation's error in
+#'   calibration over that before, `error_ratio`, `trusted`, `judged_by`, its `runs`, and the
+#'   estimates of its `parameters`). `log10_bf` is the log10 Bayes factor if neither model has an
+#'   unknown response to the conditions of the mechanism; `beside_unknown` is that with the response
+#'   in both, which imitates the mechanism. If a trial is not trusted, both hold the second factor.
+#'   The result also has the `named_cause`, the `gain`, why the loop stopped (`stopped_because`, in
+#'   a word `stopped_id`) how many runs of the simulator it took (`runs_total`), and how many more a
+#'   program's cache had (`runs_found`). Each model that adopted a mechanism has a `verdict`:
+#'   `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks
+#'   against it; or `"stand-in"`, if held-out data do not improve (`held_out_gain`, with its
+#'   standard error). `inert` names parameters of the base model that the last model no longer uses.
+#'   `steps` has, for each record, what shorter steps of the simulator change: the RMS (`error`, in
+#'   the target's unit) of what the parameters cannot take up, and by how many of its standard
+#'   deviations each would move (`moved`); `NULL` if that is not known ([function_simulator()]).
+#'   `confounded_with` names parameters that are correlated beyond 0.4 with those that it brought.
+#'   For several records `fit` is what [calibrate_jointly()] gives, and `records` of a model has
 #'   `prediction`, `scores` and `held_out_gain` of each in its own unit.
 #' @source Monari (2022) for the loop; how a mechanism is judged is the package's own:
 #'   `vignette("algorithm", "amiss")`, *Naming*.
@@ -91,7 +96,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' upgrade_model(given, house, catalogue(other), control = quick, seed = 1, quiet = TRUE)
 #' }
 #' @export
-upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, control = NULL, seed = NULL,
+upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, control = NULL,
+                          seed = NULL,
                           threads = 1, quiet = FALSE, checkpoint = NULL) {
   check_present(simulator, measurements, catalogue)
   started <- upgrade_start(simulator, measurements)
@@ -112,16 +118,16 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, contr
 
 finish_upgrade <- function(state, context) {
   measurements <- state$started$measurements
-  models <- judge_models(state$models, state$candidates, state$catalogue, measurements, context$control,
-                         context$threads, runs_left(context))
+  models <- judge_models(state$models, state$candidates, state$catalogue, measurements,
+                         context$control, context$threads, runs_left(context))
   structure(list(format_version = format_version, models = models, candidates = state$candidates,
                  catalogue = state$catalogue,
                  named_cause = named_cause(models, state$candidates, state$catalogue),
                  gain = upgrade_gain(models), stopped_because = state$stopped$words,
                  stopped_id = state$stopped$id,
-                 stopped_reason = state$stopped$reason %||% state$stopped$words, inert = inert_parameters(state),
-                 runs_total = runs_spent(context), runs_found = runs_found(context), measurements = measurements,
-                 seed = context$seed,
+                 stopped_reason = state$stopped$reason %||% state$stopped$words,
+                 inert = inert_parameters(state), runs_total = runs_spent(context),
+                 runs_found = runs_found(context), measurements = measurements, seed = context$seed,
                  control = context$control), class = "amiss_upgrade")
 }
 
@@ -133,8 +139,8 @@ inert_parameters <- function(state) {
   c(gone, intersect(idle, state$base))
 }
 
-# list(simulator, measurements, record): of one record as they are, with its name; of several a list of simulators and
-# their measurements together (new_records()).
+# list(simulator, measurements, record): of one record as they are, with its name; of several a list
+# of simulators and their measurements together (new_records()).
 upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
   check_model <- function(x) if (!inherits(x, "amiss_ensemble")) check_simulator(x, call)
   if (!rlang::is_bare_list(simulator) && !rlang::is_bare_list(measurements)) {
@@ -144,7 +150,8 @@ upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
   }
   for (name in c("simulator", "measurements")) {
     check_input(if (rlang::is_bare_list(get(name))) TRUE else "it is no list", name,
-                "Of several records give named lists of both, one element for each record.", call = call)
+                "Of several records give named lists of both, one element for each record.",
+                call = call)
   }
   check_records(simulator, measurements, "simulator", check_model, least = 1, call = call)
   names <- names(simulator)
@@ -153,8 +160,10 @@ upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
   }
   given <- vapply(simulator, inherits, NA, "amiss_ensemble")
   if (any(given) && !all(given)) {
-    abort_input(c("Of the records {.val {names[given]}} runs are given, of {.val {names[!given]}} simulators.",
-                  i = "Give simulators of all records, or an {.fun ensemble} of each."), call = call)
+    abort_input(c(paste("Of the records {.val {names[given]}} runs are given, of",
+                        "{.val {names[!given]}} simulators."),
+                  i = "Give simulators of all records, or an {.fun ensemble} of each."),
+                call = call)
   }
   check_one_prior(lapply(simulator, free_parameters), call)
   list(simulator = simulator, measurements = new_records(measurements[names]), record = names)
@@ -164,12 +173,14 @@ upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
 check_given_models <- function(simulator, catalogue, measurements, call = rlang::caller_env()) {
   edits <- Filter(function(edit) inherits(edit, "amiss_ensemble"), lapply(catalogue, `[[`, "edit"))
   if (!is_several(measurements)) {
-    return(check_given(c(if (is_given(simulator)) list(base = simulator), edits), measurements, call))
+    return(check_given(c(if (is_given(simulator)) list(base = simulator), edits),
+                       measurements, call))
   }
   if (length(edits)) {
-    abort_input(c("The mechanism {.val {names(edits)}} is one set of runs, and there are several records.",
-                  i = "Let its {.code edit} be a function of the model and the record's name that returns the runs."),
-                call = call)
+    abort_input(
+      c("The mechanism {.val {names(edits)}} is one set of runs, and there are several records.",
+        i = paste("Let its {.code edit} be a function of the model and the record's name that",
+                  "returns the runs.")), call = call)
   }
   for (name in names(simulator)) check_given(simulator[name], measurements$records[[name]], call)
 }
@@ -177,9 +188,11 @@ check_given_models <- function(simulator, catalogue, measurements, call = rlang:
 fill_upgrade_control <- function(control, measurements, call = rlang::caller_env()) {
   control <- merge_control(upgrade_control, control, call = call)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps", call = call)
-  check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE), "control$decisive",
+  check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE),
+              "control$decisive",
               call = call)
-  check_input(checkmate::check_count(control$rounds, positive = TRUE), "control$rounds", call = call)
+  check_input(checkmate::check_count(control$rounds, positive = TRUE), "control$rounds",
+              call = call)
   check_training_size(rules$more_runs * control$rounds, "control$rounds", control$rounds, call)
   check_input(checkmate::check_count(control$runs_total, positive = TRUE, null.ok = TRUE),
               "control$runs_total", call = call)
@@ -191,10 +204,12 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
 check_scouts <- function(runs, started, call = rlang::caller_env()) {
   check_input(checkmate::check_count(runs, positive = TRUE, null.ok = TRUE), "runs", call = call)
   if (is.null(runs) || is_given(started$simulator)) return(invisible())
-  for (m in each_record(started$measurements)) check_run_number(runs, length(m$raw$hours), "runs", call)
+  for (m in each_record(started$measurements))
+    check_run_number(runs, length(m$raw$hours), "runs", call)
 }
 
-# The first mechanism that is named or, if none is, likely; a stand-in is no cause, nor is a description.
+# The first mechanism that is named or, if none is, likely; a stand-in is no cause, nor is a
+# description.
 named_cause <- function(models, candidates, catalogue) {
   adopted <- Filter(function(model) !describes(catalogue[[model$mechanism]]), models[-1])
   verdicts <- vapply(adopted, `[[`, "", "verdict")
@@ -203,7 +218,8 @@ named_cause <- function(models, candidates, catalogue) {
   model <- adopted[[first[1]]]
   trial <- candidates[candidates$from == model$parent & candidates$mechanism == model$mechanism, ]
   entry <- catalogue[[model$mechanism]]
-  list(mechanism = model$mechanism, boundary = entry$boundary, log10_bf = trial$log10_bf, sentence = entry$sentence)
+  list(mechanism = model$mechanism, boundary = entry$boundary, log10_bf = trial$log10_bf,
+       sentence = entry$sentence)
 }
 
 upgrade_gain <- function(models) {
@@ -211,28 +227,31 @@ upgrade_gain <- function(models) {
   after <- models[[length(models)]]
   bf <- bayes_factor(after$fit, before$fit)
   both <- function(use, score) c(before$scores[[use]][[score]], after$scores[[use]][[score]])
-  list(log10_bf = bf$log10_bf, interval = c(bf$lower95, bf$upper95), rmse_calibration = both("calibrate", "rmse"),
-       rmse_validation = both("validate", "rmse"), coverage95_validation = both("validate", "coverage95"),
+  list(log10_bf = bf$log10_bf, interval = c(bf$lower95, bf$upper95),
+       rmse_calibration = both("calibrate", "rmse"), rmse_validation = both("validate", "rmse"),
+       coverage95_validation = both("validate", "coverage95"),
        crps_calibration = both("calibrate", "crps"), crps_validation = both("validate", "crps"))
 }
 
 adopted_models <- function(upgrade) upgrade$models[-1]
 
-# If runs of the simulator refute the emulator of the model from which all others start, evidence compares
-# emulators, not simulators.
+# If runs of the simulator refute the emulator of the model from which all others start, evidence
+# compares emulators, not simulators.
 unjudged <- function(upgrade) isFALSE(upgrade$models[[1]]$fit$check$passed)
 
-# Mechanisms not adopted whose last trial is not trusted and could still reach what adoption asks for. If
-# nothing is left to explain, none.
+# Mechanisms not adopted whose last trial is not trusted and could still reach what adoption asks
+# for. If nothing is left to explain, none.
 open_trials <- function(upgrade) {
   if (is.null(upgrade$candidates)) return(NULL)
   adopted <- vapply(adopted_models(upgrade), `[[`, "", "mechanism")
   trials <- upgrade$candidates[!is.na(upgrade$candidates$log10_bf), ]
   needed <- vapply(trials$from, function(from) {
-    max(upgrade$control$decisive, trials$log10_bf[trials$from == from & trials$mechanism %in% adopted])
+    max(upgrade$control$decisive,
+        trials$log10_bf[trials$from == from & trials$mechanism %in% adopted])
   }, 0)
   last <- last_model(upgrade$models)
-  explained <- !remaining_error(last, upgrade$measurements)$large && !any(last$attribution$table$significant)
+  explained <- !remaining_error(last, upgrade$measurements)$large &&
+    !any(last$attribution$table$significant)
   open <- trials$judged_by == "trial" & !trials$trusted & trials$upper95 >= needed &
     !(explained & trials$from == last$name)
   trials[open & !trials$mechanism %in% adopted & !duplicated(trials$mechanism, fromLast = TRUE), ]

@@ -20,7 +20,8 @@ vcov.amiss_upgrade <- function(object, ...) stats::vcov(last_fit(object), ...)
 
 #' @rdname posterior
 #' @export
-tidy.amiss_upgrade <- function(x, conf.level = 0.95, ...) generics::tidy(last_fit(x), conf.level, ...)
+tidy.amiss_upgrade <- function(x, conf.level = 0.95, ...)
+  generics::tidy(last_fit(x), conf.level, ...)
 
 #' @rdname fit
 #' @export
@@ -52,12 +53,14 @@ glance.amiss_upgrade <- function(x, ...) {
   data.frame(generics::glance(last_fit(x), ...), adopted = length(x$models) - 1L,
              named_cause = x$named_cause$mechanism %||% NA_character_, log10_bf = g$log10_bf,
              rmse_before = g$rmse_calibration[1], rmse_after = g$rmse_calibration[2],
-             rmse_validation_before = g$rmse_validation[1], rmse_validation_after = g$rmse_validation[2])
+             rmse_validation_before = g$rmse_validation[1],
+             rmse_validation_after = g$rmse_validation[2])
 }
 
 #' @rdname predict.amiss_fit
 #' @export
-predict.amiss_upgrade <- function(object, newdata = NULL, ...) stats::predict(last_fit(object), newdata, ...)
+predict.amiss_upgrade <- function(object, newdata = NULL, ...)
+  stats::predict(last_fit(object), newdata, ...)
 
 #' @rdname simulate.amiss_fit
 #' @export

@@ -28,13 +28,14 @@ use_names <- c(calibrate = "calibration", validate = "held out")
 # Prediction of a model at its calibration and held-out rows, with the residual.
 prediction_rows <- function(model) {
   p <- model$prediction
-  data.frame(time = p$time, use = factor(use_names[p$use], use_names), part = paste(p$use, p$segment),
-             observed = p$observed, simulated = p$mean, lower95 = p$lower95, upper95 = p$upper95,
-             residual = p$observed - p$mean,
+  data.frame(time = p$time, use = factor(use_names[p$use], use_names),
+             part = paste(p$use, p$segment), observed = p$observed, simulated = p$mean,
+             lower95 = p$lower95, upper95 = p$upper95, residual = p$observed - p$mean,
              row = seq_len(nrow(p)))
 }
 
-score_of <- function(upgrade, use, score) vapply(upgrade_stages(upgrade), function(s) s$scores[[use]][[score]], 0)
+score_of <- function(upgrade, use, score)
+  vapply(upgrade_stages(upgrade), function(s) s$scores[[use]][[score]], 0)
 
 has_validation <- function(upgrade) !anyNA(score_of(upgrade, "validate", "rmse"))
 

@@ -5,10 +5,12 @@ one_line <- function(x) {
   x <- paste(x)
   Encoding(x[Encoding(x) == "bytes"]) <- "unknown"
   x <- iconv(enc2utf8(x), "UTF-8", "UTF-8", sub = "?")
-  gsub("(*UTF)[\\s\\x{00}-\\x{1f}\\x{7f}-\\x{9f}\\x{2028}\\x{2029}\\x{fffe}\\x{ffff}]+", " ", x, perl = TRUE)
+  gsub("(*UTF)[\\s\\x{00}-\\x{1f}\\x{7f}-\\x{9f}\\x{2028}\\x{2029}\\x{fffe}\\x{ffff}]+", " ", x,
+       perl = TRUE)
 }
 
-# The name of a file, without its extension, of any text: of a new name where signs had to be left out or it is long.
+# The name of a file, without its extension, of any text: of a new name where signs had to be left
+# out or it is long.
 file_stem <- function(x) {
   x <- one_line(x)
   stem <- substr(gsub("[^[:alnum:]_.-]+", "_", x), 1, 80)
@@ -18,14 +20,17 @@ file_stem <- function(x) {
 }
 
 listed <- function(x, last = "and", none = "nothing") {
-  if (!length(x)) none else if (length(x) == 1) x else paste(paste(x[-length(x)], collapse = ", "), last, x[length(x)])
+  if (!length(x)) none
+  else if (length(x) == 1) x
+  else paste(paste(x[-length(x)], collapse = ", "), last, x[length(x)])
 }
 
 # A few significant digits, not in powers of ten unless very far from one.
 short <- function(x, digits = 2) {
   far <- abs(x) >= 1e7 | (abs(x) < 1e-4 & x != 0)
   text <- ifelse(far, format_each(signif(x, digits)),
-                 formatC(signif(x, digits), digits = digits, format = "fg", flag = "#", big.mark = ","))
+                 formatC(signif(x, digits), digits = digits, format = "fg", flag = "#",
+                         big.mark = ","))
   ifelse(is.na(x), "\u2013", sub("\\.$", "", text))
 }
 
@@ -40,7 +45,8 @@ signed <- function(x) {
 percent <- function(x) {
   digits <- trimws(formatC(100 * x, digits = 2, format = "fg"))
   text <- ifelse(x > 0.999, "over 99.9 %",
-                 ifelse(x > 0.99, "over 99 %", ifelse(x < 0.001, "below 0.1 %", paste(digits, "%"))))
+                 ifelse(x > 0.99, "over 99 %",
+                        ifelse(x < 0.001, "below 0.1 %", paste(digits, "%"))))
   ifelse(is.na(x), "\u2013", text)
 }
 
@@ -50,7 +56,8 @@ pretty_unit <- function(unit) {
   gsub("([ms])3(?![0-9.])", "\\1\u00b3", squared, perl = TRUE)
 }
 
-with_unit <- function(text, unit) ifelse(rep_len(nzchar(unit), length(text)), paste(text, pretty_unit(unit)), text)
+with_unit <- function(text, unit)
+  ifelse(rep_len(nzchar(unit), length(text)), paste(text, pretty_unit(unit)), text)
 
 # Two ends of an interval, with as many digits as tell them apart.
 short_ends <- function(lower, upper, digits = 2) {
@@ -62,7 +69,8 @@ short_ends <- function(lower, upper, digits = 2) {
 }
 
 interval_words <- function(lower, upper, digits = 2, between = " to ") {
-  mapply(function(l, u) paste(short_ends(l, u, digits), collapse = between), lower, upper, USE.NAMES = FALSE)
+  mapply(function(l, u) paste(short_ends(l, u, digits), collapse = between), lower, upper,
+         USE.NAMES = FALSE)
 }
 
 # An hour of the day in decimals, as a clock shows it.
@@ -74,11 +82,13 @@ clock_words <- function(hour) {
 change_words <- function(before, after, unit) {
   pair <- short(c(before, after))
   if (pair[1] == pair[2]) paste("stays at", with_unit(pair[1], unit))
-  else paste(if (after < before) "falls" else "rises", "from", pair[1], "to", with_unit(pair[2], unit))
+  else
+    paste(if (after < before) "falls" else "rises", "from", pair[1], "to", with_unit(pair[2], unit))
 }
 
 # 10^x written out while it can be read.
-power_of_ten <- function(x) ifelse(x < 6, format_each_comma(signif(10^x, 2)), paste0("10^", round(x)))
+power_of_ten <- function(x)
+  ifelse(x < 6, format_each_comma(signif(10^x, 2)), paste0("10^", round(x)))
 
 format_each_comma <- function(x) vapply(x, format, "", big.mark = ",", scientific = FALSE)
 
@@ -104,4 +114,5 @@ point_words <- function(point) {
   paste(names, signif(point, 4), sep = " = ", collapse = ", ")
 }
 
-axis_label <- function(name, unit) ifelse(nzchar(unit), paste0(name, " [", pretty_unit(unit), "]"), name)
+axis_label <- function(name, unit)
+  ifelse(nzchar(unit), paste0(name, " [", pretty_unit(unit), "]"), name)

@@ -2,13 +2,15 @@
 
 #' Edit a zone or a network
 #'
-#' A physical mechanism is an edit: a component more, one less, or other fields in one that is there.
+#' A physical mechanism is an edit: a component more, one less, or other fields in one that is
+#' there.
 #'
 #' @param model A [zone()] or a [network()].
-#' @param ... `add_component()`: components to add; `change_component()`: fields to replace, by name, the layers of a
-#'   wall as `layers = list(zone_layer(...), ...)`.
-#' @param name Name of a component. `"zone"` for the zone's own fields (`volume`, `air_capacity_factor`,
-#'   `initial_air`, `initial_wall_offset`), `"network"` for those of a network (`output`, `before`, ...).
+#' @param ... `add_component()`: components to add; `change_component()`: fields to replace, by
+#'   name, the layers of a wall as `layers = list(zone_layer(...), ...)`.
+#' @param name Name of a component. `"zone"` for the zone's own fields (`volume`,
+#'   `air_capacity_factor`, `initial_air`, `initial_wall_offset`), `"network"` for those of a
+#'   network (`output`, `before`, ...).
 #' @return The edited model; of `component()`, the component.
 #' @examples
 #' room <- zone(zone_heater("heater", power = "P"), zone_coupling("door", 10, "T_hall"), volume = 40)
@@ -68,7 +70,8 @@ drop_component.default <- function(model, name) check_composed(model)
 change_component.default <- function(model, name, ...) check_composed(model)
 
 check_composed <- function(model, call = rlang::caller_env()) {
-  check_object(model, c("amiss_zone", "amiss_network"), "model", "Make one with {.fn zone} or {.fn network}.", call)
+  check_object(model, c("amiss_zone", "amiss_network"), "model",
+               "Make one with {.fn zone} or {.fn network}.", call)
 }
 
 #' @export
@@ -81,8 +84,8 @@ find_component <- function(zone, name, call) {
   known <- names(zone$components)
   if (is.character(name)) check_readable(name, "name", call)
   if (!checkmate::test_choice(name, known)) {
-    abort_input(c("The zone has no component {.arg name} = {seen(name)}.", i = "Known components: {.val {known}}."),
-                call = call)
+    abort_input(c("The zone has no component {.arg name} = {seen(name)}.",
+                  i = "Known components: {.val {known}}."), call = call)
   }
   zone$components[[name]]
 }
@@ -121,11 +124,13 @@ change_component.amiss_zone <- function(model, name, ...) {
 check_field_names <- function(changes, known, where, call) {
   unknown <- setdiff(rlang::names2(changes), known)
   if (length(unknown) > 0) {
-    abort_input(c("{where} has no field {.val {unknown}}.", i = "Known fields: {.val {known}}."), call = call)
+    abort_input(c("{where} has no field {.val {unknown}}.", i = "Known fields: {.val {known}}."),
+                call = call)
   }
 }
 
-# Unlike modifyList(): a NULL is kept as the field's value, and a list replaces instead of being merged.
+# Unlike modifyList(): a NULL is kept as the field's value, and a list replaces instead of being
+# merged.
 replace_fields <- function(x, changes) {
   for (field in names(changes)) x[field] <- changes[field]
   x

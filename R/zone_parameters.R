@@ -12,8 +12,10 @@ scale_free <- function(operator, e1, e2) {
   number <- if (left) e2 else e1
   allowed <- operator == "*" || operator == "/" && left
   if (!allowed || !checkmate::test_number(number, finite = TRUE) || number == 0) {
-    abort_input(c("A free parameter can only be multiplied or divided by a number that is not zero.",
-                  i = "It serves to change units: {.code free(\"crack\", uniform(700, 1300), \"mm2\") * 1e-6}."))
+    abort_input(
+      c("A free parameter can only be multiplied or divided by a number that is not zero.",
+        i = paste("It serves to change units:",
+                  "{.code free(\"crack\", uniform(700, 1300), \"mm2\") * 1e-6}.")))
   }
   factor <- if (operator == "*") number else 1 / number
   if (inherits(parameter, "amiss_scaled_free")) {
@@ -32,11 +34,13 @@ print.amiss_scaled_free <- function(x, ...) {
   invisible(x)
 }
 
-# Where the free parameters stand in a nested description, in order: each with its path, and the factor that scales it.
+# Where the free parameters stand in a nested description, in order: each with its path, and the
+# factor that scales it.
 free_fields <- function(x, path = integer()) {
   if (is_free(x)) {
     scaled <- inherits(x, "amiss_scaled_free")
-    return(list(list(path = path, free = if (scaled) x$free else x, factor = if (scaled) x$factor else 1)))
+    return(list(list(path = path, free = if (scaled) x$free else x,
+                     factor = if (scaled) x$factor else 1)))
   }
   if (!is.list(x)) return(list())
   do.call(c, lapply(seq_along(x), function(i) free_fields(x[[i]], c(path, i))))
@@ -57,8 +61,9 @@ fill_free <- function(x, fields, values) {
 #'
 #' @param zone A [zone()].
 #' @param values Named numeric vector: a value for every free parameter.
-#' @return `zone_parameters()`: a named list of the free parameters, each once. `zone_boundary()`: the names of the
-#'   columns of data that the zone uses. `zone_resolve()`: the zone with numbers in place of free parameters.
+#' @return `zone_parameters()`: a named list of the free parameters, each once. `zone_boundary()`:
+#'   the names of the columns of data that the zone uses. `zone_resolve()`: the zone with numbers in
+#'   place of free parameters.
 #' @examples
 #' box <- paper_box("M2")
 #' names(zone_parameters(box))
@@ -91,7 +96,8 @@ collect_parameters <- function(fields, call = rlang::caller_env()) {
 #' @export
 zone_boundary <- function(zone) {
   check_zone(zone)
-  columns <- lapply(unname(zone$components), function(x) unlist(x[column_fields(x)], use.names = FALSE))
+  columns <- lapply(unname(zone$components),
+                    function(x) unlist(x[column_fields(x)], use.names = FALSE))
   unique(as.character(unlist(columns)))
 }
 
