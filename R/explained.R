@@ -5,19 +5,32 @@
 # mechanism takes away of the evidence for that response. It decides; the factor with the response
 # in both must not speak against it.
 
-# What a mechanism takes away: decades by which the present model needs the response more than the
-# extension does; 0 if its mechanism has no condition.
-taken_away <- function(trial, present, context) {
-  conditions <- present$conditions[[trial$mechanism]]
+# Mechanisms are compared with one another with no unknown response to any condition of the catalogue in any model: what
+# each takes away by itself is of its own conditions, and the more it has of them the more that is.
+
+# A trial with both against the present model, in decades: what it takes away of its own conditions (`taken`) and of all
+# (`taken_of_all`).
+with_taken <- function(trial, present, context) {
+  own <- present$conditions[[trial$mechanism]]
+  trial$taken <- taken_away(trial, present, own, context)
+  trial$taken_of_all <-
+    if (setequal(own, present$catalogued)) trial$taken
+    else taken_away(trial, present, present$catalogued, context)
+  trial
+}
+
+# What the present model needs the response to some conditions more than the extension does.
+taken_away <- function(trial, present, conditions, context) {
   if (!length(conditions)) return(0)
   present$lost[[toString(conditions)]] - lost_without(trial, conditions, context)
 }
 
-# The present model with the conditions of the mechanisms that are left, and what it loses without a
+# The present model with the conditions of the mechanisms that are left, each and together, and what it loses without a
 # response to them.
 with_losses <- function(model, catalogue, context) {
   model$conditions <- lapply(catalogue, function(mechanism) sort(mechanism$boundary))
-  sets <- unique(Filter(length, unname(model$conditions)))
+  model$catalogued <- sort(unique(unlist(model$conditions, use.names = FALSE)))
+  sets <- unique(Filter(length, c(unname(model$conditions), list(model$catalogued))))
   lost <- lapply(sets, function(conditions) lost_without(model, conditions, context))
   model$lost <- stats::setNames(lost, vapply(sets, toString, ""))
   model

@@ -27,6 +27,7 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
     return(utils::modifyList(model, list(level = if (is_spent(context)) "missed" else "untried")))
   }
   search <- search_trial(looked, context)
+  model$starts <- search$starts
   model <- with_least(with_modes(search$model, list(search), context$seed), context)
   model$off <- looked$off
   model$status <- search$status
@@ -37,11 +38,14 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
 
 # A search from the most promising start of the first look. An extension holds the present model,
 # with its mechanism switched off, and cannot be worse: if the search ends below that, or no nearer
-# to the record, it goes on from the next start.
+# to the record, it goes on from the next start with the mechanism on. `starts`: those that are left.
 search_trial <- function(looked, context) {
   model <- looked$model
+  is_on <- vapply(looked$starts, function(start) !start$at %in% looked$off_at, NA)
+  starts <- looked$starts[is_on | seq_along(is_on) == 1]
   best <- NULL
-  for (start in utils::head(looked$starts, rules$trial_starts)) {
+  for (tried in seq_len(min(length(starts), rules$trial_starts))) {
+    start <- starts[[tried]]
     search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps,
                            looked$off_at)
     search <- run_search(search, context)
@@ -52,7 +56,7 @@ search_trial <- function(looked, context) {
     is_done <- all(value[1] >= value[-1]) && search$status %in% c("converged", "futile")
     if (is_spent(context) || is_done && comes_nearer(model, search$least$at, looked$off_at)) break
   }
-  best$model <- model
+  best[c("model", "starts")] <- list(model, starts[-seq_len(tried)])
   best
 }
 
@@ -161,7 +165,7 @@ tried_model <- function(model, present, bar, context) {
       next
     }
     model <- with_fit(model, found$fits, "tried", round, context)
-    model$taken <- taken_away(model, present, context)
+    model <- with_taken(model, present, context)
     if (is_spent(context) || is_clear(model, present, bar)) break
   }
   model
@@ -173,26 +177,25 @@ trial_ais <- list(pilot_chains = 128, groups = 4, max_groups = 8, max_sweeps = 1
 # Whether a trial needs no further runs: they confirm it, it could not win if they did, or it will
 # be verified whatever they say.
 is_clear <- function(model, present, bar) {
-  is_confirmed(model) || upper_bound(model, present) < bar || lower_bound(model, present) > bar
+  is_confirmed(model) || !could_win(model, present, bar) || is_ahead(model, present, bar)
 }
 
-# What decides: the log10 Bayes factor with no unknown response to the conditions of the mechanism
-# in either model.
+# What a mechanism explains: the log10 Bayes factor with no unknown response to its conditions in
+# either model.
 log10_factor <- function(model, present) beside_unknown(model, present) + (model$taken %||% 0)
 
 # The same with such a response in both.
 beside_unknown <- function(model, present)
   (model$fit$log_evidence - present$fit$log_evidence) / log(10)
 
-# What the log10 Bayes factor of a model may be at most, by its level; `leader` is the best model
-# that is known.
-upper_bound <- function(model, present, leader = present) {
-  if (is_promising(model, present, leader)) return(Inf)
-  log10_factor(model, present) + doubt_of(model, present)
+# What ranks mechanisms: that with no unknown response to any condition of the catalogue.
+standing_of <- function(model, present) {
+  beside_unknown(model, present) + (model$taken_of_all %||% model$taken %||% 0)
 }
 
-# By how much its log10 Bayes factors may be off.
-doubt_of <- function(model, present) {
+# By how much its log10 Bayes factors may be off; `leader` is the best model that is known.
+doubt_of <- function(model, present, leader = present) {
+  if (is_promising(model, present, leader)) return(Inf)
   3 * min(factor_error(model, present), rules$worst_error) + trial_margin(model)
 }
 
@@ -210,38 +213,53 @@ is_promising <- function(model, present, leader = present) {
 
 least_error <- function(model) sqrt(mean(left_by_simulation(model$fit)^2))
 
-lower_bound <- function(model, present)
-  2 * log10_factor(model, present) - upper_bound(model, present)
-
-# What a mechanism must reach to be adopted, as far as the trials before it show.
-needed_factor <- function(trials, present, context) {
-  seen <- Filter(
-    function(model) isTRUE(model$fit$trust$trusted) && !cannot_be_adopted(model, present), trials)
-  max(context$control$decisive, vapply(seen, lower_bound, 0, present))
+# What a mechanism must reach to be adopted, as far as `trials` show: a decisive `factor`, and a
+# `standing` that none of those surely has that may be adopted.
+bar_of <- function(trials, present, context) {
+  bar <- list(factor = context$control$decisive, standing = -Inf)
+  surely <- Filter(function(model) {
+    isTRUE(model$fit$trust$trusted) && !cannot_be_adopted(model, present) &&
+      is_ahead(model, present, bar)
+  }, trials)
+  least <- vapply(surely, function(model) standing_of(model, present) - doubt_of(model, present), 0)
+  list(factor = bar$factor, standing = max(bar$standing, least))
 }
 
-# The next trial to verify, or NULL: of those that may be adopted and may lead the one of highest
-# evidence, so that what the others must reach is known early; then, of those whose evidence says
+could_win <- function(model, present, bar, leader = present) {
+  doubt <- doubt_of(model, present, leader)
+  log10_factor(model, present) + doubt >= bar$factor &&
+    standing_of(model, present) + doubt >= bar$standing
+}
+
+is_ahead <- function(model, present, bar) {
+  doubt <- doubt_of(model, present)
+  log10_factor(model, present) - doubt > bar$factor &&
+    standing_of(model, present) - doubt > bar$standing
+}
+
+# The next trial to verify, or NULL: the one that ranks highest of those that may be adopted and may
+# lead, so that what the others must reach is known early; then, of those whose evidence says
 # nothing yet, the one that is nearest to the record.
 next_to_verify <- function(trials, present, context) {
-  open <- Filter(function(model) model$level == "tried" && !cannot_be_adopted(model, present),
-                 trials)
+  adoptable <- Filter(Negate(function(model) cannot_be_adopted(model, present)), trials)
+  open <- Filter(function(model) model$level == "tried", adoptable)
   if (!length(open)) return(NULL)
-  needed <- context$control$decisive
-  leader <- present
-  verified <- Filter(function(model) is_verified(model) && !cannot_be_adopted(model, present),
-                     trials)
-  factor <- vapply(verified, log10_factor, 0, present)
-  if (any(factor >= needed)) {
-    leader <- verified[[which.max(factor)]]
-    needed <- max(factor)
+  leader <- leader_of(Filter(is_verified, adoptable), present, context$control$decisive)
+  bar <- list(factor = context$control$decisive,
+              standing = if (is.null(leader)) -Inf else standing_of(leader, present))
+  open <- Filter(function(model) could_win(model, present, bar, leader %||% present), open)
+  is_near <- vapply(open, is_promising, NA, present, leader %||% present)
+  if (!all(is_near)) {
+    open <- open[!is_near]
+    return(open[[which.max(vapply(open, standing_of, 0, present))]]$mechanism)
   }
-  bound <- vapply(open, upper_bound, 0, present, leader)
-  likely <- open[bound >= needed & bound < Inf]
-  if (length(likely))
-    return(likely[[which.max(vapply(likely, log10_factor, 0, present))]]$mechanism)
-  near <- open[bound == Inf]
-  if (length(near)) near[[which.min(vapply(near, least_error, 0))]]$mechanism
+  if (length(open)) open[[which.min(vapply(open, least_error, 0))]]$mechanism
+}
+
+# Of models with a decisive factor the one that ranks highest, or NULL.
+leader_of <- function(models, present, decisive) {
+  models <- Filter(function(model) log10_factor(model, present) >= decisive, models)
+  if (length(models)) models[[which.max(vapply(models, standing_of, 0, present))]]
 }
 
 # Further runs of a model whose check has passed change neither.
@@ -265,46 +283,65 @@ settled_trial <- function(model, present, bar, context) {
 # costs: once.
 asks_for_checks <- function(model, present, bar) {
   is_open <- !is_confirmed(model) && !is_promising(model, present) && is.null(model$rechecked)
-  is_open && (is_refused(model, present) || lower_bound(model, present) <= bar)
+  is_open && (is_refused(model, present) || !is_ahead(model, present, bar))
 }
 
 # A trial that its runs confirm has had its first round.
 verify_trial <- function(model, present, context) {
   before <- if (is_confirmed(model)) model$fit$log_evidence
   model <- verify_model(model, context, before, rules$trial_rounds)
-  model$taken <- taken_away(model, present, context)
-  model
+  with_taken(model, present, context)
 }
 
-# A trial searched again from runs over all priors, far from where it ended: an extension may have a
-# better mode there, with another part of the model in the place that its mechanism takes. As it was
-# if none is found.
+# A trial searched again, far from where it ended: an extension may have a better mode there, with
+# another part of the model in the place that its mechanism takes. First from what is left of its
+# first look, then from runs over all priors. As it was if none is found.
 widened_trial <- function(trial, present, bar, context) {
-  model <- trial
-  p <- length(model$parameters)
-  unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
-  model <- with_runs(model, from_unit(unit, model$space), context)$model
-  own <- list(at = trial$mode, slopes = secant_slopes(model, trial$mode, least_reference(model)),
-              least = trial$least)
-  own[c("mean", "covariance", "history", "moves")] <- tangent_at(model, own$at, own$slopes,
-                                                               moves_of(model, own$least), context)
-  modes <- list(own)
-  for (start in start_runs(model, own$at)[-1]) {
+  searched <- search_again(trial, trial$starts, rules$trial_stale, context)
+  if (!comes_nearer(searched$model, which.min(squared_misfit(searched$model)), trial$least$at)) {
+    model <- over_priors(searched$model, context)
+    starts <- lapply(start_runs(model, trial$mode)[-1],
+                     function(at) list(at = at, slopes = regression_slopes(model, at)))
+    further <- search_again(model, starts, rules$scout_stale, context)
+    searched <- list(model = further$model, modes = c(searched$modes, further$modes))
+  }
+  trial$starts <- NULL
+  trial$runs <- searched$model$runs
+  if (!length(searched$modes)) return(trial)
+  found <- ranked_modes(searched$model, c(list(own_mode(trial, context)), searched$modes), context)
+  best <- found$modes[[1]]
+  trial$runs <- found$model$runs
+  if (best$at == trial$mode) return(trial)
+  again <- tried_model(with_modes(trial, list(best), context$seed), present, bar, context)
+  if (standing_of(again, present) > standing_of(trial, present)) return(again)
+  trial$runs <- again$runs
+  trial
+}
+
+search_again <- function(model, starts, stale, context) {
+  modes <- list()
+  for (start in starts) {
     if (is_spent(context)) break
-    search <- begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
-    search <- run_search(search, context)
+    search <- run_search(begin_search(model, start$at, start$slopes, stale), context)
     model <- search$model
     modes <- c(modes, list(search))
   }
-  found <- ranked_modes(model, modes, context)
-  best <- found$modes[[1]]
-  trial$runs <- found$model$runs
-  if (best$at == own$at) return(trial)
-  again <- with_modes(trial, list(best), context$seed)
-  again <- tried_model(again, present, bar, context)
-  if (again$fit$log_evidence > trial$fit$log_evidence) return(again)
-  trial$runs <- again$runs
-  trial
+  list(model = model, modes = modes)
+}
+
+# Where a trial ended, as its searches are.
+own_mode <- function(trial, context) {
+  own <- list(at = trial$mode, slopes = secant_slopes(trial, trial$mode, least_reference(trial)),
+              least = trial$least)
+  own[c("mean", "covariance", "history", "moves")] <-
+    tangent_at(trial, own$at, own$slopes, moves_of(trial, own$least), context)
+  own
+}
+
+over_priors <- function(model, context) {
+  p <- length(model$parameters)
+  unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
+  with_runs(model, from_unit(unit, model$space), context)$model
 }
 
 # If a step ends without a cause of the error, though much of it is left: trials searched again, the
@@ -312,13 +349,12 @@ widened_trial <- function(trial, present, bar, context) {
 second_look <- function(present, trials, context) {
   for (name in nearest_first(trials)) {
     if (is_spent(context)) break
-    bar <- needed_factor(trials, present, context)
+    bar <- bar_of(trials, present, context)
     before <- trials[[name]]
     trials[[name]] <- staged(paste(name, "again"), widened_trial(before, present, bar, context))
     if (trials[[name]]$mode != before$mode) report_trial(trials[[name]], present, context)
-    is_near <- !is_refused(trials[[name]], present) &&
-      lower_bound(trials[[name]], present) > context$control$decisive
-    if (!is_near) next
+    is_decisive <- is_ahead(trials[[name]], present, replace(bar, "standing", -Inf))
+    if (!is_decisive || is_refused(trials[[name]], present)) next
     trials <- race(present, trials, context)
     if (has_cause(trials, present, context)) return(trials)
   }
@@ -332,8 +368,9 @@ nearest_first <- function(trials) {
 
 # Whether a trial may be adopted that takes the error away.
 has_cause <- function(trials, present, context) {
-  best <- best_trial(trial_table(trials, present, names(trials)))
-  may_be_adopted(best, context$control) && takes_error(trials[[best$mechanism]], present)
+  decisive <- context$control$decisive
+  best <- best_trial(trial_table(trials, present, names(trials), decisive), decisive)
+  may_be_adopted(best, decisive) && takes_error(trials[[best$mechanism]], present)
 }
 
 # Whether a model leaves little of the error, or of what was beyond the noise.
@@ -359,7 +396,7 @@ race <- function(present, trials, context) {
   repeat {
     name <- next_to_verify(trials, present, context)
     if (is.null(name) || is_spent(context)) break
-    bar <- needed_factor(trials[names(trials) != name], present, context)
+    bar <- bar_of(trials[names(trials) != name], present, context)
     trials[[name]] <- staged(paste("verifying", name),
                              settled_trial(trials[[name]], present, bar, context))
     report_trial(trials[[name]], present, context)

@@ -21,15 +21,16 @@ next_step <- function(state, context) {
   state$present <- as_present(state$present, state$catalogue[left], context)
   trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
   trials <- race(state$present, trials, context)
-  table <- trial_table(trials, state$present, left)
+  decisive <- context$control$decisive
+  table <- trial_table(trials, state$present, left, decisive)
   if (asks_again(state) && !has_cause(trials, state$present, context)) {
     trials <- second_look(state$present, trials, context)
-    table <- trial_table(trials, state$present, left)
+    table <- trial_table(trials, state$present, left, decisive)
   }
   state$candidates <- rbind(state$candidates, table)
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
-  best <- best_trial(table)
-  if (!may_be_adopted(best, context$control)) {
+  best <- best_trial(table, decisive)
+  if (!may_be_adopted(best, decisive)) {
     return(c(state, list(stopped = no_winner(table, last_model(state$models), context))))
   }
   context$say("Adopted {.strong {best$mechanism}}: log10 Bayes factor {round(best$log10_bf, 1)}")
@@ -82,7 +83,7 @@ try_all <- function(state, left, context) {
   for (name in ordered) {
     if (is_spent(context)) break
     simulators <- extended_simulators(state$catalogue[[name]], state)
-    bar <- needed_factor(trials, state$present, context)
+    bar <- bar_of(trials, state$present, context)
     trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, context))
     report_trial(trials[[name]], state$present, context)
   }
@@ -94,7 +95,7 @@ try_one <- function(state, name, simulators, bar, context) {
   present <- state$present
   if (is_given(simulators)) {
     trial <- given_trial(present, name, simulators, context)
-    return(c(trial, taken = taken_away(trial, present, context)))
+    return(with_taken(trial, present, context))
   }
   tryCatch(try_mechanism(present, name, simulators, state$off[[name]], bar, context),
            amiss_error_numerical = function(e) {
@@ -173,7 +174,7 @@ no_winner <- function(table, present, context) {
 why_not <- function(table, decisive, context) {
   seen <- table[!is.na(table$log10_bf), ]
   if (!nrow(seen)) return(list(id = "none_computed", words = "no mechanism could be computed"))
-  best <- best_trial(table)
+  best <- best_trial(table, decisive)
   highest <- seen[which.max(seen$log10_bf), ]
   if (keeps_error(highest) && highest$log10_bf >= decisive) {
     return(list(id = "keeps_error", words = sprintf(

@@ -2,17 +2,23 @@
 # may be adopted.
 
 # A row for each mechanism that was tried or left out by the budget.
-trial_table <- function(trials, present, left) {
+trial_table <- function(trials, present, left, decisive) {
   rows <- lapply(trials, trial_row, present)
   missed <- lapply(setdiff(left, names(trials)), function(name) empty_row(name, present, "none"))
   table <- do.call(rbind, c(unname(rows), missed))
-  # Equal prior probability for no change and for each mechanism that was tried.
-  log_odds <- c(0, table$log10_bf) * log(10)
-  log_odds[is.na(log_odds)] <- -Inf
-  probability <- exp(log_odds - max(log_odds)) / sum(exp(log_odds - max(log_odds)))
-  table$probability <- probability[-1]
+  table$probability <- probability_of(table, decisive)
   rownames(table) <- NULL
   table
+}
+
+# Of each mechanism, if these and no change were equally probable beforehand. The best trial has the
+# odds of its factor against no change; the others have those of their standing against it.
+probability_of <- function(table, decisive) {
+  best <- best_trial(table, decisive)
+  log10_odds <- if (nrow(best)) best$log10_bf + table$standing - best$standing else table$log10_bf
+  log10_odds[is.na(log10_odds)] <- -Inf
+  odds <- 10^(c(0, log10_odds) - max(0, log10_odds))
+  (odds / sum(odds))[-1]
 }
 
 trial_row <- function(trial, present) {
@@ -26,8 +32,9 @@ trial_row <- function(trial, present) {
   factor <- readable(factor)
   row <- data.frame(
     from = present$name, mechanism = trial$mechanism, factor, beside_unknown = beside,
-    error_ratio = error_ratio(trial$fit, present$fit), trusted = trial$fit$trust$trusted,
-    judged_by = if (is_verified(trial)) "runs" else "trial", runs = trial$own_runs %||% 0)
+    standing = standing_of(trial, present), error_ratio = error_ratio(trial$fit, present$fit),
+    trusted = trial$fit$trust$trusted, judged_by = if (is_verified(trial)) "runs" else "trial",
+    runs = trial$own_runs %||% 0)
   row$parameters <- list(added_parameters(trial$fit, present$fit))
   row
 }
@@ -35,8 +42,8 @@ trial_row <- function(trial, present) {
 empty_row <- function(mechanism, present, why, runs = NULL) {
   row <- data.frame(from = present$name, mechanism = mechanism, log10_bf = NA_real_,
                     lower95 = NA_real_, upper95 = NA_real_, word = NA_character_,
-                    beside_unknown = NA_real_, error_ratio = NA_real_, trusted = FALSE,
-                    judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
+                    beside_unknown = NA_real_, standing = NA_real_, error_ratio = NA_real_,
+                    trusted = FALSE, judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
   row$parameters <- list(added_parameters(present$fit, present$fit))
   row
 }
@@ -89,19 +96,15 @@ added_parameters <- function(fit, parent) {
   table[!table$name %in% names(drawn_parameters(parent)), ]
 }
 
-# The row of highest evidence among the mechanisms that may be adopted: they were verified, the
-# simulation's own error falls with them, and they do not lose to an unknown response. Of decisive
-# ones that it does not lead decisively, the one that does best beside an unknown response: a
-# stand-in explains no more than that does. No row if there is none.
-best_trial <- function(table) {
+# The row of highest standing among the decisive mechanisms that may be adopted: they were verified,
+# the simulation's own error falls with them, and they do not lose to an unknown response. If none is
+# decisive, that of the highest factor; no row if none may be adopted.
+best_trial <- function(table, decisive) {
   open <- table[table$judged_by == "runs" & !keeps_error(table) & !is_refuted(table), ]
-  lead <- open[which.max(open$log10_bf), ]
-  if (!nrow(lead)) return(lead)
-  near <- open[open$log10_bf >= max(lead$log10_bf - rules$decisive, rules$decisive) &
-               open$lower95 > 0, ]
-  if (nrow(near)) near[which.max(near$beside_unknown), ] else lead
+  sure <- open[open$log10_bf >= decisive & open$lower95 > 0, ]
+  if (nrow(sure)) sure[which.max(sure$standing), ] else open[which.max(open$log10_bf), ]
 }
 
-may_be_adopted <- function(best, control) {
-  nrow(best) > 0 && best$log10_bf >= control$decisive && best$lower95 > 0
+may_be_adopted <- function(best, decisive) {
+  nrow(best) > 0 && best$log10_bf >= decisive && best$lower95 > 0
 }
