@@ -65,8 +65,9 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
                 Reduce(function(m, name) change_component(
                   m, name, wind_film = share, wind_speed = "Ws", wind_direction = "Wd",
                   azimuth = unname(facing[name])), outer, model)
-              }, sentence = paste("Wind changes the heat transfer at the outer surfaces, which the",
-                                  "model takes as constant.")),
+              },
+              sentence = paste("Wind changes the heat transfer at the outer surfaces, which the",
+                               "model takes as constant.")),
     mechanism(
       "neighbour coupling", boundary = "Tn",
       edit = function(model) add_component(model, zone_coupling("neighbour", free(

@@ -1,7 +1,7 @@
-emulator_control <- list(
-  explained = 0.99, noise_fraction = 0.05, max_vectors = 30, selection = "ard", significance = 0.05,
-  s2 = c(1, 1), eta2 = c(1, 1), beta = c(1, 1), lambda = c(2, NA), starts = 3, searches = 1,
-  max_evaluations = 120)
+emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 30,
+                         selection = "ard", significance = 0.05,
+                         s2 = c(1, 1), eta2 = c(1, 1), beta = c(1, 1), lambda = c(2, NA),
+                         starts = 3, searches = 1, max_evaluations = 120)
 
 #' Train the emulator of an ensemble
 #'
@@ -102,19 +102,20 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   selection <- trained$selection
   selection$parameter <- names(ensemble$parameters)[selection$parameter]
-  emulator <- structure(list(
-    format_version = format_version, parameters = ensemble$parameters,
-    simulator = ensemble$simulator, basis = basis[c(
-      "vectors", "singular_values", "explained", "discarded_rms", "discarded_ss", "discarded_sd")],
-    processes = c(trained[c("inputs", "coefficients", "hyperparameters")],
-                  list(region = ensemble$region, trend = trend)),
-    unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
-    left_out = list(error = trained$coefficients - trained$loo_mean,
-                    variance = trained$loo_variance), selection = selection,
-    diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble),
-    control = control,
-    hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
-    noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
+  emulator <- structure(
+    list(format_version = format_version, parameters = ensemble$parameters,
+         simulator = ensemble$simulator,
+         basis = basis[c("vectors", "singular_values", "explained",
+                         "discarded_rms", "discarded_ss", "discarded_sd")],
+         processes = c(trained[c("inputs", "coefficients", "hyperparameters")],
+                       list(region = ensemble$region, trend = trend)),
+         unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
+         left_out = list(error = trained$coefficients - trained$loo_mean,
+                         variance = trained$loo_variance), selection = selection,
+         diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble),
+         control = control,
+         hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
+         noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
   warn_coarse_basis(emulator, "control$max_vectors")
   emulator
 }
@@ -252,8 +253,8 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
   why <- c(
     if (coarse_basis(basis, noise_sd))
       sprintf("the basis of %d vectors leaves %s (RMS) of the runs out, more than the noise of %s",
-              ncol(basis$vectors),
-              format(signif(basis$discarded_rms, 3)), format(signif(noise_sd, 3))),
+              ncol(basis$vectors), format(signif(basis$discarded_rms, 3)),
+              format(signif(noise_sd, 3))),
     if (max(diagnostics$coefficients$widened) > 4)
       sprintf(paste("its leave-one-out errors are up to %s times as large as its hyper-parameters",
                     "would have them, by which its intervals are widened"),
@@ -282,8 +283,8 @@ print.amiss_emulator <- function(x, ...) on_stdout(x, {
     selected <- vapply(seq_len(ncol(x$basis$vectors)), function(q) paste(
       x$selection$parameter[x$selection$vector == q], collapse = ", "), "")
     shown <- seq_len(min(length(selected), 8))
-    cli::cli_bullets(
-      c("*" = "own beta by forward selection, in order, of {length(x$parameters)} parameters:"))
+    cli::cli_bullets(c("*" = paste("own beta by forward selection, in order, of",
+                                   "{length(x$parameters)} parameters:")))
     cli::cli_verbatim(sprintf("    vector %d: %s", shown,
                               ifelse(nzchar(selected[shown]), selected[shown], "none")))
     if (length(selected) > 8)
