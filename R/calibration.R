@@ -1,9 +1,9 @@
 calibration_control <- list(
   confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf),
-  time_constants = NULL,
-  error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, check = 40,
-  exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12,
-                           precision = 0.2, gradient = TRUE))
+  time_constants = NULL, error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100),
+  error_draws = 32, check = 40, exact = NULL,
+  ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12, precision = 0.2,
+             gradient = TRUE))
 
 #' Calibrate a simulator on measurements
 #'
@@ -214,8 +214,8 @@ fit_trust <- function(fit) {
   why <- c(if (!fit$posterior$trusted) fit$posterior$verdict,
            if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
            if (fit$posterior$trusted && fit$standard_error > rules$evidence_error)
-             paste("not trusted: corrected by the runs, the evidence has a standard error of more",
-                   "than one nat"))
+             paste("not trusted: corrected by the runs, the evidence has a standard error of",
+                   "more than one nat"))
   list(trusted = is.null(why),
        verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }

@@ -250,8 +250,8 @@ pairs_otherwise <- function(comparison) {
   order_of <- function(criterion)
     sign(ranks[[criterion]][pairs[1, ]] - ranks[[criterion]][pairs[2, ]])
   others <- setdiff(names(ranks), c("model", "evidence"))
-  counts <- vapply(others, function(criterion) sum(order_of(criterion) * order_of("evidence") < 0),
-                   0)
+  counts <- vapply(others,
+                   function(criterion) sum(order_of(criterion) * order_of("evidence") < 0), 0)
   structure(counts[counts > 0], pairs = ncol(pairs))
 }
 

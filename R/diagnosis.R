@@ -356,8 +356,9 @@ step_sentence <- function(upgrade, model) {
 }
 
 gain_words <- function(gain) {
-  if (gain$standard_error > 0) sprintf("a gain of %s standard errors",
-                                       short(gain$mean / gain$standard_error)) else "a gain"
+  if (gain$standard_error > 0)
+    sprintf("a gain of %s standard errors", short(gain$mean / gain$standard_error))
+  else "a gain"
 }
 
 doubt_sentence <- function(model) {
@@ -445,9 +446,9 @@ remaining_sentences <- function(upgrade) {
         paste0(": either the stated noise is too small, or something else is missing",
                if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
       else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    reach_sentence(model$fit) %||% if (last$large)
-                                     paste("The parameters may have taken the place of what is",
-                                           "missing: do not read their values as physical."),
+    reach_sentence(model$fit) %||%
+      if (last$large) paste("The parameters may have taken the place of what is missing: do not",
+                            "read their values as physical."),
     if (!is.null(moved))
       sprintf("With finer steps of the simulator %s: do not read %s as physical.", moved,
               if (length(step_moved(model)) > 1) "these values" else "this value"),

@@ -113,8 +113,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
          left_out = list(error = trained$coefficients - trained$loo_mean,
                          variance = trained$loo_variance), selection = selection,
          diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble),
-         control = control,
-         hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
+         control = control, hours = ensemble$hours,
+         given = if (is.null(ensemble$simulator)) ensemble,
          noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
   warn_coarse_basis(emulator, "control$max_vectors")
   emulator
@@ -280,8 +280,9 @@ print.amiss_emulator <- function(x, ...) on_stdout(x, {
                                  "{round(100 * d$coverage95, 1)} % of the coefficients,",
                                  "{round(100 * d$series_coverage95, 1)} % of the series")))
   if (x$control$selection == "forward") {
-    selected <- vapply(seq_len(ncol(x$basis$vectors)), function(q) paste(
-      x$selection$parameter[x$selection$vector == q], collapse = ", "), "")
+    selected <- vapply(seq_len(ncol(x$basis$vectors)),
+                       function(q) paste(x$selection$parameter[x$selection$vector == q],
+                                         collapse = ", "), "")
     shown <- seq_len(min(length(selected), 8))
     cli::cli_bullets(c("*" = paste("own beta by forward selection, in order, of",
                                    "{length(x$parameters)} parameters:")))

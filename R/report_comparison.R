@@ -93,13 +93,13 @@ practice_sentences <- function(comparison) {
   noted <- criteria[nzchar(criteria$lr_note) & !is.na(criteria$nested), ]
   c(if (!length(disagreements(comparison)))
       "Every criterion chooses the model that the evidence chooses.",
-    disagree, if (nrow(correlated)) {
-                sprintf(paste("Likelihood, AIC, BIC and the likelihood ratio count errors as",
-                              "independent; those of %s are correlated from one step to the next",
-                              "(%s), so that these criteria overstate every difference."),
-                        listed(correlated$model),
-                        listed(sprintf("%.2f", correlated$autocorrelation)))
-              },
+    disagree,
+    if (nrow(correlated)) {
+      sprintf(paste("Likelihood, AIC, BIC and the likelihood ratio count errors as independent;",
+                    "those of %s are correlated from one step to the next (%s), so that these",
+                    "criteria overstate every difference."),
+              listed(correlated$model), listed(sprintf("%.2f", correlated$autocorrelation)))
+    },
     if (nrow(noted))
       sprintf("Likelihood ratio of %s against %s: %s.", noted$model, noted$nested, noted$lr_note))
 }
@@ -131,8 +131,8 @@ attribution_table_words <- function(comparison) {
             ifelse(table$significant, " *", ""))
   }
   models <- names(comparison$models)
-  columns <- sapply(comparison$measurements$conditions, function(condition) cell[match(
-    paste(models, condition), paste(table$model, table$boundary))], simplify = FALSE)
+  columns <- sapply(comparison$measurements$conditions, function(condition)
+    cell[match(paste(models, condition), paste(table$model, table$boundary))], simplify = FALSE)
   data.frame(model = models, columns, check.names = FALSE)
 }
 

@@ -229,8 +229,8 @@ simulate_runs.amiss_responding <- function(simulator, values, drivers, step_h, h
 print.amiss_responding <- function(x, ...) on_stdout(x, {
   print(without_responses(x))
   of <- vapply(attr(x, "responses"), `[[`, "", "boundary")
-  told <-
-    "with {cli::qty(of)}the response{?s} to {.field {of}}, which describe{?s/} and do{?es/} not explain"
+  told <- paste("with {cli::qty(of)}the response{?s} to {.field {of}}, which describe{?s/} and",
+                "do{?es/} not explain")
   cli::cli_bullets(c("*" = told))
 })
 

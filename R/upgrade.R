@@ -97,8 +97,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' }
 #' @export
 upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, control = NULL,
-                          seed = NULL,
-                          threads = 1, quiet = FALSE, checkpoint = NULL) {
+                          seed = NULL, threads = 1, quiet = FALSE, checkpoint = NULL) {
   check_present(simulator, measurements, catalogue)
   started <- upgrade_start(simulator, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", "Make it with {.fun catalogue}.")
@@ -189,8 +188,7 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   control <- merge_control(upgrade_control, control, call = call)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps", call = call)
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE),
-              "control$decisive",
-              call = call)
+              "control$decisive", call = call)
   check_input(checkmate::check_count(control$rounds, positive = TRUE), "control$rounds",
               call = call)
   check_training_size(rules$more_runs * control$rounds, "control$rounds", control$rounds, call)
