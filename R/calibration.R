@@ -59,7 +59,8 @@ calibration_control <- list(
 #'   its priors and the check are in `vignette("algorithm", "amiss")`, *One covariance*, *The
 #'   simulator has the last word* and *History of the boundary conditions*.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)

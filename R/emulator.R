@@ -66,7 +66,8 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 #'   Giordano, Stephenson, Liu, Jordan and Broderick (2019), A Swiss army infinitesimal jackknife,
 #'   AISTATS.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)
@@ -317,7 +318,8 @@ tidy.amiss_emulator <- function(x, ...) {
 #'   emulator's uncertainty and what the basis leaves out.
 #' @source `vignette("algorithm", "amiss")`, *Emulator*.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)

@@ -70,7 +70,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   `vignette("algorithm", "amiss")`, *Naming*.
 #' @examples
 #' \donttest{
-#' table <- data.frame(hour = 1:120, Te = 5 + 3 * sin(1:120 / 4), Gv = pmax(0, 100 * cos(1:120 / 3.8)))
+#' table <- data.frame(hour = 1:120, Te = 5 + 3 * sin(1:120 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:120 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.02 * table$Gv + 0.1 * sin(61 * (1:120)^2)
 #' house <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                       validate = table$hour > 90)
