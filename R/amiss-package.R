@@ -84,8 +84,8 @@ engine_context <- function(seed, threads) list(seed = seed, threads = threads)
 call_engine <- function(expression, call = rlang::caller_env()) {
   tryCatch(expression, `C++Error` = function(e) {
     numerical <- inherits(e, "std::runtime_error")
-    (if (numerical) abort_numerical
-     else abort_input)("The computation stopped: {conditionMessage(e)}.", call = call)
+    (if (numerical) abort_numerical else abort_input)(
+      "The computation stopped: {conditionMessage(e)}.", call = call)
   })
 }
 

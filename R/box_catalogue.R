@@ -45,9 +45,10 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
               sentence = paste("The heater stores heat and gives it off with a delay that the",
                                "model leaves out.")),
     mechanism("missing thermal mass", boundary = c("RHP", "Te"),
-              edit = function(model) add_component(model, zone_wall("mass", area = free(
-                "mass_area", uniform(0.01, 3), "m2", "surface of additional mass"),
-                                                                    zone_layer(0.02, 0.5, 2e6))),
+              edit = function(model) add_component(
+                model, zone_wall("mass", area = free("mass_area", uniform(0.01, 3), "m2",
+                                                     "surface of additional mass"),
+                                 zone_layer(0.02, 0.5, 2e6))),
               sentence = "The box holds mass that the model leaves out."),
     mechanism("glazing U-value", boundary = "Te",
               edit = function(model) change_component(
@@ -65,8 +66,9 @@ box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn")
                 Reduce(function(m, name) change_component(
                   m, name, wind_film = share, wind_speed = "Ws", wind_direction = "Wd",
                   azimuth = unname(facing[name])), outer, model)
-              }, sentence = paste("Wind changes the heat transfer at the outer surfaces, which the",
-                                  "model takes as constant.")),
+              },
+              sentence = paste("Wind changes the heat transfer at the outer surfaces, which the",
+                               "model takes as constant.")),
     mechanism(
       "neighbour coupling", boundary = "Tn",
       edit = function(model) add_component(model, zone_coupling("neighbour", free(

@@ -1,9 +1,9 @@
 calibration_control <- list(
   confidence = NULL, inclusion = 0.2, amplitude = NULL, reach = c(13, 300, Inf),
-  time_constants = NULL,
-  error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100), error_draws = 32, check = 40,
-  exact = NULL, ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12,
-                           precision = 0.2, gradient = TRUE))
+  time_constants = NULL, error_times = NULL, error_ratios = c(0, 0.3, 1, 3, 10, 30, 100),
+  error_draws = 32, check = 40, exact = NULL,
+  ais = list(pilot_chains = 400, groups = 8, max_groups = 16, max_sweeps = 12, precision = 0.2,
+             gradient = TRUE))
 
 #' Calibrate a simulator on measurements
 #'
@@ -59,7 +59,8 @@ calibration_control <- list(
 #'   its priors and the check are in `vignette("algorithm", "amiss")`, *One covariance*, *The
 #'   simulator has the last word* and *History of the boundary conditions*.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)
@@ -214,8 +215,8 @@ fit_trust <- function(fit) {
   why <- c(if (!fit$posterior$trusted) fit$posterior$verdict,
            if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
            if (fit$posterior$trusted && fit$standard_error > rules$evidence_error)
-             paste("not trusted: corrected by the runs, the evidence has a standard error of more",
-                   "than one nat"))
+             paste("not trusted: corrected by the runs, the evidence has a standard error of",
+                   "more than one nat"))
   list(trusted = is.null(why),
        verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
 }

@@ -156,8 +156,8 @@ calibro_design <- function(inputs, parameters, relative, call = rlang::caller_en
   if (any(abs(inputs) > 1 + 1e-9)) {
     far <- which(abs(inputs) > 1 + 1e-9, arr.ind = TRUE)[1, ]
     abort_input(c(paste("Row {far[1]} of the design has the value {inputs[far[1], far[2]]} for",
-                        "{.val {names(parameters)[far[2]]}}; relative values lie between -1 and",
-                        "1."),
+                        "{.val {names(parameters)[far[2]]}}; relative values lie between",
+                        "-1 and 1."),
                   i = "Use {.code relative = FALSE} for values in the parameter's unit."),
                 call = call)
   }

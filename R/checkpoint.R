@@ -166,7 +166,8 @@ bindings <- function(x, names, seen) {
   value <- function(name) {
     if (rlang::env_binding_are_active(x, name)) return("active")
     tryCatch(plain(if (name == "...") eval(quote(list(...)), x) else get(name, x, inherits = FALSE),
-                   seen), error = function(e) "none")
+                   seen),
+             error = function(e) "none")
   }
   stats::setNames(lapply(names, value), names)
 }

@@ -6,10 +6,10 @@ command_parser <- function() {
   optparse::OptionParser(
     usage = "usage: amiss run STUDY.yml --out DIR [options]\n       amiss --help | --version",
     add_help_option = FALSE, option_list = list(
-      option("out",
-             "folder for report.html, figures/, result.rds and result.json", metavar = "DIR"),
-      option("threads",
-             "threads to use (1); results do not depend on it", default = "1", metavar = "N"),
+      option("out", "folder for report.html, figures/, result.rds and result.json",
+             metavar = "DIR"),
+      option("threads", "threads to use (1); results do not depend on it", default = "1",
+             metavar = "N"),
       option("seed", "seed of the random numbers; overrides that of the study", metavar = "N"),
       switch("trust", "run the R files that the study names, and read files outside its folder"),
       switch("large", "run even what is estimated to need more than a day or 4 GB"),

@@ -93,9 +93,8 @@ clock_zone <- function(time, clock) {
   if (inherits(time, "Date")) return("UTC")
   zone <- clock$zone %||% attr(time, "tzone")[1] %||% ""
   if (nzchar(zone)) return(zone)
-  stop(
-    "the times of the column name no zone, so that a text is another time on each machine; say `time_zone`, such ",
-    "as \"UTC\"", call. = FALSE)
+  stop("the times of the column name no zone, so that a text is another time on each machine; ",
+       "say `time_zone`, such as \"UTC\"", call. = FALSE)
 }
 
 # Two texts have an order only if they are numbers, times of day or times.

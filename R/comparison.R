@@ -59,8 +59,8 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)
 #' house <- measurements(data, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1)
 #' gain <- free("gain", uniform(0, 1))
-#' blind <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"], gain,
-#'                             boundary = "Te")
+#' blind <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
+#'                             gain, boundary = "Te")
 #' sunny <- function_simulator(function(values, drivers) {
 #'   20 + values[["gain"]] * drivers[, "Te"] + values[["sun"]] * drivers[, "Gv"]
 #' }, gain, free("sun", uniform(0, 1)), boundary = c("Te", "Gv"))
@@ -250,8 +250,8 @@ pairs_otherwise <- function(comparison) {
   order_of <- function(criterion)
     sign(ranks[[criterion]][pairs[1, ]] - ranks[[criterion]][pairs[2, ]])
   others <- setdiff(names(ranks), c("model", "evidence"))
-  counts <- vapply(others, function(criterion) sum(order_of(criterion) * order_of("evidence") < 0),
-                   0)
+  counts <- vapply(others,
+                   function(criterion) sum(order_of(criterion) * order_of("evidence") < 0), 0)
   structure(counts[counts > 0], pairs = ncol(pairs))
 }
 
@@ -364,7 +364,8 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
 #' @param ... Not used.
 #' @return `tidy()`: a data frame; `glance()`: one row, about the model of highest evidence.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)
@@ -373,8 +374,8 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
 #' steep <- function_simulator(function(values, drivers) 20 + values[["gain"]]^2 * drivers[, "Te"],
 #'                             free("gain", uniform(0, 1)), boundary = "Te")
 #' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))
-#' comparison <- compare_models(list(linear = linear, steep = steep), room, runs = 20, control = quick,
-#'                              seed = 1, quiet = TRUE)
+#' comparison <- compare_models(list(linear = linear, steep = steep), room, runs = 20,
+#'                              control = quick, seed = 1, quiet = TRUE)
 #' tidy(comparison)
 #' tidy(comparison, "criteria")
 #' @export

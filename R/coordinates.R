@@ -37,8 +37,8 @@ coordinates_of <- function(parameters) {
 # Points in the unit cube (one a row) in these coordinates, and back.
 from_unit <- function(unit, space) {
   n <- nrow(unit)
-  z <- to_normal(
-    rep(space$below, each = n) + rep(space$within, each = n) * pmin(pmax(unit, 1e-15), 1 - 1e-15))
+  z <- to_normal(rep(space$below, each = n) +
+                   rep(space$within, each = n) * pmin(pmax(unit, 1e-15), 1 - 1e-15))
   dim(z) <- dim(unit)
   z[, space$flat] <- 2 * flat_limit * (unit[, space$flat] - 0.5)
   z

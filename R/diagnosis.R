@@ -14,7 +14,8 @@
 #'   `attribution` and `method`. Of several records the sentences and `scores` are in units of each
 #'   one's noise, and `records` and `of_records` have the scores of each in its own unit.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)
@@ -118,11 +119,11 @@ open_verdict <- function(upgrade) {
   answers <- significant_conditions(base$attribution$table)
   remainder <- remaining_error(base, upgrade$measurements)
   if (unjudged(upgrade) && remainder$large) {
-    return(
-      unexplained(sprintf(paste("The error is %s times the stated noise%s. Whether something is",
-                                "missing from the model or its parameters were not found cannot be",
-                                "told: its emulator is not good enough."), short(remainder$ratio),
-                          if (length(answers)) paste(" and answers to", listed(answers)) else "")))
+    return(unexplained(sprintf(
+      paste("The error is %s times the stated noise%s. Whether something is missing from the model",
+            "or its parameters were not found cannot be told: its emulator is not good enough."),
+      short(remainder$ratio),
+      if (length(answers)) paste(" and answers to", listed(answers)) else "")))
   }
   if (length(answers) && !remainder$large) {
     return(unexplained(sprintf(paste("The error is of the size of the stated noise (%s times), but",
@@ -135,10 +136,10 @@ open_verdict <- function(upgrade) {
                                listed(answers), explained)))
   }
   if (remainder$large) {
-    return(unexplained(
-      sprintf(paste("Something is missing from the model, and %s: its error is %s times the stated",
-                    "noise; %s."), explained, short(remainder$ratio),
-              remainder$pattern$what %||% "no response to a boundary condition was found in it")))
+    return(unexplained(sprintf(
+      paste("Something is missing from the model, and %s: its error is %s times the stated noise;",
+            "%s."), explained, short(remainder$ratio),
+      remainder$pattern$what %||% "no response to a boundary condition was found in it")))
   }
   if (!base$fit$trust$trusted) {
     return(list(verdict = "nothing", tag = "Nothing decisive, but the numbers are not trusted",
@@ -356,8 +357,9 @@ step_sentence <- function(upgrade, model) {
 }
 
 gain_words <- function(gain) {
-  if (gain$standard_error > 0) sprintf("a gain of %s standard errors",
-                                       short(gain$mean / gain$standard_error)) else "a gain"
+  if (gain$standard_error > 0)
+    sprintf("a gain of %s standard errors", short(gain$mean / gain$standard_error))
+  else "a gain"
 }
 
 doubt_sentence <- function(model) {
@@ -445,9 +447,9 @@ remaining_sentences <- function(upgrade) {
         paste0(": either the stated noise is too small, or something else is missing",
                if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
       else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    reach_sentence(model$fit) %||% if (last$large)
-                                     paste("The parameters may have taken the place of what is",
-                                           "missing: do not read their values as physical."),
+    reach_sentence(model$fit) %||%
+      if (last$large) paste("The parameters may have taken the place of what is missing: do not",
+                            "read their values as physical."),
     if (!is.null(moved))
       sprintf("With finer steps of the simulator %s: do not read %s as physical.", moved,
               if (length(step_moved(model)) > 1) "these values" else "this value"),

@@ -1,7 +1,7 @@
-emulator_control <- list(
-  explained = 0.99, noise_fraction = 0.05, max_vectors = 30, selection = "ard", significance = 0.05,
-  s2 = c(1, 1), eta2 = c(1, 1), beta = c(1, 1), lambda = c(2, NA), starts = 3, searches = 1,
-  max_evaluations = 120)
+emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 30,
+                         selection = "ard", significance = 0.05,
+                         s2 = c(1, 1), eta2 = c(1, 1), beta = c(1, 1), lambda = c(2, NA),
+                         starts = 3, searches = 1, max_evaluations = 120)
 
 #' Train the emulator of an ensemble
 #'
@@ -66,7 +66,8 @@ emulator_control <- list(
 #'   Giordano, Stephenson, Liu, Jordan and Broderick (2019), A Swiss army infinitesimal jackknife,
 #'   AISTATS.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)
@@ -102,19 +103,20 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   diagnostics <- emulator_diagnostics(trained, basis, ensemble$outputs)
   selection <- trained$selection
   selection$parameter <- names(ensemble$parameters)[selection$parameter]
-  emulator <- structure(list(
-    format_version = format_version, parameters = ensemble$parameters,
-    simulator = ensemble$simulator, basis = basis[c(
-      "vectors", "singular_values", "explained", "discarded_rms", "discarded_ss", "discarded_sd")],
-    processes = c(trained[c("inputs", "coefficients", "hyperparameters")],
-                  list(region = ensemble$region, trend = trend)),
-    unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
-    left_out = list(error = trained$coefficients - trained$loo_mean,
-                    variance = trained$loo_variance), selection = selection,
-    diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble),
-    control = control,
-    hours = ensemble$hours, given = if (is.null(ensemble$simulator)) ensemble,
-    noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
+  emulator <- structure(
+    list(format_version = format_version, parameters = ensemble$parameters,
+         simulator = ensemble$simulator,
+         basis = basis[c("vectors", "singular_values", "explained",
+                         "discarded_rms", "discarded_ss", "discarded_sd")],
+         processes = c(trained[c("inputs", "coefficients", "hyperparameters")],
+                       list(region = ensemble$region, trend = trend)),
+         unit = ensemble$unit, spread = trained$spread, over_priors = ensemble$over_priors,
+         left_out = list(error = trained$coefficients - trained$loo_mean,
+                         variance = trained$loo_variance), selection = selection,
+         diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble),
+         control = control, hours = ensemble$hours,
+         given = if (is.null(ensemble$simulator)) ensemble,
+         noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
   warn_coarse_basis(emulator, "control$max_vectors")
   emulator
 }
@@ -252,8 +254,8 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
   why <- c(
     if (coarse_basis(basis, noise_sd))
       sprintf("the basis of %d vectors leaves %s (RMS) of the runs out, more than the noise of %s",
-              ncol(basis$vectors),
-              format(signif(basis$discarded_rms, 3)), format(signif(noise_sd, 3))),
+              ncol(basis$vectors), format(signif(basis$discarded_rms, 3)),
+              format(signif(noise_sd, 3))),
     if (max(diagnostics$coefficients$widened) > 4)
       sprintf(paste("its leave-one-out errors are up to %s times as large as its hyper-parameters",
                     "would have them, by which its intervals are widened"),
@@ -279,11 +281,12 @@ print.amiss_emulator <- function(x, ...) on_stdout(x, {
                                  "{round(100 * d$coverage95, 1)} % of the coefficients,",
                                  "{round(100 * d$series_coverage95, 1)} % of the series")))
   if (x$control$selection == "forward") {
-    selected <- vapply(seq_len(ncol(x$basis$vectors)), function(q) paste(
-      x$selection$parameter[x$selection$vector == q], collapse = ", "), "")
+    selected <- vapply(seq_len(ncol(x$basis$vectors)),
+                       function(q) paste(x$selection$parameter[x$selection$vector == q],
+                                         collapse = ", "), "")
     shown <- seq_len(min(length(selected), 8))
-    cli::cli_bullets(
-      c("*" = "own beta by forward selection, in order, of {length(x$parameters)} parameters:"))
+    cli::cli_bullets(c("*" = paste("own beta by forward selection, in order, of",
+                                   "{length(x$parameters)} parameters:")))
     cli::cli_verbatim(sprintf("    vector %d: %s", shown,
                               ifelse(nzchar(selected[shown]), selected[shown], "none")))
     if (length(selected) > 8)
@@ -315,7 +318,8 @@ tidy.amiss_emulator <- function(x, ...) {
 #'   emulator's uncertainty and what the basis leaves out.
 #' @source `vignette("algorithm", "amiss")`, *Emulator*.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)

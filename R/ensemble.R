@@ -94,8 +94,8 @@ ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, va
   check_enough_runs(nrow(unique(design)), ncol(design), nrow(design))
   if (is.null(parameters)) {
     for (name in colnames(design)) check_varies(name, design[, name])
-    parameters <- lapply(colnames(design), function(name) free(
-      name, uniform(min(design[, name]), max(design[, name]))))
+    parameters <- lapply(colnames(design), function(name)
+      free(name, uniform(min(design[, name]), max(design[, name]))))
   }
   check_input(checkmate::check_list(parameters), "parameters",
               "Give a list of parameters, each made by {.fun free}.")
@@ -246,8 +246,9 @@ runs_by_count <- function(outputs, validation, measurements, call) {
   kinds <- list(rows$calibration, sort(c(rows$calibration, rows$validation)), rows$record)
   kind <- match(nrow(outputs), lengths(kinds))
   if (is.na(kind)) {
-    readings <- if (m$per_step > 1) paste0(", and ", length(m$raw$hours),
-                                           " before they were averaged") else ""
+    readings <- if (m$per_step > 1)
+                  paste0(", and ", length(m$raw$hours), " before they were averaged")
+                else ""
     abort_input(c(paste("The runs have {nrow(outputs)} rows; the measurements have",
                         "{length(rows$calibration)} calibration and {length(rows$validation)}",
                         "validation rows, of {length(m$y)} in all{readings}."),

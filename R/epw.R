@@ -32,10 +32,11 @@
 #' @examples
 #' # A small template: three hours of 1 January in a clock that is an hour ahead of UTC.
 #' header <- c("LOCATION,Somewhere,-,DEU,None,000000,48.0,11.7,1.0,700.0", "DESIGN CONDITIONS,0",
-#'             "TYPICAL/EXTREME PERIODS,0", "GROUND TEMPERATURES,0", "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0",
-#'             "COMMENTS 1,-", "COMMENTS 2,-", "DATA PERIODS,1,1,Data,Sunday, 1/ 1, 1/ 1")
-#' rows <- sprintf("2001,1,1,%d,60,?9,5.0,1.0,75,94000,9999,9999,300,0,0,0,%s", 1:3,
-#'                 "999999,999999,999999,9999,180,2.0,5,5,9999,99999,9,999999999,10,0.1,0,88,0.2,0,1")
+#'             "TYPICAL/EXTREME PERIODS,0", "GROUND TEMPERATURES,0",
+#'             "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0", "COMMENTS 1,-", "COMMENTS 2,-",
+#'             "DATA PERIODS,1,1,Data,Sunday, 1/ 1, 1/ 1")
+#' rest <- "999999,999999,999999,9999,180,2.0,5,5,9999,99999,9,999999999,10,0.1,0,88,0.2,0,1"
+#' rows <- sprintf("2001,1,1,%d,60,?9,5.0,1.0,75,94000,9999,9999,300,0,0,0,%s", 1:3, rest)
 #' template <- tempfile(fileext = ".epw")
 #' writeLines(c(header, rows), template)
 #' epw_weather(template, c(dry_bulb = "Te"), instant = "dry_bulb")

@@ -9,7 +9,8 @@
 #' @return A one-row data frame: `log10_bf` in favour of `model`, its 95 % interval `lower95`,
 #'   `upper95`, and `word`.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)
@@ -70,7 +71,8 @@ evidence_word <- function(lower, upper) {
 #' @return `logml()`: the natural logarithm of the evidence. `bf()`: the Bayes factor in favour of
 #'   `x1`, of the class `bf_bridge`.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)

@@ -24,18 +24,19 @@ stage_lines <- function() ggplot2::scale_linetype_manual(
   values = c("before" = "longdash", "after" = "solid", "the model" = "solid"))
 
 figure_theme <- function() {
-  ggplot2::theme_minimal(base_size = letter_points, base_family = figure_family()) + ggplot2::theme(
-    plot.title = ggplot2::element_text(face = "bold",
-                                       size = ggplot2::rel(title_size), lineheight = 1.05),
-    plot.subtitle = ggplot2::element_text(colour = "grey30",
-                                          size = ggplot2::rel(subtitle_size), lineheight = 1.1),
-    plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(),
-    panel.spacing = ggplot2::unit(14, "pt"),
-    strip.text = ggplot2::element_text(face = "bold", hjust = 0), strip.placement = "outside",
-    strip.text.y.left = ggplot2::element_text(angle = 90, hjust = 0.5), strip.clip = "off",
-    axis.text = ggplot2::element_text(colour = "grey20"), legend.position = "top",
-    legend.justification = "left",
-    legend.title = ggplot2::element_blank(), legend.margin = ggplot2::margin(0, 0, 0, 0))
+  ggplot2::theme_minimal(base_size = letter_points, base_family = figure_family()) +
+    ggplot2::theme(
+      plot.title = ggplot2::element_text(face = "bold", size = ggplot2::rel(title_size),
+                                         lineheight = 1.05),
+      plot.subtitle = ggplot2::element_text(colour = "grey30", size = ggplot2::rel(subtitle_size),
+                                            lineheight = 1.1),
+      plot.title.position = "plot", panel.grid.minor = ggplot2::element_blank(),
+      panel.spacing = ggplot2::unit(14, "pt"),
+      strip.text = ggplot2::element_text(face = "bold", hjust = 0), strip.placement = "outside",
+      strip.text.y.left = ggplot2::element_text(angle = 90, hjust = 0.5), strip.clip = "off",
+      axis.text = ggplot2::element_text(colour = "grey20"), legend.position = "top",
+      legend.justification = "left", legend.title = ggplot2::element_blank(),
+      legend.margin = ggplot2::margin(0, 0, 0, 0))
 }
 
 figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {

@@ -15,8 +15,8 @@ figure_attribution <- function(attributions) {
   table <- stage_table(attributions, function(a) a$table)
   strength <- tapply(table$log10_bf_dropped, table$boundary, max)
   table$boundary <- factor(table$boundary, names(sort(strength)))
-  table$label <- ifelse(table$significant, paste0("   ", percent(pmax(table$share, 0)), " of it"),
-                        "")
+  table$label <- ifelse(table$significant,
+                        paste0("   ", percent(pmax(table$share, 0)), " of it"), "")
   table$y <- as.integer(table$boundary) +
     if (length(attributions) > 1) ifelse(table$stage == "before", 0.18, -0.18) else 0
   axis <- signed_log_axis(table$log10_bf_dropped)

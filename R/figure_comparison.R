@@ -152,7 +152,8 @@ figure_models_in_time <- function(comparison, use) {
   m <- comparison$measurements
   table <- mark_models(
     bind_models(comparison$models,
-                function(model) prediction_rows(model)[model$prediction$use == use, ]), comparison)
+                function(model) prediction_rows(model)[model$prediction$use == use, ]),
+    comparison)
   score <- if (use == "calibrate") "rmse_calibration" else "rmse_validation"
   criteria <- comparison$tables$criteria
   labels <- stats::setNames(paste0(criteria$model, "\n",
@@ -169,8 +170,9 @@ figure_models_in_time <- function(comparison, use) {
     ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$standing),
                        linewidth = 0.7) +
     ggplot2::facet_grid(ggplot2::vars(.data$model),
-                        labeller = function(strip) lapply(
-                          strip, function(x) wrap_labels(0.2)(labels[x]))) + model_scales() +
+                        labeller = function(strip)
+                          lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
+    model_scales() +
     figure_titles(title,
                   paste("Black: measured. Coloured: simulated, with the band that should hold 95 %",
                         "of the measurements. At the right: root mean squared error."),
@@ -199,8 +201,9 @@ figure_discrepancies <- function(comparison) {
     ggplot2::geom_line(ggplot2::aes(y = .data$discrepancy, colour = .data$standing),
                        linewidth = 0.9) +
     ggplot2::facet_grid(ggplot2::vars(.data$model),
-                        labeller = function(strip) lapply(
-                          strip, function(x) wrap_labels(0.2)(labels[x]))) + model_scales() +
+                        labeller = function(strip)
+                          lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
+    model_scales() +
     figure_titles(title, paste("Grey: measured - simulated. Coloured: the discrepancy that answers",
                                "to boundary conditions, with its 95 % band; at the right its root",
                                "mean square."),
@@ -243,9 +246,8 @@ figure_models_parameters <- function(comparison) {
 }
 
 heat_loss_table <- function(comparison) {
-  table <- do.call(rbind, lapply(
-    comparison$models, function(model) if (length(model$heat_loss))
-                                         data.frame(model = model$name, value = model$heat_loss)))
+  table <- do.call(rbind, lapply(comparison$models, function(model)
+    if (length(model$heat_loss)) data.frame(model = model$name, value = model$heat_loss)))
   rownames(table) <- NULL
   table
 }

@@ -60,8 +60,8 @@ response_title <- function(binned, name, noise) {
   swing <- vapply(split(binned$residual, binned$stage), function(r) diff(range(r)), 0)
   if (all(swing < 2 * noise)) return(paste("The error hardly depends on", name))
   if (length(swing) < 2) return(paste("How the error changes with", name))
-  if (swing[2] < 0.7 * swing[1]) paste("The error depends on", name, "before the change, and less",
-                                       "after it")
+  if (swing[2] < 0.7 * swing[1])
+    paste("The error depends on", name, "before the change, and less after it")
   else paste("The error depends on", name, "about as much after the change as before")
 }
 

@@ -66,10 +66,12 @@ figure_gain <- function(upgrade) {
   dodge <- ggplot2::position_dodge(width = 0.9)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$use, .data$value, fill = .data$stage)) +
     ggplot2::geom_col(position = dodge, width = 0.84) +
-    ggplot2::geom_text(ggplot2::aes(
-      label = .data$label, vjust = ifelse(.data$score == "coverage95", 3, -0.35),
-      colour = ifelse(.data$score == "coverage95" & .data$stage != "before", "white", "black")),
-                       position = dodge, size = 3.9) + ggplot2::scale_colour_identity() +
+    ggplot2::geom_text(
+      ggplot2::aes(
+        label = .data$label, vjust = ifelse(.data$score == "coverage95", 3, -0.35),
+        colour = ifelse(.data$score == "coverage95" & .data$stage != "before", "white", "black")),
+      position = dodge, size = 3.9) +
+    ggplot2::scale_colour_identity() +
     ggplot2::geom_hline(ggplot2::aes(yintercept = .data$value), target, linetype = "dashed",
                         colour = "grey20") +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 3,
@@ -128,8 +130,9 @@ figure_measurements <- function(measurements) {
   table <- data.frame(time = rep(m$time, length(panels)), value = unlist(series),
                       use = factor(uses[rep(m$use, length(panels))], uses),
                       panel = factor(rep(panels, each = length(m$y)), panels),
-                      part = rep(paste(m$segment, cumsum(
-                        c(TRUE, m$use[-1] != m$use[-length(m$use)]))), length(panels)))
+                      part = rep(paste(m$segment,
+                                       cumsum(c(TRUE, m$use[-1] != m$use[-length(m$use)]))),
+                                 length(panels)))
   count <- function(use) sum(m$use == use & !is.na(m$y))
   title <- sprintf("%s: %d steps of %s h to calibrate, %d held out", m$name, count("calibrate"),
                    format(m$step_h), count("validate"))

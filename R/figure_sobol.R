@@ -13,13 +13,16 @@ figure_sobol <- function(indices) {
   table$y <- match(table$term, indices$table$parameter[ranked]) +
     ifelse(table$order == "first", 0.15, -0.15)
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$estimate, .data$y, colour = .data$order)) +
-    ggplot2::geom_vline(xintercept = 0, colour = "grey40") + ggplot2::geom_linerange(
-      ggplot2::aes(xmin = .data$conf.low, xmax = .data$conf.high), linewidth = 1.1) +
+    ggplot2::geom_vline(xintercept = 0, colour = "grey40") +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$conf.low, xmax = .data$conf.high),
+                            linewidth = 1.1) +
     ggplot2::geom_point(ggplot2::aes(shape = .data$order), size = 4, fill = "white", stroke = 1.3) +
     ggplot2::scale_colour_manual(values = sobol_colours, labels = sobol_orders) +
     ggplot2::scale_shape_manual(values = c(first = 19, total = 21), labels = sobol_orders) +
-    ggplot2::scale_y_continuous(NULL, breaks = seq_along(ranked), labels = function(y) wrap_labels(
-      0.3)(indices$table$label[ranked][y])) + ggplot2::scale_x_continuous(guide = apart) +
+    ggplot2::scale_y_continuous(
+      NULL, breaks = seq_along(ranked),
+      labels = function(y) wrap_labels(0.3)(indices$table$label[ranked][y])) +
+    ggplot2::scale_x_continuous(guide = apart) +
     figure_titles(sobol_title(indices$table),
                   "Sobol indices over the priors, all steps together, with 95 % intervals.",
                   x = "share of the variance") +

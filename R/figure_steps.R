@@ -2,12 +2,12 @@
 
 steps_table <- function(upgrade) {
   models <- upgrade$models
-  told <- vapply(seq_along(models), function(k) if (k == 1) models[[1]]$name
-                                                else paste("+", models[[k]]$mechanism), "")
+  told <- vapply(seq_along(models), function(k)
+    if (k == 1) models[[1]]$name else paste("+", models[[k]]$mechanism), "")
   rows <- lapply(seq_along(models), function(k) {
     data.frame(step = told[k], use = names(use_names),
-               rmse = vapply(names(use_names), function(use) models[[k]]$scores[[use]][["rmse"]],
-                             0))
+               rmse = vapply(names(use_names),
+                             function(use) models[[k]]$scores[[use]][["rmse"]], 0))
   })
   table <- do.call(rbind, rows)
   table$step <- factor(table$step, rev(told))

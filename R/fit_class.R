@@ -23,8 +23,8 @@ calibrated_record.amiss_fit <- function(fit) fit$measurements$y[fit$rows]
 record_fits <- function(fit) {
   if (!inherits(fit, "amiss_joint")) return(list(fit))
   lapply(fit$records, function(one) {
-    one[c("log_evidence", "standard_error",
-          "interval")] <- fit[c("log_evidence", "standard_error", "interval")]
+    one[c("log_evidence", "standard_error", "interval")] <-
+      fit[c("log_evidence", "standard_error", "interval")]
     one$part <- NULL
     one
   })

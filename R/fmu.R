@@ -64,7 +64,8 @@
 #' house <- fmu_simulator(file, free("R_out", uniform(0.005, 0.02), "K/W"), output = "T_air",
 #'                        inputs = c("Te", "P"), fixed = list(aperture = 0), steps_per_row = 4)
 #' house
-#' simulate_runs(house, cbind(R_out = c(0.008, 0.015)), cbind(Te = c(4, 6, 5), P = 1000), step_h = 1)
+#' simulate_runs(house, cbind(R_out = c(0.008, 0.015)), cbind(Te = c(4, 6, 5), P = 1000),
+#'               step_h = 1)
 #' @export
 fmu_simulator <- function(file, ..., output, inputs = character(), fixed = list(), averaged = TRUE,
                           steps_per_row = 1, start = 0, tolerance = NULL, time_limit = 600,
@@ -115,9 +116,11 @@ fmu_simulator <- function(file, ..., output, inputs = character(), fixed = list(
 #' @return The extended simulator.
 #' @examplesIf requireNamespace("xml2", quietly = TRUE) && nzchar(Sys.which("make"))
 #' source(system.file("examples", "fmu", "build.R", package = "amiss"))
-#' house <- fmu_simulator(build_house(tempfile(fileext = ".fmu")), free("R_out", uniform(0.005, 0.02), "K/W"),
+#' house <- fmu_simulator(build_house(tempfile(fileext = ".fmu")),
+#'                        free("R_out", uniform(0.005, 0.02), "K/W"),
 #'                        output = "T_air", inputs = "Te")
-#' mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.", edit = function(model) {
+#' mechanism("sun", boundary = "Gv", sentence = "Sun enters that the model leaves out.",
+#'           edit = function(model) {
 #'   with_fmu(model, free("aperture", uniform(0, 10), "m2"), inputs = "Gv")
 #' })
 #' @export

@@ -147,9 +147,11 @@ as_number <- function(x)
 described_variables <- function(root, version, path, call) {
   nodes <- xml2::xml_find_all(root, "./ModelVariables/*")
   if (!length(nodes)) refuse_fmu(path, "It has no variables.", call)
-  typed <- if (version == 2) xml2::xml_find_all(root, paste0(
-    "./ModelVariables/ScalarVariable/*[self::Real or self::Integer or self::Boolean or ",
-    "self::String or self::Enumeration]")) else nodes
+  typed <- if (version == 2)
+             xml2::xml_find_all(root, paste0("./ModelVariables/ScalarVariable/*[self::Real or ",
+                                             "self::Integer or self::Boolean or self::String or ",
+                                             "self::Enumeration]"))
+           else nodes
   reference <- as_number(xml2::xml_attr(nodes, "valueReference"))
   name <- xml2::xml_attr(nodes, "name")
   if (length(typed) != length(nodes) || anyNA(name) || anyNA(reference) ||

@@ -34,8 +34,8 @@ heat_loss_coefficient <- function(simulator, values, drivers = numeric(), outsid
               "It must be warmer than {.arg outside}.")
   row <- t(steady_drivers(simulator, drivers, outside))
   vapply(seq_len(nrow(values)),
-         function(i) steady_loss(zone_resolve(simulator, values[i, ]), row,
-                                 inside) / (inside - outside), 0)
+         function(i) steady_loss(zone_resolve(simulator, values[i, ]), row, inside) /
+                       (inside - outside), 0)
 }
 
 # One interval of a day, its driver repeated long enough for the walls to be in balance with a held

@@ -356,8 +356,9 @@ not_agreed <- function(trust, modes) {
          else if (modes$searches < 2)
            "the budget allowed a single search, so that no other confirms its mode"
          else sprintf("no two of %d searches led to one mode", modes$searches)
-  list(trusted = FALSE, verdict = paste0(
-    c(if (!trust$trusted) trust$verdict, paste("not trusted:", why)), collapse = "; "))
+  list(trusted = FALSE,
+       verdict = paste0(c(if (!trust$trusted) trust$verdict, paste("not trusted:", why)),
+                        collapse = "; "))
 }
 
 # Whether a second search ended in the region of the posterior, as seen in the end; and how many

@@ -92,12 +92,11 @@ held_out_inspection <- function(model, measurements) {
   beyond <- uncovered_conditions(measurements, model$fit)
   where <- if (!length(beyond))
              "compare the two periods for what else differs: settings, use, sensors"
-           else
-             sprintf("there %s outside of what calibration saw%s; calibrate on data that cover it",
-                     listed(sprintf("%s lies in %s of the steps", names(beyond), percent(beyond))),
-                     if (remaining_error(model, measurements)$large)
-                       ", or what is missing acts more"
-                     else "")
+           else sprintf(
+             "there %s outside of what calibration saw%s; calibrate on data that cover it",
+             listed(sprintf("%s lies in %s of the steps", names(beyond), percent(beyond))),
+             if (remaining_error(model, measurements)$large) ", or what is missing acts more"
+             else "")
   c(held_out = sprintf("On held-out data the error is %s times that in calibration: %s.",
                        short(excess), where))
 }
@@ -302,9 +301,10 @@ nearest_inspection <- function(upgrade) {
     best$mechanism, odds(best$log10_bf),
     if (isTRUE(best$error_ratio < rules$clearly_fallen))
       sprintf("; with it the error falls to %s", percent(best$error_ratio))
-    else "", if (!length(drivers)) ""
-             else sprintf(" in which %s strongly",
-                          paste(listed(drivers), if (length(drivers) > 1) "change" else "changes")),
+    else "",
+    if (!length(drivers)) ""
+    else sprintf(" in which %s strongly",
+                 paste(listed(drivers), if (length(drivers) > 1) "change" else "changes")),
     if (NROW(new)) sprintf(", or a look for %s on site", called_for(new)) else ""))
 }
 
@@ -384,8 +384,8 @@ driver_inspections <- function(upgrade) {
   constant <- intersect(absent, unlist(lapply(each_record(upgrade$measurements), `[[`, "constant")))
   absent <- setdiff(absent, constant)
   driven_by <- function(conditions) {
-    listed(names(upgrade$catalogue)[vapply(upgrade$catalogue,
-                                           function(m) any(m$boundary %in% conditions), NA)])
+    listed(names(upgrade$catalogue)[
+      vapply(upgrade$catalogue, function(m) any(m$boundary %in% conditions), NA)])
   }
   c(if (length(constant)) {
       c(constant = sprintf(paste("%s did not vary in calibration, so that %s cannot be judged:",

@@ -6,64 +6,62 @@ doubt <- function(says, reason) list(says = says, reason = reason)
 
 # Tests of a case: the mechanism's model and its parent, its row and those of its rivals, and what
 # judge_models() knows of all models.
-doubts <- list(record = doubt(function(case) record_doubt_words(case$faults),
-                              "a fault of the record looks like a cause"),
-               describes = doubt(function(case) {
-                 if (describes(case$entry)) "it describes what is missing and does not explain it"
-               }, "a response is no cause"),
-               rivals = doubt(function(case) {
-                 if (case$others > rules$rival_probability) "other causes are possible"
-               }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
-               untried = doubt(function(case) {
-                 twins <- untried_twins(case$parent, case$entry, case$catalogue)
-                 if (length(twins)) {
-                   sprintf(paste("the error answers to %s as well, which this record cannot tell",
-                                 "from %s and no mechanism was given for"),
-                           listed(twins), listed(case$entry$boundary, "or"))
-                 }
-               }, "a place or driver that nobody thought of is no less likely"),
-               untrusted = doubt(function(case) {
-                 if (!case$parent$fit$trust$trusted || !case$model$fit$trust$trusted)
-                   "the numbers behind it are not trusted"
-               }, "runs of the simulator refute an emulator, or searches do not agree"),
-               steps = doubt(function(case) {
-                 step_doubt(case$parent, case$model, case$new, case$row$log10_bf, case$measurements)
-               }, "coarse steps of a simulator look like a cause"),
-               no_gain = doubt(function(case) {
-                 if (case$no_gain) "held-out data do not improve"
-               }, "what fits alone does not predict"),
-               raises_error = doubt(function(case) risen_words(case$parent, case$model),
-                                    "what is gained, the discrepancy gains"),
-               still_responds = doubt(function(case) {
-                 if (still_answers(case$parent, case$model, case$entry$boundary))
-                   "the error still responds to what drives it"
-               }, "the true mechanism takes the response away"),
-               only_beside = doubt(function(case) only_beside(case$models, case$confounded,
-                                                              case$candidates),
-                                   "two that imitate a third together look like this"),
-               edge = doubt(function(case) {
-                 if (any(edge_of_prior(case$model$fit)[case$new]))
-                   "its value lies at the edge of what was thought possible"
-               }, "it may make up for something else"),
-               remains = doubt(function(case) {
-                 if (case$remains) "a good part of the error remains"
-               }, "the mechanism that made the error leaves nothing"),
-               coverage = doubt(function(case) {
-                 if (isTRUE(case$inside < rules$least_inside)) {
-                   sprintf("its 95 %% band holds only %s of the data held out",
-                           percent(case$inside))
-                 }
-               }, "a band that misses a fifth of new data is wrong"),
-               slow = doubt(function(case) {
-                 if (case$drift && acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
-                   "anything that changes slowly would explain the error as well"
-                 }
-               }, "a parabola in time does as well, and so does the mechanism"),
-               drift = doubt(function(case) {
-                 if (case$drift && !acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
-                   "a drifting sensor would explain the error as well"
-                 }
-               }, "a parabola in time does as well"))
+doubts <- list(
+  record = doubt(function(case) record_doubt_words(case$faults),
+                 "a fault of the record looks like a cause"),
+  describes = doubt(function(case) {
+    if (describes(case$entry)) "it describes what is missing and does not explain it"
+  }, "a response is no cause"),
+  rivals = doubt(function(case) {
+    if (case$others > rules$rival_probability) "other causes are possible"
+  }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
+  untried = doubt(function(case) {
+    twins <- untried_twins(case$parent, case$entry, case$catalogue)
+    if (length(twins)) {
+      sprintf(paste("the error answers to %s as well, which this record cannot tell from %s and no",
+                    "mechanism was given for"), listed(twins), listed(case$entry$boundary, "or"))
+    }
+  }, "a place or driver that nobody thought of is no less likely"),
+  untrusted = doubt(function(case) {
+    if (!case$parent$fit$trust$trusted || !case$model$fit$trust$trusted)
+      "the numbers behind it are not trusted"
+  }, "runs of the simulator refute an emulator, or searches do not agree"),
+  steps = doubt(function(case) {
+    step_doubt(case$parent, case$model, case$new, case$row$log10_bf, case$measurements)
+  }, "coarse steps of a simulator look like a cause"),
+  no_gain = doubt(function(case) {
+    if (case$no_gain) "held-out data do not improve"
+  }, "what fits alone does not predict"),
+  raises_error = doubt(function(case) risen_words(case$parent, case$model),
+                       "what is gained, the discrepancy gains"),
+  still_responds = doubt(function(case) {
+    if (still_answers(case$parent, case$model, case$entry$boundary))
+      "the error still responds to what drives it"
+  }, "the true mechanism takes the response away"),
+  only_beside = doubt(function(case) only_beside(case$models, case$confounded, case$candidates),
+                      "two that imitate a third together look like this"),
+  edge = doubt(function(case) {
+    if (any(edge_of_prior(case$model$fit)[case$new]))
+      "its value lies at the edge of what was thought possible"
+  }, "it may make up for something else"),
+  remains = doubt(function(case) {
+    if (case$remains) "a good part of the error remains"
+  }, "the mechanism that made the error leaves nothing"),
+  coverage = doubt(function(case) {
+    if (isTRUE(case$inside < rules$least_inside)) {
+      sprintf("its 95 %% band holds only %s of the data held out", percent(case$inside))
+    }
+  }, "a band that misses a fifth of new data is wrong"),
+  slow = doubt(function(case) {
+    if (case$drift && acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
+      "anything that changes slowly would explain the error as well"
+    }
+  }, "a parabola in time does as well, and so does the mechanism"),
+  drift = doubt(function(case) {
+    if (case$drift && !acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
+      "a drifting sensor would explain the error as well"
+    }
+  }, "a parabola in time does as well"))
 
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a
 # mechanism, and `steps` (step_effect() of each record) of all, and `suspects` of the first

@@ -42,8 +42,8 @@ with_lead <- function(given, lead_in, before, raw, rows, needed) {
 
 # The rows of the record at these hours, of earlier segments and complete; NA if there is none.
 record_rows_at <- function(hours, raw, rows, needed) {
-  earlier <- which(
-    raw$hours < raw$hours[rows[1]] & rowSums(!is.finite(raw$drivers[, needed, drop = FALSE])) == 0)
+  earlier <- which(raw$hours < raw$hours[rows[1]] &
+                   rowSums(!is.finite(raw$drivers[, needed, drop = FALSE])) == 0)
   if (!length(earlier)) return(rep(NA_integer_, length(hours)))
   nearest <- earlier[pmax(1, findInterval(hours + 0.5 * raw$step_h, raw$hours[earlier]))]
   ifelse(abs(raw$hours[nearest] - hours) <= stray_limit * raw$step_h, nearest, NA_integer_)

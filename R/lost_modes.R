@@ -12,8 +12,8 @@ with_lost_modes <- function(result, log_likelihood, seed) {
   aside <- leads_elsewhere(density, starts, result, seed)
   result$evaluations <- result$evaluations + 2 * rules$mode_starts
   if (length(aside$values)) {
-    reached <- climb(density, aside$x[apart_from_better(aside$x, aside$values), , drop = FALSE],
-                     seed)
+    reached <- climb(density,
+                     aside$x[apart_from_better(aside$x, aside$values), , drop = FALSE], seed)
     result$evaluations <- result$evaluations + reached$evaluations
     for (k in seq_along(reached$value)) {
       peak <- peak_at(density, reached$x[k, ], reached$value[k])
@@ -132,8 +132,8 @@ is_at <- function(peak, x)
 add_mode <- function(result, density, peak, seed) {
   p <- length(peak$x)
   n <- mode_draws
-  way <- with_seed(seed, matrix(stats::rnorm(n * p),
-                                p) * rep(sqrt(mode_dof / stats::rchisq(n, mode_dof)), each = p))
+  way <- with_seed(seed, matrix(stats::rnorm(n * p), p) *
+                           rep(sqrt(mode_dof / stats::rchisq(n, mode_dof)), each = p))
   x <- t(peak$x + peak$step * backsolve(peak$root, way))
   log_t <- lgamma((mode_dof + p) / 2) - lgamma(mode_dof / 2) - 0.5 * p * log(mode_dof * pi) +
     sum(log(diag(peak$root))) - sum(log(peak$step)) -

@@ -381,9 +381,11 @@ average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
   keep <- !is.na(index)
   mean_of <- function(v) as.numeric(rowsum(v[keep], index[keep], reorder = TRUE)) / per_step
   y <- mean_of(raw$y)
-  spread <- if (per_step > 1) sqrt(pmax(0, as.numeric(
-    rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) / (per_step - 1)) / per_step)
-            else rep(NA_real_, length(whole))
+  spread <-
+    if (per_step > 1)
+      sqrt(pmax(0, as.numeric(rowsum((raw$y[keep] - y[index[keep]])^2, index[keep])) /
+                   (per_step - 1)) / per_step)
+    else rep(NA_real_, length(whole))
   boundary <- rowsum(boundary[keep, , drop = FALSE], index[keep], reorder = TRUE) / per_step
   last <- which(keep)[!duplicated(index[keep], fromLast = TRUE)]
   dimnames(boundary) <- NULL

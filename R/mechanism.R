@@ -28,7 +28,8 @@
 #'   with_parameters(model, free("sun", uniform(0, 0.1), "K m2/W"), boundary = "Gv", f = brighter)
 #' })
 #' leaks <- mechanism("leaks", boundary = "Te", sentence = "Air enters.", edit = function(zone) {
-#'   add_component(zone, zone_infiltration("leaks", free("ach", uniform(0, 1), "1/h"), outside = "Te"))
+#'   add_component(zone, zone_infiltration("leaks", free("ach", uniform(0, 1), "1/h"),
+#'                                         outside = "Te"))
 #' })
 #' catalogue(sun, leaks)
 #' @export

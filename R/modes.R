@@ -35,8 +35,8 @@ begun_from <- function(model, start, locally, context) {
 # Runs over the priors, as many as it takes to begin; those that are known count.
 with_scouts <- function(model, context) {
   p <- length(model$parameters)
-  n <- max(
-    0, (model$scouts %||% (rules$scouts_base + rules$scouts_parameter * p)) - nrow(model$runs$z))
+  n <- max(0, (model$scouts %||% (rules$scouts_base + rules$scouts_parameter * p)) -
+                nrow(model$runs$z))
   if (n == 0) return(model)
   unit <- with_seed(context$seed, lhs::randomLHS(n, p))
   model <- with_runs(model, from_unit(unit, model$space), context)$model

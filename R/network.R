@@ -63,7 +63,8 @@
 #'   network_flow("soil", "ground", rate = free("percolation", uniform(0.001, 0.1), "1/h")),
 #'   network_flow("ground", NULL, rate = free("k", uniform(0.001, 0.05), "1/h"), name = "river"),
 #'   output = "river")
-#' simulate_runs(catchment, cbind(percolation = 0.02, k = 0.01), cbind(rain = c(0, 3, 1)), step_h = 1)
+#' simulate_runs(catchment, cbind(percolation = 0.02, k = 0.01), cbind(rain = c(0, 3, 1)),
+#'               step_h = 1)
 #' @export
 network <- function(..., output, before = list(), hold = TRUE, interpolation = "constant",
                     output_at = "mean", start_hours = 24, name = "network") {

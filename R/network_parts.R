@@ -45,7 +45,8 @@ network_fields <- list(
 #' @examples
 #' network_node("air", capacity = free("C_air", uniform(0.1, 5), "kWh/K"))
 #' network_link("air", "wall", resistance = free("R_inside", uniform(0.2, 5), "K/kW"))
-#' network_link("air", "Te", conductance = free("leak", uniform(0, 0.02), "kW/K per m/s"), by = "wind")
+#' network_link("air", "Te", conductance = free("leak", uniform(0, 0.02), "kW/K per m/s"),
+#'              by = "wind")
 #' network_flow("soil", "river", rate = free("k", uniform(0.001, 0.1), "1/h"))
 #' network_gain("air", "Gv", factor = free("aperture", uniform(0, 8), "m2") * 1e-3)
 #' @name network_parts

@@ -36,7 +36,8 @@ read_sqlite <- function(output, folder) {
 # A variable as it was reported most often, of the weather's run period alone: no design days, no
 # warm-up.
 sqlite_series <- function(column, database, file) {
-  known <- DBI::dbGetQuery(database, "SELECT ReportDataDictionaryIndex AS id, KeyValue AS key, Name AS name
+  known <- DBI::dbGetQuery(
+    database, "SELECT ReportDataDictionaryIndex AS id, KeyValue AS key, Name AS name
                                       FROM ReportDataDictionary")
   keyed <- !is.na(known$key) & nzchar(known$key)  # meters have none
   names <- ifelse(keyed, paste0(known$key, ":", known$name), known$name)
@@ -45,7 +46,8 @@ sqlite_series <- function(column, database, file) {
     there <- paste(utils::head(unique(names), 5), collapse = ", ")
     stop("there is no variable ", column, " in ", file, "; there: ", shown(there))
   }
-  series <- lapply(found, function(id) DBI::dbGetQuery(database, run_period_query, params = list(id)))
+  series <- lapply(found, function(id)
+    DBI::dbGetQuery(database, run_period_query, params = list(id)))
   series[[which.max(vapply(series, nrow, 0L))]]
 }
 

@@ -118,9 +118,8 @@ plain_stamps <- function(words, output, expected, ends, offset) {
 
 require_dates <- function(expected, output) {
   if (is.numeric(expected$time)) {
-    stop(
-      output$file,
-      " has dates, and the record is in hours; give the record dates, or say time_format = \"hours\"")
+    stop(output$file, " has dates, and the record is in hours; give the record dates, or say ",
+         "time_format = \"hours\"")
   }
 }
 

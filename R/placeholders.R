@@ -6,9 +6,8 @@ placeholder <- "\\{\\{\\s*([^{}]*?)\\s*\\}\\}"
 
 # What may be called, with the least and the largest number of arguments. Nothing else is evaluated.
 arithmetic <- list("+" = c(1, 2), "-" = c(1, 2), "*" = c(2, 2), "/" = c(2, 2), "^" = c(2, 2),
-                   "(" = c(1, 1), sqrt = c(1, 1),
-                   exp = c(1, 1), log = c(1, 1), log10 = c(1, 1), abs = c(1, 1), round = c(1, 2),
-                   min = c(1, Inf), max = c(1, Inf))
+                   "(" = c(1, 1), sqrt = c(1, 1), exp = c(1, 1), log = c(1, 1), log10 = c(1, 1),
+                   abs = c(1, 1), round = c(1, 2), min = c(1, Inf), max = c(1, Inf))
 
 # The placeholders of a text, each once, as they stand there. Byte by byte: templates may be in any
 # encoding.

@@ -29,7 +29,8 @@ record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_
 #' @return A ggplot.
 #' @examples
 #' table <- data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4))
-#' plot(measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6))
+#' plot(measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+#'                   warmup = 6))
 #' @name figures
 NULL
 

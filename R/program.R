@@ -97,7 +97,8 @@
 #' @return An object of class `amiss_program_simulator`.
 #' @examples
 #' rule <- c("BEGIN { FS = \",\"; print \"Ti\" }", "NR > 1 { print 20 + {{gain}} * $3 }")
-#' linear <- program_simulator(c("awk", "-f", "model.awk", "drivers.csv"), free("gain", uniform(0, 2)),
+#' linear <- program_simulator(c("awk", "-f", "model.awk", "drivers.csv"),
+#'                             free("gain", uniform(0, 2)),
 #'                             output = c(file = "stdout.txt", column = "Ti"),
 #'                             templates = list(model.awk = I(rule)), boundary = "Te",
 #'                             cache = tempfile("runs"))
@@ -106,7 +107,8 @@
 #'
 #' # Two programs in a chain: one simulates, one extracts.
 #' chain <- program_simulator(
-#'   list(program_step("awk", "-f", "model.awk", "drivers.csv", stdout = "all.txt", makes = "all.txt"),
+#'   list(program_step("awk", "-f", "model.awk", "drivers.csv", stdout = "all.txt",
+#'                     makes = "all.txt"),
 #'        program_step("awk", "NR == 1 || $1 > 24.5", "all.txt")),
 #'   free("gain", uniform(0, 2)), output = program_output("stdout.txt", "Ti"),
 #'   templates = list(model.awk = I(rule)), boundary = "Te", cache = tempfile("runs"))
@@ -232,7 +234,8 @@ check_program <- function(simulator, call = rlang::caller_env()) {
 #' @return The edited simulator.
 #' @examples
 #' rule <- c("BEGIN { FS = \",\"; print \"Ti\" }", "NR > 1 { print {{gain}} * $3 }")
-#' base <- program_simulator(c("awk", "-f", "model.awk", "drivers.csv"), free("gain", uniform(0, 2)),
+#' base <- program_simulator(c("awk", "-f", "model.awk", "drivers.csv"),
+#'                           free("gain", uniform(0, 2)),
 #'                           output = c(file = "stdout.txt", column = "Ti"),
 #'                           templates = list(model.awk = I(rule)), boundary = "Te",
 #'                           cache = tempfile("runs"))

@@ -26,8 +26,8 @@ check_program_drivers <- function(drivers, call = rlang::caller_env()) {
 
 # Names of the files that are known before a function has run.
 drivers_files <- function(drivers) {
-  unlist(lapply(drivers, function(one) if (is.character(one)) one
-                                       else if (inherits(one, "amiss_epw")) one$file))
+  unlist(lapply(drivers, function(one)
+    if (is.character(one)) one else if (inherits(one, "amiss_epw")) one$file))
 }
 
 # The columns that weather files need.

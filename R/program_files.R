@@ -146,8 +146,8 @@ check_template_names <- function(names, reserved, call = rlang::caller_env()) {
   if (!length(names)) return(invisible())
   check_inside(stats::setNames(names, rep("templates", length(names))), call)
   parts <- fs::path_norm(c(names, reserved))
-  folders <- unlist(lapply(parts, function(part) setdiff(
-    fs::path_dir(Reduce(fs::path, fs::path_split(part)[[1]], accumulate = TRUE)), ".")))
+  folders <- unlist(lapply(parts, function(part)
+    setdiff(fs::path_dir(Reduce(fs::path, fs::path_split(part)[[1]], accumulate = TRUE)), ".")))
   taken <- c(names, reserved)[match(unique(c(parts[duplicated(parts)], intersect(parts, folders))),
                                     parts)]
   if (length(taken)) {

@@ -319,7 +319,8 @@ end_of_file <- function(path) {
 # The folder of a run that succeeded under another name, up to the number that is to be kept.
 keep_good <- function(plan, job, folder) {
   if (plan$simulator$keep < 1 ||
-      length(kept_folders(plan$simulator$cache, plan$id)) >= plan$simulator$keep) return()
+      length(kept_folders(plan$simulator$cache, plan$id)) >= plan$simulator$keep)
+    return()
   to <- file.path(plan$simulator$cache, paste0("kept-", job$key))
   unlink(to, recursive = TRUE)
   file.rename(folder, to)

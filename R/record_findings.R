@@ -106,9 +106,10 @@ far_finding <- function(x) {
   usual <- format_each(signif(range(x$v[-rows], na.rm = TRUE), 4))
   told <- if (length(values) > 3) paste(listed(usual_ends(values), "to"))
           else listed(format_each(values), "or")
-  list(rows = rows, value = values[1], says = sprintf(
-    paste("%s is %s in %s, far outside all other values (%s to %s): correct these rows, or set",
-          "them to NA."), x$name, told, rows_words(rows), usual[1], usual[2]))
+  list(rows = rows, value = values[1],
+       says = sprintf(paste("%s is %s in %s, far outside all other values (%s to %s): correct",
+                            "these rows, or set them to NA."),
+                      x$name, told, rows_words(rows), usual[1], usual[2]))
 }
 
 usual_ends <- function(values) format_each(signif(range(values), 4))
@@ -160,11 +161,12 @@ range_finding <- function(x) {
   limits[names(at)] <- format_each(at)
   extreme <- if (length(at) > 1) "both ends"
              else switch(names(at), lower = "its least value", "its largest value")
-  list(rows = rows, value = unname(at[1]), says = sprintf(
-    paste("%s is %s, %s, in %d of %d rows: the range of its sensor seems to end there. Give range",
-          "= c(%s, %s) to leave these rows out of the comparison."), x$name,
-    listed(format_each(at), "or"), extreme, length(rows), sum(!is.na(x$v)), limits[["lower"]],
-    limits[["upper"]]))
+  list(rows = rows, value = unname(at[1]),
+       says = sprintf(paste("%s is %s, %s, in %d of %d rows: the range of its sensor seems to end",
+                            "there. Give range = c(%s, %s) to leave these rows out of the",
+                            "comparison."), x$name,
+                      listed(format_each(at), "or"), extreme, length(rows), sum(!is.na(x$v)),
+                      limits[["lower"]], limits[["upper"]]))
 }
 
 # ---- readings that repeat

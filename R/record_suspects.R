@@ -24,15 +24,17 @@ suspect_case <- function(base, adopted, threads, runs) {
   m <- base$measurements
   error <- left_at_best(fit)
   if (length(error) < 20 || !all(is.finite(error)) ||
-      mean(error^2) < rules$excess_error * m$noise_sd^2) return(NULL)
+      mean(error^2) < rules$excess_error * m$noise_sd^2)
+    return(NULL)
   case <- list(fit = fit, measurements = m, noise = m$noise_sd, y = m$y[fit$rows],
                hours = m$hours[fit$rows], segment = m$segment[fit$rows],
                simulated = m$y[fit$rows] - error, slopes = emulated_slopes(fit), threads = threads,
                runs = runs)
   if (!is.null(adopted)) {
     p <- adopted$prediction[adopted$prediction$use == "calibrate", ]
-    case$adopted <- list(left = p$observed - p$mean, more = length(drawn_parameters(adopted$fit)) -
-                                                            length(drawn_parameters(fit)))
+    case$adopted <- list(
+      left = p$observed - p$mean,
+      more = length(drawn_parameters(adopted$fit)) - length(drawn_parameters(fit)))
   }
   case$before <- left_with(case)
   case
@@ -339,7 +341,8 @@ coarse_value_step <- function(v) {
   step <- value_step(v)
   change <- abs(diff(v))
   if (!is.null(step) && step >= 0.01 * diff(range(v)) &&
-      mean(change[change > 0] < 2.5 * step) > 0.5) step
+      mean(change[change > 0] < 2.5 * step) > 0.5)
+    step
 }
 
 # ---- in words

@@ -12,7 +12,8 @@
 #'   table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5), `heat_loss` (of zones) and
 #'   `method`.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      validate = table$hour > 72)
@@ -21,8 +22,8 @@
 #' steep <- function_simulator(function(values, drivers) 20 + values[["gain"]]^2 * drivers[, "Te"],
 #'                             free("gain", uniform(0, 1)), boundary = "Te")
 #' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)))
-#' comparison <- compare_models(list(linear = linear, steep = steep), room, runs = 20, control = quick,
-#'                              seed = 1, quiet = TRUE)
+#' comparison <- compare_models(list(linear = linear, steep = steep), room, runs = 20,
+#'                              control = quick, seed = 1, quiet = TRUE)
 #' summary(comparison)
 #' @export
 summary.amiss_comparison <- function(object, ...) {
@@ -93,13 +94,13 @@ practice_sentences <- function(comparison) {
   noted <- criteria[nzchar(criteria$lr_note) & !is.na(criteria$nested), ]
   c(if (!length(disagreements(comparison)))
       "Every criterion chooses the model that the evidence chooses.",
-    disagree, if (nrow(correlated)) {
-                sprintf(paste("Likelihood, AIC, BIC and the likelihood ratio count errors as",
-                              "independent; those of %s are correlated from one step to the next",
-                              "(%s), so that these criteria overstate every difference."),
-                        listed(correlated$model),
-                        listed(sprintf("%.2f", correlated$autocorrelation)))
-              },
+    disagree,
+    if (nrow(correlated)) {
+      sprintf(paste("Likelihood, AIC, BIC and the likelihood ratio count errors as independent;",
+                    "those of %s are correlated from one step to the next (%s), so that these",
+                    "criteria overstate every difference."),
+              listed(correlated$model), listed(sprintf("%.2f", correlated$autocorrelation)))
+    },
     if (nrow(noted))
       sprintf("Likelihood ratio of %s against %s: %s.", noted$model, noted$nested, noted$lr_note))
 }
@@ -131,8 +132,8 @@ attribution_table_words <- function(comparison) {
             ifelse(table$significant, " *", ""))
   }
   models <- names(comparison$models)
-  columns <- sapply(comparison$measurements$conditions, function(condition) cell[match(
-    paste(models, condition), paste(table$model, table$boundary))], simplify = FALSE)
+  columns <- sapply(comparison$measurements$conditions, function(condition)
+    cell[match(paste(models, condition), paste(table$model, table$boundary))], simplify = FALSE)
   data.frame(model = models, columns, check.names = FALSE)
 }
 

@@ -39,7 +39,8 @@
 #' @return `response_mechanism()`: a [mechanism()] that edits an [ensemble()] of given runs or any
 #'   simulator; `responses()`: a [catalogue()] of one for each boundary condition that is analysed.
 #' @examples
-#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4), Gv = pmax(0, 100 * cos(1:96 / 3.8)))
+#' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.005 * table$Gv + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                      unit = "K", validate = table$hour > 72)
@@ -229,8 +230,8 @@ simulate_runs.amiss_responding <- function(simulator, values, drivers, step_h, h
 print.amiss_responding <- function(x, ...) on_stdout(x, {
   print(without_responses(x))
   of <- vapply(attr(x, "responses"), `[[`, "", "boundary")
-  told <-
-    "with {cli::qty(of)}the response{?s} to {.field {of}}, which describe{?s/} and do{?es/} not explain"
+  told <- paste("with {cli::qty(of)}the response{?s} to {.field {of}}, which describe{?s/} and",
+                "do{?es/} not explain")
   cli::cli_bullets(c("*" = told))
 })
 

@@ -216,8 +216,8 @@ study_measurements <- function(study, files) {
   }
   measurements(
     data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
-    noise_sd = study$noise_sd, average = study$average_h, calibrate = rows("calibrate"),
-    validate = rows("validate"),
+    noise_sd = study$noise_sd, average = study$average_h,
+    calibrate = rows("calibrate"), validate = rows("validate"),
     warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
     time_format = study$time_format, time_zone = study$time_zone,
     fill_gaps = study$fill_gaps_h %||% 0,
@@ -315,8 +315,8 @@ upgrade_pieces <- function(files, measurements, call = rlang::caller_env()) {
   several <- !is.object(measurements)
   model <- if (several) record_models(files, measurements, call)
            else source_value(files[[1]][["model"]], "model", call, measurements)
-  for (one in if (several) model
-              else list(model)) if (!inherits(one, "amiss_ensemble")) check_simulator(one, call)
+  for (one in if (several) model else list(model))
+    if (!inherits(one, "amiss_ensemble")) check_simulator(one, call)
   catalogue <- source_value(files[[1]][["catalogue"]], "catalogue", call, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", call = call)
   list(model = model, catalogue = catalogue)

@@ -38,8 +38,9 @@ check_table_options <- function(separator, decimal, call) {
 }
 
 # One sign that no field begins or ends with; "" stands for spaces.
-can_separate <- function(sign) !nzchar(sign) ||
-  grepl("^([[:punct:]]|\t)$", sign) && !grepl("[\"'#]", sign) && nchar(sign, "bytes") == 1
+can_separate <- function(sign)
+  !nzchar(sign) ||
+    grepl("^([[:punct:]]|\t)$", sign) && !grepl("[\"'#]", sign) && nchar(sign, "bytes") == 1
 
 known_separator <- function(separator) {
   if (separator %in% names(separators)) return(separators[[separator]])

@@ -306,22 +306,22 @@ zone_readings <- function(local, zone) {
 repeated_hours <- function(local, both, text, name, zone, call) {
   seconds <- ifelse(is.na(both$first), both$second, both$first)
   rows <- which(both$first != both$second)
-  for (part in split(
-    rows, cumsum(c(TRUE, diff(rows) > 1 | diff(local[rows]) > 86400))[seq_along(rows)])) {
-      back <- which(diff(local[part]) <= 0)
-      if (length(back) > 1) {
-        abort_input(c(paste("Time column {.val {name}} goes back more than once in the hour that",
-                            "{.val {zone}} has twice when daylight saving ends; again in row",
-                            "{part[back[2] + 1]}, {.val {text[part[back[2] + 1]]}}."),
-                      i = "Sort the rows as they were measured, or give time in UTC."), call = call)
-      }
-      second <- if (length(back)) part[seq_along(part) > back] else {
-        to_before <- both$first[part[1]] - c(NA, seconds)[part[1]]
-        to_after <- c(seconds, NA)[part[length(part)] + 1] - both$second[part[length(part)]]
-        if (isTRUE(to_after < to_before) || is.na(to_before) && !is.na(to_after)) part
-      }
-      seconds[second] <- both$second[second]
+  for (part in split(rows, cumsum(c(TRUE, diff(rows) > 1 |
+                                          diff(local[rows]) > 86400))[seq_along(rows)])) {
+    back <- which(diff(local[part]) <= 0)
+    if (length(back) > 1) {
+      abort_input(c(paste("Time column {.val {name}} goes back more than once in the hour that",
+                          "{.val {zone}} has twice when daylight saving ends; again in row",
+                          "{part[back[2] + 1]}, {.val {text[part[back[2] + 1]]}}."),
+                    i = "Sort the rows as they were measured, or give time in UTC."), call = call)
     }
+    second <- if (length(back)) part[seq_along(part) > back] else {
+      to_before <- both$first[part[1]] - c(NA, seconds)[part[1]]
+      to_after <- c(seconds, NA)[part[length(part)] + 1] - both$second[part[length(part)]]
+      if (isTRUE(to_after < to_before) || is.na(to_before) && !is.na(to_after)) part
+    }
+    seconds[second] <- both$second[second]
+  }
   seconds
 }
 

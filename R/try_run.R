@@ -32,7 +32,8 @@
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)
 #' room <- measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1)
 #' linear <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],
-#'                              free("gain", uniform(0, 1)), free("idle", uniform(0, 1)), boundary = "Te")
+#'                              free("gain", uniform(0, 1)), free("idle", uniform(0, 1)),
+#'                              boundary = "Te")
 #' try_run(linear, room)
 #' @export
 try_run <- function(simulator, measurements, runs = 200, threads = 1, quiet = FALSE) {

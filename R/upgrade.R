@@ -70,7 +70,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   `vignette("algorithm", "amiss")`, *Naming*.
 #' @examples
 #' \donttest{
-#' table <- data.frame(hour = 1:120, Te = 5 + 3 * sin(1:120 / 4), Gv = pmax(0, 100 * cos(1:120 / 3.8)))
+#' table <- data.frame(hour = 1:120, Te = 5 + 3 * sin(1:120 / 4),
+#'                     Gv = pmax(0, 100 * cos(1:120 / 3.8)))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.02 * table$Gv + 0.1 * sin(61 * (1:120)^2)
 #' house <- measurements(table, time = "hour", target = "Ti", boundary = ~ Te + Gv, noise_sd = 0.1,
 #'                       validate = table$hour > 90)
@@ -97,8 +98,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' }
 #' @export
 upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, control = NULL,
-                          seed = NULL,
-                          threads = 1, quiet = FALSE, checkpoint = NULL) {
+                          seed = NULL, threads = 1, quiet = FALSE, checkpoint = NULL) {
   check_present(simulator, measurements, catalogue)
   started <- upgrade_start(simulator, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", "Make it with {.fun catalogue}.")
@@ -189,8 +189,7 @@ fill_upgrade_control <- function(control, measurements, call = rlang::caller_env
   control <- merge_control(upgrade_control, control, call = call)
   check_input(checkmate::check_count(control$max_steps), "control$max_steps", call = call)
   check_input(checkmate::check_number(control$decisive, lower = 0, finite = TRUE),
-              "control$decisive",
-              call = call)
+              "control$decisive", call = call)
   check_input(checkmate::check_count(control$rounds, positive = TRUE), "control$rounds",
               call = call)
   check_training_size(rules$more_runs * control$rounds, "control$rounds", control$rounds, call)

@@ -29,9 +29,8 @@
 #' weather$RHP <- rolbs(nrow(weather), step_h = 0.25, power = 100, seed = 1)
 #' @export
 synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude = 36.8,
-                              temperature = 17, daily_range = 9,
-                              cloudiness = 0.3, wind = 3.5, wind_direction = 240, azimuth = 180,
-                              seed = NULL) {
+                              temperature = 17, daily_range = 9, cloudiness = 0.3, wind = 3.5,
+                              wind_direction = 240, azimuth = 180, seed = NULL) {
   check_input(checkmate::check_number(days, lower = 1, finite = TRUE), "days")
   check_input(checkmate::check_number(step_h, lower = 1 / 60, upper = 6), "step_h")
   check_size("days", days, matrix_gb(24 * days / step_h, 30))

@@ -67,9 +67,9 @@
 #' the share `1 - to_air` goes to the walls.
 #'
 #' *Openings.* Mass flow of an orifice is `0.65 area sqrt(2 rho |dp|)`, so that `area` is geometric;
-#' of a crack `rho k
-#' |dp|^x` with `x = 0.5 + 0.5 exp(-500 width)` and `k = 0.0097 length 0.0092^x`: a crack is absent at `length = 0`, not
-#' at `width = 0`. dp is wind pressure and buoyancy over `height`. A negative `flow` of a supply counts as 0.
+#' of a crack `rho k |dp|^x` with `x = 0.5 + 0.5 exp(-500 width)` and `k = 0.0097 length 0.0092^x`:
+#' a crack is absent at `length = 0`, not at `width = 0`. dp is wind pressure and buoyancy over
+#' `height`. A negative `flow` of a supply counts as 0.
 #' @section Limits of the fields:
 #' `r zone_limits()`
 #' @source Wind pressure coefficients: Liddament (1986), Air infiltration calculation techniques,
@@ -79,7 +79,8 @@
 #' @examples
 #' zone(
 #'   zone_wall("facade", area = 12, zone_layer(0.02, 0.8, 1.4e6),
-#'             zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5), outside = "Te", sun = "Gv"),
+#'             zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5),
+#'             outside = "Te", sun = "Gv"),
 #'   zone_window("window", area = 2, outside = "Te", sun = "Gv"),
 #'   zone_heater("heater", power = "P"),
 #'   volume = 40)

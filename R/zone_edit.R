@@ -13,7 +13,8 @@
 #'   network (`output`, `before`, ...).
 #' @return The edited model; of `component()`, the component.
 #' @examples
-#' room <- zone(zone_heater("heater", power = "P"), zone_coupling("door", 10, "T_hall"), volume = 40)
+#' room <- zone(zone_heater("heater", power = "P"), zone_coupling("door", 10, "T_hall"),
+#'              volume = 40)
 #' room <- add_component(room, zone_infiltration("leaks", ach = 0.2, outside = "Te"))
 #' room <- change_component(room, "heater", capacity = 8000)
 #' room <- change_component(room, "zone", air_capacity_factor = 4)
@@ -21,7 +22,8 @@
 #' component(room, "heater")
 #'
 #' # The heating reaches the air by way of a heater that stores heat.
-#' house <- network(network_node("air", 1), network_link("air", "Te", 0.2), network_gain("air", "P"), output = "air")
+#' house <- network(network_node("air", 1), network_link("air", "Te", 0.2),
+#'                  network_gain("air", "P"), output = "air")
 #' house <- add_component(house, network_node("heater", free("C_heater", uniform(0, 1), "kWh/K")),
 #'                        network_link("heater", "air", conductance = 0.5))
 #' change_component(house, "P to air", to = "heater")

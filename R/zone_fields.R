@@ -41,13 +41,14 @@ zone_fields <- list(
 zone_limits <- function() {
   in_words <- function(rule)
     switch(rule$kind,
-           number = paste0(if (is.infinite(rule$lower)) "any number"
-                           else
-                             paste0("number ", if (rule$open) "above "
-                                               else if (is.finite(rule$upper)) "from "
-                                               else "of at least ", rule$lower,
-                                    if (is.finite(rule$upper)) paste(" to", rule$upper)),
-                           if (isTRUE(rule$missing)) " or `NA`"),
+           number = paste0(
+             if (is.infinite(rule$lower)) "any number"
+             else paste0("number ",
+                         if (rule$open) "above "
+                         else if (is.finite(rule$upper)) "from "
+                         else "of at least ",
+                         rule$lower, if (is.finite(rule$upper)) paste(" to", rule$upper)),
+             if (isTRUE(rule$missing)) " or `NA`"),
            column = if (rule$optional) "column or `NULL`" else "column",
            choice = paste0('`"', rule$choices, '"`', collapse = ", "),
            layers = "layers")

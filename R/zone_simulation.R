@@ -26,8 +26,8 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' @examples
 #' weather <- synthetic_weather(1, seed = 1)
 #' weather$RHP <- rolbs(nrow(weather), power = 100, seed = 1)
-#' values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = c(0.040, 0.048), insulation_c = 179,
-#'                 heater_radiant = 0.79)
+#' values <- cbind(outer_k = 1.05, outer_c = 3361, insulation_k = c(0.040, 0.048),
+#'                 insulation_c = 179, heater_radiant = 0.79)
 #' air <- simulate_zone(paper_box("M2"), values, as.matrix(weather[-1]), step_s = 900)
 #' dim(air)
 #' @export
