@@ -5,11 +5,12 @@
 # mechanism takes away of the evidence for that response. It decides; the factor with the response
 # in both must not speak against it.
 
-# Mechanisms are compared with one another with no unknown response to any condition of the catalogue in any model: what
-# each takes away by itself is of its own conditions, and the more it has of them the more that is.
+# Mechanisms are compared with one another with no unknown response to any condition of the
+# catalogue in any model. What each takes away of its own conditions grows with their number, and is
+# no measure of which is better.
 
-# A trial with both against the present model, in decades: what it takes away of its own conditions (`taken`) and of all
-# (`taken_of_all`).
+# A trial with both, in decades: what it takes away of its own conditions (`taken`) and of all of
+# the catalogue (`taken_of_all`).
 with_taken <- function(trial, present, context) {
   own <- present$conditions[[trial$mechanism]]
   trial$taken <- taken_away(trial, present, own, context)
@@ -19,14 +20,14 @@ with_taken <- function(trial, present, context) {
   trial
 }
 
-# What the present model needs the response to some conditions more than the extension does.
+# By how much more the present model needs the response to some conditions than the extension does.
 taken_away <- function(trial, present, conditions, context) {
   if (!length(conditions)) return(0)
   present$lost[[toString(conditions)]] - lost_without(trial, conditions, context)
 }
 
-# The present model with the conditions of the mechanisms that are left, each and together, and what it loses without a
-# response to them.
+# The present model with the conditions of the mechanisms that are left, each and together, and what
+# it loses without a response to them.
 with_losses <- function(model, catalogue, context) {
   model$conditions <- lapply(catalogue, function(mechanism) sort(mechanism$boundary))
   model$catalogued <- sort(unique(unlist(model$conditions, use.names = FALSE)))

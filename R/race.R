@@ -38,7 +38,8 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
 
 # A search from the most promising start of the first look. An extension holds the present model,
 # with its mechanism switched off, and cannot be worse: if the search ends below that, or no nearer
-# to the record, it goes on from the next start with the mechanism on. `starts`: those that are left.
+# to the record, it goes on from the next start with the mechanism on. `starts`: those that are
+# left.
 search_trial <- function(looked, context) {
   model <- looked$model
   is_on <- vapply(looked$starts, function(start) !start$at %in% looked$off_at, NA)

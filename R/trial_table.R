@@ -43,7 +43,8 @@ empty_row <- function(mechanism, present, why, runs = NULL) {
   row <- data.frame(from = present$name, mechanism = mechanism, log10_bf = NA_real_,
                     lower95 = NA_real_, upper95 = NA_real_, word = NA_character_,
                     beside_unknown = NA_real_, standing = NA_real_, error_ratio = NA_real_,
-                    trusted = FALSE, judged_by = if (why == "silent") "silent" else "none", runs = runs %||% 0)
+                    trusted = FALSE, judged_by = if (why == "silent") "silent" else "none",
+                    runs = runs %||% 0)
   row$parameters <- list(added_parameters(present$fit, present$fit))
   row
 }
@@ -97,8 +98,8 @@ added_parameters <- function(fit, parent) {
 }
 
 # The row of highest standing among the decisive mechanisms that may be adopted: they were verified,
-# the simulation's own error falls with them, and they do not lose to an unknown response. If none is
-# decisive, that of the highest factor; no row if none may be adopted.
+# the simulation's own error falls with them, and they do not lose to an unknown response. If none
+# is decisive, that of the highest factor; no row if none may be adopted.
 best_trial <- function(table, decisive) {
   open <- table[table$judged_by == "runs" & !keeps_error(table) & !is_refuted(table), ]
   sure <- open[open$log10_bf >= decisive & open$lower95 > 0, ]

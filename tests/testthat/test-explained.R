@@ -19,8 +19,9 @@ test_that(paste("it is the factor, and what the present model loses without the 
 })
 
 test_that("a mechanism without conditions takes nothing away", {
-  present <- list(conditions = list(sun = character()), lost = list())
-  expect_identical(amiss:::taken_away(list(mechanism = "sun"), present, NULL), 0)
+  present <- list(conditions = list(sun = character()), catalogued = character(), lost = list())
+  trial <- amiss:::with_taken(list(mechanism = "sun"), present, NULL)
+  expect_identical(trial[c("taken", "taken_of_all")], list(taken = 0, taken_of_all = 0))
 })
 
 test_that("what numbers that are not trusted take away is not told", {

@@ -576,3 +576,24 @@ test_that("a trial whose first search leads no nearer to the record goes on from
   expect_true(amiss:::comes_nearer(found$model, found$least$at, 1))
   expect_true(amiss:::comes_nearer(model, 1, NULL))
 })
+
+test_that("the second start of a trial has the mechanism on, and what is left is kept", {
+  # Searches that end where they begin: only the third run is nearer to the record.
+  begun <- integer()
+  stand_in(run_search = function(search, context) {
+    begun <<- c(begun, search$at)
+    utils::modifyList(search, list(status = "converged", least = list(at = search$at)))
+  }, values_at = function(model, at, ...) -amiss:::squared_misfit(model)[at])
+  model <- list(target = rep(0, 9), noise = rep(1, 9), space = space_of(uniform(0, 1)),
+                runs = list(outputs = outer(rep(1, 9), c(9, 9, 1, 8)), z = matrix(0, 4, 1)))
+  starts <- lapply(c(2, 1, 3, 4), function(at) list(at = at, slopes = matrix(0, 9, 1)))
+  found <- amiss:::search_trial(list(model = model, off_at = 1, starts = starts), search_context())
+  expect_equal(begun, c(2, 3))
+  expect_equal(found$at, 3)
+  expect_equal(vapply(found$starts, `[[`, 0, "at"), 4)
+  # If the mechanism is switched off where the search is most promising, it begins there.
+  begun <- integer()
+  amiss:::search_trial(list(model = model, off_at = 1, starts = starts[c(2, 1, 3)]),
+                       search_context())
+  expect_equal(begun, c(1, 2))
+})

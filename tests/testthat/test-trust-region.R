@@ -48,10 +48,11 @@ test_that("a trial that its runs do not confirm is checked again, once, before i
   models <- small_upgrade()$models
   trial <- c(models[[2]], list(level = "tried", taken = 0))
   present <- models[[1]]
-  asks <- function(bar, ...)
-    amiss:::asks_for_checks(utils::modifyList(trial, list(...)), present, bar)
+  asks <- function(factor, ...)
+    amiss:::asks_for_checks(utils::modifyList(trial, list(...)), present,
+                            list(factor = factor, standing = -Inf))
   trial$fit$check$effective <- 0.5
-  low <- amiss:::lower_bound(trial, present)
+  low <- amiss:::log10_factor(trial, present) - amiss:::doubt_of(trial, present)
   expect_true(asks(low + 1))
   expect_false(asks(low - 1))  # it will be verified whatever they say
   expect_false(asks(low + 1, rechecked = TRUE))

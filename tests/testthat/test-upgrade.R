@@ -330,7 +330,8 @@ tried_by_hand <- function(log10_evidence, ...) model_by_hand(log10_evidence, lev
 
 test_that("a trial's evidence may be off by what its runs leave open, a verified one's is not", {
   present <- model_by_hand(0, se = 0, error = 1)
-  bound <- function(model) amiss:::upper_bound(model, present)
+  bound <- function(model, leader = present)
+    amiss:::log10_factor(model, present) + amiss:::doubt_of(model, present, leader)
   expect_equal(bound(model_by_hand(3, se = 0.1)), 3 + 3 * 0.1)
   expect_equal(bound(tried_by_hand(3, se = 0)), 3 + rules$trial_margin)
   expect_equal(bound(tried_by_hand(3, se = 0.2, effective = 0.5)), 3 + 3 * 0.2 + rules$trial_margin)
@@ -343,11 +344,10 @@ test_that("a trial's evidence may be off by what its runs leave open, a verified
   expect_equal(bound(tried_by_hand(-40, se = 3, effective = 0.3, error = 0.5)), Inf)
   expect_lt(bound(tried_by_hand(-40, se = 1, effective = 0.3, error = 0.5)), 0)
   # A leader that is as near to the record can.
-  expect_lt(amiss:::upper_bound(promising, present, leader = model_by_hand(8, error = 0.5)), -20)
+  expect_lt(bound(promising, leader = model_by_hand(8, error = 0.5)), -20)
   unchecked <- tried_by_hand(3, se = 0)
   unchecked$fit$check <- NULL
   expect_equal(bound(unchecked), 3 + rules$trial_doubt * 2)
-  expect_equal(amiss:::lower_bound(tried_by_hand(3, se = 0), present), 3 - rules$trial_margin)
 })
 
 test_that("of trials that can still win the one of highest evidence is verified", {
@@ -369,6 +369,14 @@ test_that("of trials that can still win the one of highest evidence is verified"
   expect_equal(following(tried_by_hand(1.6, name = "a")), "a")
   expect_null(following(tried_by_hand(5, name = "a"), model_by_hand(8, name = "b")))
   expect_equal(following(tried_by_hand(7.6, name = "a"), model_by_hand(8, name = "b")), "a")
+  # Mechanisms rank by what they explain with no unknown response at all.
+  ranked <- function(model, taken, taken_of_all) c(model, list(taken = taken,
+                                                               taken_of_all = taken_of_all))
+  mass <- ranked(model_by_hand(0, name = "mass"), 8, 8)
+  expect_equal(following(ranked(tried_by_hand(1, name = "leak"), 3, 9), mass), "leak")
+  expect_null(following(ranked(tried_by_hand(1, name = "leak"), 3, 5), mass))
+  # One that is not decisive by itself is not adopted, wherever it ranks.
+  expect_null(following(ranked(tried_by_hand(-1, name = "leak"), 1, 9), mass))
   # A leader with which the simulation's own error rises stands in nobody's way.
   raising <- model_by_hand(8, name = "b", error = 1.5)
   expect_equal(following(tried_by_hand(5, name = "a"), raising), "a")
@@ -376,9 +384,24 @@ test_that("of trials that can still win the one of highest evidence is verified"
                         list(mechanism = "b", level = "failed")))
 })
 
+test_that("what a mechanism must reach is what another surely has that may be adopted", {
+  present <- model_by_hand(0, se = 0, error = 1)
+  context <- amiss:::new_context(1, 1, list(decisive = 2))
+  bar <- function(model, trusted = TRUE) {
+    model$fit$trust <- list(trusted = trusted)
+    amiss:::bar_of(list(model), present, context)$standing
+  }
+  expect_equal(bar(model_by_hand(5, se = 0)), 5)
+  expect_equal(bar(tried_by_hand(5, se = 0)), 5 - rules$trial_margin)
+  expect_equal(bar(model_by_hand(5, se = 0), trusted = FALSE), -Inf)
+  expect_equal(bar(model_by_hand(1, se = 0)), -Inf)  # not decisive
+  expect_equal(bar(model_by_hand(5, se = 0, error = 1.5)), -Inf)  # the error rises
+})
+
 test_that("a trial goes on while its runs leave open whether it can win", {
   present <- model_by_hand(0, se = 0, error = 1)
-  clear <- function(..., bar = 2) amiss:::is_clear(tried_by_hand(...), present, bar)
+  clear <- function(..., bar = 2)
+    amiss:::is_clear(tried_by_hand(...), present, list(factor = bar, standing = -Inf))
   expect_true(clear(3))
   expect_false(clear(2.2, effective = 0.5))
   expect_true(clear(3, effective = 0.5))
@@ -399,7 +422,7 @@ test_that("the odds are of what was computed; what was not has no part in them",
   stand_in(added_parameters = function(...) data.frame(name = character()), bayes_factor = by_hand)
   for (name in c("a", "b")) trials[[name]]$fit$trust <- list(trusted = TRUE)
   trials$quiet <- list(mechanism = "quiet", level = "silent")
-  table <- amiss:::trial_table(trials, present, c("a", "b", "quiet", "left"))
+  table <- amiss:::trial_table(trials, present, c("a", "b", "quiet", "left"), 2)
   expect_equal(table$mechanism, c("a", "b", "quiet", "left"))
   expect_equal(table$judged_by, c("runs", "trial", "silent", "none"))
   odds <- c(10, 0.1)
@@ -408,12 +431,15 @@ test_that("the odds are of what was computed; what was not has no part in them",
   expect_equal(table$upper95 - table$lower95, c(0.2, 0.2 + 2 * rules$trial_margin, NA, NA))
 })
 
+# A mechanism as trial_table() has it.
+row_by_hand <- function(log10_bf = 3, lower95 = log10_bf - 0.2, judged_by = "runs",
+                        error_ratio = 0.5, beside_unknown = -1, standing = log10_bf, name = "a") {
+  data.frame(mechanism = name, log10_bf, lower95, judged_by, error_ratio, beside_unknown, standing)
+}
+
 test_that("what is adopted was verified, lowers the error, and leads by a decisive evidence", {
-  row <- function(log10_bf = 3, lower95 = 2, judged_by = "runs", error_ratio = 0.5,
-                  beside_unknown = -1) {
-    data.frame(mechanism = "a", log10_bf, lower95, judged_by, error_ratio, beside_unknown)
-  }
-  adopted <- function(...) amiss:::may_be_adopted(amiss:::best_trial(row(...)), list(decisive = 2))
+  adopted <- function(...)
+    amiss:::may_be_adopted(amiss:::best_trial(row_by_hand(...), 2), 2)
   expect_true(adopted())
   expect_false(adopted(judged_by = "trial"))
   expect_false(adopted(log10_bf = 1.9))
@@ -422,22 +448,31 @@ test_that("what is adopted was verified, lowers the error, and leads by a decisi
   expect_true(adopted(error_ratio = 0.98))
   expect_false(adopted(beside_unknown = -4))
   expect_false(adopted(log10_bf = NA))
-  both <- rbind(row(5, error_ratio = 1.5), row(3))
-  expect_equal(amiss:::best_trial(both)$log10_bf, 3)
+  both <- rbind(row_by_hand(5, error_ratio = 1.5), row_by_hand(3))
+  expect_equal(amiss:::best_trial(both, 2)$log10_bf, 3)
 })
 
-test_that(paste("of decisive mechanisms with one evidence that is adopted which does best beside",
-                "an unknown response"), {
-  row <- function(mechanism, log10_bf, beside_unknown, lower95 = log10_bf - 0.2) {
-    data.frame(mechanism, log10_bf, lower95, judged_by = "runs", error_ratio = 0.5, beside_unknown)
-  }
-  best <- function(...) amiss:::best_trial(rbind(...))$mechanism
-  expect_equal(best(row("stand-in", 52.8, -1.6), row("cause", 52.4, 15.5)), "cause")
-  # One that leads decisively is adopted.
-  expect_equal(best(row("leader", 52.8, -1.6), row("other", 50.7, 15.5)), "leader")
-  # One that is not decisive itself is not.
-  expect_equal(best(row("leader", 2.5, -1), row("other", 1.9, 1.5)), "leader")
-  expect_equal(best(row("leader", 2.5, -1), row("other", 2.4, 1.5, lower95 = -0.1)), "leader")
+test_that(paste("of decisive mechanisms that is adopted which explains most with no unknown",
+                "response at all"), {
+  best <- function(...) amiss:::best_trial(rbind(...), 2)$mechanism
+  # A mass has all conditions to itself, a leak one.
+  mass <- row_by_hand(47.7, standing = 48.3, name = "mass")
+  expect_equal(best(mass, row_by_hand(23.8, standing = 55.1, name = "leak")), "leak")
+  # One that is not decisive by itself is not adopted.
+  expect_equal(best(mass, row_by_hand(1.9, standing = 55.1, name = "leak")), "mass")
+  expect_equal(best(mass, row_by_hand(5, lower95 = -0.1, standing = 55.1, name = "leak")), "mass")
+})
+
+test_that("the best mechanism has its own odds, the others those of their standing against it", {
+  table <- rbind(row_by_hand(3, standing = 10, name = "best"),
+                 row_by_hand(5, standing = 9, error_ratio = 1.2, name = "raises the error"),
+                 row_by_hand(NA, judged_by = "none", name = "left out"))
+  odds <- c(1000, 100, 0)
+  expect_equal(amiss:::probability_of(table, 2), odds / (1 + sum(odds)))
+  # If none may be adopted, each has its own.
+  table$error_ratio <- 1.2
+  odds <- c(1000, 1e5, 0)
+  expect_equal(amiss:::probability_of(table, 2), odds / (1 + sum(odds)))
 })
 
 test_that("a winner is the cause if it leaves little of the error beyond the noise", {
