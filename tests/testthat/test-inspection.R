@@ -21,7 +21,7 @@ test_that("what to inspect next names the value that the mechanism asks for", {
   expect_identical(summary(untied())$mechanisms[[1]]$inspect, told[1])
 })
 
-test_that("rivals are told apart by what only one of them answers to, or on site", {
+test_that("rivals are distinguished by what only one of them responds to, or on site", {
   upgrade <- untied()
   upgrade$candidates$probability <- c(0.7, 0.3)
   m <- upgrade$measurements
@@ -29,22 +29,23 @@ test_that("rivals are told apart by what only one of them answers to, or on site
   r <- cor(m$boundary[used, m$condition == 1], m$boundary[used, m$condition == 2])
   told <- about(inspected(upgrade), "rival")
   expect_match(told,
-               "tell sun from drift, measure while Gv changes while Te does not, or vice versa")
+               paste("distinguish sun from drift, measure while Gv changes while Te does not,",
+                     "or vice versa"))
   expect_match(told, sprintf("correlation of Gv and Te is %.2f", r))
   m$boundary[used, m$condition == 2] <- rnorm(sum(used))
   expect_identical(amiss:::correlation_words(m, "Gv", "Te"), "")
   expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- character()
   expect_match(about(inspected(upgrade), "rival"),
-               "Since sun and drift answer to no condition that was measured")
+               "Because sun and drift respond to no condition that was measured")
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- "Gv"
   expect_match(about(inspected(upgrade), "rival"),
-               paste("only a look on site tells them apart: the one asks for a",
+               paste("only a look on site distinguishes them: the first asks for a",
                      "sun_gain of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
   expect_match(about(inspected(upgrade), "rival"),
-               paste("What sun brings \\(gain of the sun\\) trades off against",
-                     "gain: with that measured"), all = FALSE)
+               paste("The estimate of sun \\(gain of the sun\\) is correlated with gain:",
+                     "measuring that would narrow it"), all = FALSE)
 })
 
 test_that("a stand-in and a drifting sensor have tests of their own", {
@@ -91,17 +92,19 @@ test_that("conditions that go together, answers without a mechanism and absent d
     about(inspected(upgrade), "answer")
   }
   expect_match(answers(-1, 0.9),
-               "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted",
+               paste("responds to Gv\\. Among the mechanisms that it drives, sun was tried but not",
+                     "adopted"),
                all = FALSE)
   expect_match(answers(-1, 0.7),
                paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against.",
-                     "does not tell that from an unknown response to Gv: look for a sun_gain"),
+                     "does not distinguish that from an unknown response to Gv: look for a",
+                     "sun_gain"),
                all = FALSE)
-  expect_match(answers(1, 0.7), "answers to Gv: sun may be why, and is not decided", all = FALSE)
+  expect_match(answers(1, 0.7), "responds to Gv: sun may be why, and is not decided", all = FALSE)
   plain <- upgrade$catalogue
   upgrade$catalogue$sun$boundary <- c("Te", "Gv")
   expect_match(answers(1, 0.7),
-               "answers to Te and Gv: sun may be why, and is not decided|to Gv and Te: sun may be",
+               "responds to Te and Gv: sun may be why, and is not decided|to Gv and Te: sun may be",
                all = FALSE)
   expect_length(answers(1, 0.7), 1)
   upgrade$catalogue <- plain
@@ -244,10 +247,10 @@ test_that("a calibration tells what it does not know", {
   expect_match(about(told, "cause"), "attribute_discrepancy")
   fit$values[, "gain"] <- (fit$values[, "offset"] - 10) / 40
   expect_match(about(calibration_inspections(fit), "tied"),
-               "offset and gain trade off .*correlation 1.00")
+               "offset and gain are correlated .1.00.")
 })
 
-test_that("models that are not told apart are so where their simulations differ most", {
+test_that("models that are not distinguished are so where their simulations differ most", {
   data <- linear_data(90)
   m <- linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60)
   steep <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],

@@ -100,7 +100,7 @@ test_that("two mechanisms of a function, adopted one after the other, are both k
   expect_identical(rejudged(upgrade)$models[[3]]$verdict, "named")
   at <- match(c("sun", "wind"), names(last$emulator$parameters))
   upgrade$models[[3]]$fit$posterior$unit[, at[1]] <- last$posterior$unit[, at[2]]
-  expect_match(rejudged(upgrade)$models[[3]]$doubts, "evidence only beside")
+  expect_match(rejudged(upgrade)$models[[3]]$doubts, "evidence only together with")
   expect_identical(rejudged(upgrade)$models[[3]]$verdict, "likely")
 })
 
