@@ -489,8 +489,8 @@ separation_inspection <- function(comparison) {
   name <- names(which.max(abs(conditions)))
   at <- which.max(apart)
   c(separate = sprintf(paste("The record does not clearly distinguish %s from %s. Their",
-                             "simulations differ most (by %s) at %s, and the more so the %s %s is: measure",
-                             "under such conditions."),
+                             "simulations differ most (by %s) at %s, and the more so the %s %s is:",
+                             "measure under such conditions."),
                        best$model, best$against, with_unit(short(apart[at]), m$unit),
                        paste0(if (is.numeric(a$time)) "hour ", format(a$time[at])),
                        if (conditions[[name]] > 0) "higher" else "lower", name))

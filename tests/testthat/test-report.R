@@ -373,7 +373,8 @@ seen_in_browser <- function(browser, file, width) {
   script <- "frame.onload = function() {
     const page = frame.contentDocument, images = [...page.images];
     probe.textContent = JSON.stringify({width: page.documentElement.scrollWidth,
-      letters: Math.min(...[...page.querySelectorAll('p, li')].map(e => parseFloat(getComputedStyle(e).fontSize))),
+      letters: Math.min(...[...page.querySelectorAll('p, li')].map(
+        e => parseFloat(getComputedStyle(e).fontSize))),
       natural: images.map(i => i.naturalWidth), shown: images.map(i => i.clientWidth)});
   }"
   writeLines(sprintf("<pre id='probe'></pre><script>%s</script>",
