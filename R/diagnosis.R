@@ -265,7 +265,8 @@ trust_sentence <- function(upgrade, best) {
     open <- open_trials(upgrade)
     return(paste0("The numbers behind this can be trusted: the sampler passed its own checks.",
                   if (NROW(open))
-                    sprintf(" Not so those of %s, which %s not adopted: see what to inspect next.",
+                    sprintf(paste(" The numbers behind %s, which %s not adopted, are not trusted:",
+                                  "see what to inspect next."),
                             listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
   }
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)

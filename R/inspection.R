@@ -145,13 +145,13 @@ mechanism_inspections <- function(upgrade, model) {
     else if (describes(upgrade$catalogue[[model$mechanism]])) description_inspection(upgrade, model)
     else site_inspection(upgrade, model),
     if ("drift" %in% names(model$doubts)) {
-      c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: a",
+      c(drift = sprintf(paste("Compare the sensor of %s with a second one from time to time: a",
                               "drift of it would explain as much as %s."),
                         upgrade$measurements$target, model$mechanism))
     },
     if ("slow" %in% names(model$doubts)) {
-      c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again",
-                              "later: it shows whether the sensor changes or what it",
+      c(drift = sprintf(paste("Compare the sensor of %s with a second one from time to",
+                              "time: that shows whether the sensor changes or what it",
                               "measures."), upgrade$measurements$target))
     },
     step_inspection(upgrade, model))
@@ -290,14 +290,14 @@ nearest_inspection <- function(upgrade) {
   if (!NROW(best) || unjudged(upgrade) || best$upper95 - best$lower95 > rules$too_rough)
     return(NULL)
   if (is_unverified(best, upgrade)) {
-    return(c(nearest = sprintf(paste("Not verified is %s (odds of %s): a larger budget",
-                                     "(control$runs_total) would decide it."),
+    return(c(nearest = sprintf(paste("The mechanism %s was not verified (odds of %s): a",
+                                     "larger budget (control$runs_total) would decide it."),
                                best$mechanism, odds(best$log10_bf))))
   }
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf(
-    "Not decided is %s (odds of %s%s): a longer record%s would decide it%s.",
+    "The mechanism %s remains undecided (odds of %s%s): a longer record%s would decide it%s.",
     best$mechanism, odds(best$log10_bf),
     if (isTRUE(best$error_ratio < rules$clearly_fallen))
       sprintf("; with it the error falls to %s", percent(best$error_ratio))
@@ -318,8 +318,9 @@ undecided_inspections <- function(upgrade) {
     sprintf("odds of %s%s, by numbers that are not trusted", odds(open$log10_bf[k]),
             odds_interval(ends))
   }, "")
-  told <- sprintf(paste("Not ruled out is %s: %s. A larger budget (control$runs_total), or",
-                        "narrower priors, would decide."), open$mechanism, said)
+  told <- sprintf(paste("The mechanism %s is not ruled out: %s. A larger budget",
+                        "(control$runs_total), or narrower priors, would decide."),
+                  open$mechanism, said)
   stats::setNames(told, rep("undecided", length(told)))
 }
 
@@ -409,9 +410,10 @@ edge_inspections <- function(fit) {
   rows <- rows[rows$at_edge, ]
   upper <- abs(rows$prior_upper - rows$median) < abs(rows$median - rows$prior_lower)
   end <- with_unit(short(ifelse(upper, rows$prior_upper, rows$prior_lower)), rows$unit)
-  told <- sprintf(paste("At the %s end of its prior (%s) lies %s: measure it, or widen the prior",
-                        "if %s is possible; otherwise it makes up for something else."),
-                  ifelse(upper, "upper", "lower"), end, rows$label, ifelse(upper, "more", "less"))
+  told <- sprintf(paste("The parameter %s lies at the %s end of its prior (%s): measure it, or",
+                        "widen the prior if %s is possible; otherwise it makes up for something",
+                        "else."),
+                  rows$label, ifelse(upper, "upper", "lower"), end, ifelse(upper, "more", "less"))
   stats::setNames(told, rep("edge", length(told)))
 }
 
@@ -450,9 +452,9 @@ remainder_inspection <- function(model, measurements) {
   left <- remaining_error(model, measurements)
   noise <- with_unit(short(measurements$noise_sd), measurements$unit)
   if (left$large && is.null(left$pattern)) {
-    return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: hold a",
-                                   "second sensor beside the first; if that noise is right,",
-                                   "something is still missing from the model%s."),
+    return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: check",
+                                   "that noise with a second sensor; if it is right, something is",
+                                   "still missing from the model%s."),
                              short(left$ratio), noise,
                              if (any(model$attribution$table$significant)) ""
                              else paste(", perhaps something that acts through two conditions at",

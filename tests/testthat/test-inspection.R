@@ -56,7 +56,7 @@ test_that("a stand-in and a drifting sensor have tests of their own", {
   upgrade$models[[2]]$doubts <- c(slow = "anything that changes slowly would explain the error too")
   expect_match(about(inspected(upgrade), "drift"), "whether the sensor changes or what it measures")
   upgrade$models[[2]]$doubts <- c(drift = "a drifting sensor would explain the error as well")
-  expect_match(about(inspected(upgrade), "drift"), "sensor of Ti beside a second one")
+  expect_match(about(inspected(upgrade), "drift"), "sensor of Ti with a second one")
 })
 
 test_that("a time of about a step asks for finer steps of the simulator", {
@@ -124,7 +124,7 @@ test_that("a candidate that is near is named with what would decide it", {
   upgrade$candidates$log10_bf <- c(1, -1)
   upgrade$candidates$probability <- c(0.8, 0.01)
   expect_match(about(inspected(upgrade), "nearest"),
-               paste("Not decided is sun \\(odds of 10 to 1 in favour; with it",
+               paste("sun remains undecided \\(odds of 10 to 1 in favour; with it",
                      "the error falls to 8.*Gv changes strongly"))
   upgrade$catalogue$sun$boundary <- character()
   upgrade$candidates$error_ratio <- 0.9
@@ -143,10 +143,10 @@ test_that("a trial is near as well, and one that no runs were left to verify ask
   upgrade$candidates <- upgrade$candidates[sun, ]
   upgrade$candidates[c("judged_by", "log10_bf", "lower95", "upper95")] <- list("trial", 1, 0.4, 1.6)
   expect_match(about(inspected(upgrade), "nearest"),
-               "Not decided is sun \\(odds of 10 to 1 in favour")
+               "sun remains undecided \\(odds of 10 to 1 in favour")
   upgrade$candidates[c("log10_bf", "lower95", "upper95")] <- list(3, 2.4, 3.6)
   expect_match(about(inspected(upgrade), "nearest"),
-               "Not verified is sun \\(odds of 1,000 to 1.*runs_total")
+               "sun was not verified \\(odds of 1,000 to 1.*runs_total")
   expect_match(summary(upgrade)$sure, "no runs were left to verify it", all = FALSE)
   expect_match(plot(upgrade, "candidates")$labels$title, "no runs were left to verify the best")
 })
@@ -157,17 +157,19 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
   upgrade$candidates[rough, c("log10_bf", "lower95", "upper95")] <- list(-3.5, -5.9, 3)
   upgrade$candidates[rough, c("judged_by", "trusted")] <- list("trial", FALSE)
   expect_match(about(inspected(upgrade), "undecided"),
-               "Not ruled out is drift.*3,200 to 1 against.*in favour")
+               "drift is not ruled out: .*3,200 to 1 against.*in favour")
   upgrade$candidates$upper95[rough] <- 54
-  expect_match(about(inspected(upgrade), "undecided"), "drift: its numbers are too rough for odds")
+  expect_match(about(inspected(upgrade), "undecided"),
+               "drift is not ruled out: its numbers are too rough for odds")
   expect_length(about(inspected(upgrade), "nothing"), 0)
-  expect_match(paste(summary(upgrade)$sure, collapse = " "), "Not so those of drift")
+  expect_match(paste(summary(upgrade)$sure, collapse = " "),
+               "numbers behind drift, which was not adopted, are not trusted")
   upgrade$candidates$trusted[rough] <- TRUE
   expect_length(about(inspected(upgrade), "undecided"), 0)
   upgrade$candidates$trusted[rough] <- FALSE
   upgrade$candidates$upper95[rough] <- 1.9
   expect_length(about(inspected(upgrade), "undecided"), 0)
-  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "those of drift")
+  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "numbers behind drift")
   # Beside what was adopted only where it could be better.
   adopted <- small_upgrade()
   upper <- adopted$candidates$log10_bf[adopted$candidates$mechanism == "sun"][1]
@@ -227,7 +229,7 @@ test_that("edges of the prior are told with the end and its value", {
   fit$values[, "gain"] <- 1.9999
   fit$posterior$unit[, match("gain", colnames(fit$values))] <- 0.99995
   expect_match(edge_inspections(fit),
-               paste("At the upper end of its prior \\(2.0\\) lies gain: measure it, .* if",
+               paste("gain lies at the upper end of its prior \\(2.0\\): measure it, .* if",
                      "more is possible"))
 })
 

@@ -351,7 +351,7 @@ test_that(
                      ".* not found"))
   expect_match(told$tag, "not good enough")
   expect_no_match(paste(c(told$sure, told$inspect), collapse = " "),
-                  "missing is plain|Not decided is")
+                  "missing is plain|remains undecided")
   stand_in(remaining_error = function(...) list(ratio = 3, large = TRUE, pattern = NULL))
   expect_match(summary(open)$remains,
                "noise is too small, or something else is missing, or the parameters were not",
