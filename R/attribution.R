@@ -117,7 +117,7 @@ attribute_record <- function(fits, which, control, seed, threads) {
                  control = control, seed = seed), class = "amiss_attribution")
 }
 
-# The members of a group are told as what the group is.
+# Each member of a group is reported with the numbers of the group.
 with_groups <- function(table, groups) {
   for (group in groups) {
     members <- table$boundary %in% group$conditions
@@ -167,7 +167,8 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
   control
 }
 
-# What is told as the answer: conditions, and groups that cannot be told apart as one.
+# What is reported as significant: conditions, and each group of conditions that cannot be
+# distinguished as one.
 significant_conditions <- function(table) {
   told <- ifelse(is.na(table$group), table$boundary, table$group)
   unique(told[table$significant])
@@ -184,10 +185,11 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
                      ">" = "next: {.fun upgrade_model} with a {.fun catalogue}"))
 })
 
-# Which conditions cannot be told apart, and what would.
+# Which conditions cannot be distinguished, and what would distinguish them.
 group_words <- function(attribution) {
   vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
-    sprintf("%s cannot be told apart in this record (correlation %.3f): measure while %s differ",
+    sprintf(paste("%s cannot be distinguished in this record (correlation %.3f): measure while %s",
+                  "differ"),
             listed(g$conditions), g$correlation,
             if (length(g$conditions) == 2) "the two" else "they")
   }, "")

@@ -127,7 +127,7 @@ engine_records <- function(fits) {
   })
 }
 
-# A noise that is lost in the rounding of what the simulator moves is told as the reason of a
+# A noise that is lost in the rounding of what the simulator moves is given as the reason of a
 # failure.
 check_noise_visible <- function(emulator, noise_sd, parent, call) {
   spread <- sqrt(mean(rowSums(simulator_moves(emulator)^2)))

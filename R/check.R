@@ -44,7 +44,7 @@ posterior_runs <- function(fit, drawn, threads) {
        failed = sum(failed))
 }
 
-# The check tells of failed runs itself.
+# The check itself reports failed runs.
 suppress_run_warnings <- function(code)
   withCallingHandlers(code, amiss_warning_input = function(w) rlang::cnd_muffle(w))
 

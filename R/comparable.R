@@ -161,7 +161,7 @@ literal_formats <- function(format) {
   c(format, rev(whole), list(NULL), if (day > 0 && month > 0) if (day < month) "dmy" else "mdy")
 }
 
-# Stamps without a year, such as those of EnergyPlus, tell times apart within one year only.
+# Stamps without a year, such as those of EnergyPlus, distinguish times within one year only.
 check_one_year <- function(time) {
   if (!is.numeric(time) || max(time) <= 8784) return(invisible())
   stop("the stamps of the column have no year and go beyond one; give the rows by another column",

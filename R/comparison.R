@@ -274,8 +274,9 @@ disagreement_sentences <- function(comparison) {
   c(if (length(first))
       sprintf("%s would choose %s; the evidence chooses %s.", told, names(told), best),
     if (length(pairs)) {
-      sprintf("Of %d pairs of models, %s in another order than the evidence.", attr(pairs, "pairs"),
-              listed(sprintf("%s puts %d", criterion_names[names(pairs)], as.integer(pairs))))
+      sprintf("%s of %d pairs of models in another order than the evidence.",
+              listed(sprintf("%s puts %d", criterion_names[names(pairs)], as.integer(pairs))),
+              attr(pairs, "pairs"))
     },
     if (nrow(ratios)) {
       sprintf(paste("The likelihood ratio test %s %s to %s (p = %s); the log10 Bayes factor",
@@ -352,7 +353,7 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
   say_table(table[sort(shown), ])
   doubts <- length(doubt_sentences(x))
   told <- c(evidence_sentences(x), utils::head(disagreement_sentences(x), 1),
-            if (doubts) paste0("Doubts: ", doubts, "; summary() tells them."))
+            if (doubts) paste0("Doubts: ", doubts, "; summary() lists them."))
   say_bullets(told)
   cli::cli_bullets(c(">" = "next: {.fun summary}, {.fun tidy}, {.fun plot} or {.fun report}"))
 })

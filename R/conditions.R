@@ -12,7 +12,7 @@ abort_numerical <- function(message, call = rlang::caller_env(), .envir = parent
                  call = short_call(call), .envir = .envir)
 }
 
-# The call as name(): without its arguments, which do.call() would print in full.
+# The call as name(): without its arguments, which do.call() would print fully.
 short_call <- function(call) {
   if (is.environment(call)) call <- rlang::frame_call(call)
   name <- if (is.call(call)) rlang::call_name(call)
@@ -28,7 +28,7 @@ warn_result <- function(message, class = character(), .envir = parent.frame()) {
 }
 
 # The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own
-# condition. The value that it checks, its first argument, is told.
+# condition. The value that it checks, its first argument, is reported.
 check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) {
   check <- substitute(verdict)
   checks <- is.call(check) && is.call(check[[1]]) && identical(check[[1]][[2]], quote(checkmate))
@@ -116,7 +116,7 @@ plain_number <- function(x, single) {
   sprintf("Must be a plain number, not of class '%s'", class(x)[1])
 }
 
-# " = value", or nothing for what is not told in a few words.
+# " = value", or nothing for what a few words cannot say.
 value_words <- function(x) {
   if (is.null(x) || is.atomic(x) && !is.object(x) && is.null(dim(x)) && length(x) <= 5)
     paste0(" = ", seen(x))

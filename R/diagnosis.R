@@ -110,7 +110,7 @@ mechanism_verdict <- function(upgrade) {
 open_verdict <- function(upgrade) {
   explained <- if (is.null(upgrade$candidates)) "no mechanism was tried"
                else if (unjudged(upgrade))
-                 "whether a mechanism of the catalogue explains it cannot be told"
+                 "whether a mechanism of the catalogue explains it cannot be decided"
                else "no mechanism of the catalogue explains it"
   tag <- if (unjudged(upgrade)) "Unexplained; the emulator is not good enough to judge mechanisms"
          else "Unexplained"
@@ -120,19 +120,19 @@ open_verdict <- function(upgrade) {
   remainder <- remaining_error(base, upgrade$measurements)
   if (unjudged(upgrade) && remainder$large) {
     return(unexplained(sprintf(
-      paste("The error is %s times the stated noise%s. Whether something is missing from the model",
-            "or its parameters were not found cannot be told: its emulator is not good enough."),
+      paste("The error is %s times the stated noise%s. The model's emulator is not good enough to",
+            "decide whether something is missing from the model or its parameters were not found."),
       short(remainder$ratio),
-      if (length(answers)) paste(" and answers to", listed(answers)) else "")))
+      if (length(answers)) paste(" and responds to", listed(answers)) else "")))
   }
   if (length(answers) && !remainder$large) {
     return(unexplained(sprintf(paste("The error is of the size of the stated noise (%s times), but",
-                                     "a part of it answers to %s: something small is missing from",
+                                     "a part of it responds to %s: something small is missing from",
                                      "the model, or its state at the start is off, and %s."),
                                short(remainder$ratio), listed(answers), explained)))
   }
   if (length(answers)) {
-    return(unexplained(sprintf("Something that answers to %s is missing from the model, but %s.",
+    return(unexplained(sprintf("Something that responds to %s is missing from the model, but %s.",
                                listed(answers), explained)))
   }
   if (remainder$large) {
@@ -146,7 +146,7 @@ open_verdict <- function(upgrade) {
                 headline = paste0("No mechanism is called for, but the numbers behind this are ",
                                   "not to be trusted: ", base$fit$trust$verdict, ".")))
   }
-  nothing <- paste("no mechanism is called for, and the remaining error answers to no boundary",
+  nothing <- paste("no mechanism is called for, and the remaining error responds to no boundary",
                    "condition")
   held_out <- held_out_excess(base, upgrade$measurements)
   if (!is.null(held_out)) {
@@ -251,21 +251,22 @@ probability_sentence <- function(trials) {
   all <- sort(all, decreasing = TRUE)
   near <- all[-1][all[-1] >= 0.01]
   told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
-  paste0("Of ", nrow(trials), if (nrow(trials) == 1) " mechanism" else " mechanisms",
-         " tried and \"no change\", all equally likely beforehand, ",
-         names(all)[1], " holds ", percent(unname(all[1])), " of the probability",
+  paste0("The most probable of ", nrow(trials),
+         if (nrow(trials) == 1) " mechanism" else " mechanisms",
+         " tried and \"no change\", all equally likely beforehand, is ", told(all[1]),
          if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
 }
 
 # Whether the numbers behind the first decision can be trusted, in words; if not, whether the
-# decision hangs on it.
+# decision depends on it.
 trust_sentence <- function(upgrade, best) {
   base <- upgrade$models[[1]]$fit$trust
   if (base$trusted && best$trusted) {
     open <- open_trials(upgrade)
     return(paste0("The numbers behind this can be trusted: the sampler passed its own checks.",
                   if (NROW(open))
-                    sprintf(" Not so those of %s, which %s not adopted: see what to inspect next.",
+                    sprintf(paste(" The numbers behind %s, which %s not adopted, are not trusted:",
+                                  "see what to inspect next."),
                             listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
   }
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
@@ -273,7 +274,7 @@ trust_sentence <- function(upgrade, best) {
   sprintf(
     "The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
     if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
-    else "The decision may hang on it: more runs or chains would settle it.")
+    else "The decision may depend on it: more runs or chains would settle it.")
 }
 
 # How large the matter is, beside the noise and on data held out.
@@ -314,7 +315,7 @@ change_sentences <- function(upgrade) {
   }))
 }
 
-# All that is told of one mechanism.
+# All that is reported of one mechanism.
 mechanism_words <- function(model, upgrade) {
   row <- upgrade$candidates[upgrade$candidates$from == model$parent &
                             upgrade$candidates$mechanism == model$mechanism, ]
@@ -368,7 +369,7 @@ doubt_sentence <- function(model) {
 
 confounded_sentence <- function(model) {
   if (length(model$confounded_with)) {
-    sprintf("How much %s does hangs together with %s (correlation beyond 0.4).", model$mechanism,
+    sprintf("The estimate of %s is correlated with %s (by more than 0.4).", model$mechanism,
             listed(parameter_labels(model$fit, model$confounded_with)))
   }
 }
@@ -439,8 +440,8 @@ remaining_sentences <- function(upgrade) {
   edge <- rows$label[rows$at_edge]
   moved <- step_moved_words(model)
   last <- remaining_error(model, upgrade$measurements)
-  c(if (length(answers)) sprintf("The remaining error answers to %s.", listed(answers))
-    else "The remaining error answers to no boundary condition.",
+  c(if (length(answers)) sprintf("The remaining error responds to %s.", listed(answers))
+    else "The remaining error responds to no boundary condition.",
     if (last$large) sprintf(
       "In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
       if (is.null(last$pattern))

@@ -146,7 +146,7 @@ project_outputs <- function(outputs, basis) {
 
 coarse_basis <- function(basis, noise_sd) noise_sd > 0 && basis$discarded_rms > noise_sd
 
-# Told once for every model that was asked for: where emulators come and go
+# Said once for every model that was asked for: where emulators come and go
 # (without_basis_warnings()), of the one that stays.
 warn_coarse_basis <- function(emulator, option, model = NULL) {
   basis <- emulator$basis

@@ -17,7 +17,8 @@ figure_height <- function(figure, width = canvas_width) {
 figure_of_nothing <- function(title)
   with_height(ggplot2::ggplot() + figure_titles(title) + figure_theme(), 1.5)
 
-# Okabe and Ito's colours: told apart by colour-blind readers and, one light and one dark, in grey.
+# Okabe and Ito's colours: colour-blind readers can distinguish them. One is light and one dark, so
+# that they differ in grey too.
 stage_colours <- c("before" = "#E69F00", "after" = "#0072B2", "the model" = "#0072B2")
 
 stage_lines <- function() ggplot2::scale_linetype_manual(

@@ -1,4 +1,4 @@
-# What the error answers to.
+# What the error responds to.
 
 attribution_title <- function(attributions) {
   named <- lapply(attributions, function(a) significant_conditions(a$table))

@@ -102,7 +102,7 @@ attribution_words <- function(comparison) {
                         factor(comparison$tables$attribution$model, names(comparison$models))),
                   significant_conditions)
   best <- best_model(comparison)
-  sprintf("%s, of highest evidence, leaves an error that answers to %s", best,
+  sprintf("%s, of highest evidence, leaves an error that responds to %s", best,
           listed(named[[best]], none = "no boundary condition"))
 }
 
@@ -204,9 +204,9 @@ figure_discrepancies <- function(comparison) {
                         labeller = function(strip)
                           lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
     model_scales() +
-    figure_titles(title, paste("Grey: measured - simulated. Coloured: the discrepancy that answers",
-                               "to boundary conditions, with its 95 % band; at the right its root",
-                               "mean square."),
+    figure_titles(title, paste("Grey: measured - simulated. Coloured: the discrepancy that",
+                               "responds to boundary conditions, with its 95 % band; at the right",
+                               "its root mean square."),
                   x = time_label(table$time), y = axis_label("error", m$unit)) +
     time_axis(table$time) + figure_theme() +
     ggplot2::theme(strip.text.y = ggplot2::element_text(angle = 0))

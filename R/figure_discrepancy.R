@@ -4,9 +4,9 @@ discrepancy_title <- function(table) {
   size <- vapply(split(table$discrepancy, table$stage), function(d) sqrt(mean(d^2)), 0)
   unit <- attr(table, "unit")
   if (length(size) < 2)
-    paste("The part of the error that answers to boundary conditions is typically",
+    paste("The part of the error that responds to boundary conditions is typically",
           with_unit(short(size), unit))
-  else paste("The part of the error that answers to boundary conditions",
+  else paste("The part of the error that responds to boundary conditions",
              change_words(size[1], size[2], unit))
 }
 
@@ -35,8 +35,8 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
     ggplot2::facet_grid(panel ~ ., scales = "free_y", switch = "y",
                         labeller = wrap_turned(length(panels))) + stage_scales() +
     figure_titles(discrepancy_title(table),
-                  paste0("Grey: measured - simulated. Coloured: the discrepancy, which answers to ",
-                         "boundary conditions, with 95 % band.",
+                  paste0("Grey: measured - simulated. Coloured: the discrepancy, which responds ",
+                         "to boundary conditions, with 95 % band.",
                          if (!is.null(leading))
                            paste0(" Below: ", leading$name, ", which leads.")),
                   x = time_label(table$time)) +
@@ -110,8 +110,8 @@ figure_missing <- function(discrepancy, attribution = NULL, most = 4) {
     figure_titles(
       sprintf("What the model lacks is mostly a response to %s, typically %s", shown[1],
               with_unit(short(size[[shown[1]]]), discrepancy$unit)),
-      paste("How the target answers to each boundary condition, present and past, beyond what the",
-            "model says. Above zero the model is too low, below it too high."),
+      paste("How the target responds to each boundary condition, present and past, beyond what",
+            "the model says. Above zero the model is too low, below it too high."),
       x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +
     time_axis(table$time) + figure_theme()
   with_height(figure, 2 + 1.2 * length(shown))

@@ -99,9 +99,9 @@ figure_moved <- function(upgrade) {
     ggplot2::scale_y_discrete(labels = wrap_labels(0.28)) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free_x",
                         labeller = wrap_strips(2.6)) +
-    figure_titles(title, paste("A parameter that moved far had made up for what was missing. One",
-                               "that is strongly correlated with a new parameter trades off",
-                               "against it: data that tell the two apart come next.")) +
+    figure_titles(title, paste("A parameter that moved far had made up for what was missing. If",
+                               "one is strongly correlated with a new parameter, measure next",
+                               "what distinguishes the two.")) +
     figure_theme()
   with_height(figure, 2.4 + 0.5 * nrow(table))
 }

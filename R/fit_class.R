@@ -55,7 +55,7 @@ condition_table <- function(fit, settings) UseMethod("condition_table")
 # What the sampler said: of the paper's calibration, which samples twice, of both.
 sampler_said <- function(fit) if (knows_history(fit)) fit$posterior else fit$trust
 
-# Whether the discrepancy answers to the history of the conditions: then it carries over to other
+# Whether the discrepancy responds to the history of the conditions: then it carries over to other
 # rows.
 knows_history <- function(fit) !is.null(fit$coefficients)
 

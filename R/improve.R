@@ -122,7 +122,7 @@ with_least <- function(model, context) {
   model
 }
 
-# The slopes there by differences, as what the discrepancy keeps out of hangs on them; and the
+# The slopes there by differences, because what the discrepancy keeps out of depends on them; the
 # search goes on as long as they promise that it comes nearer to the record.
 with_exact_least <- function(model, context) {
   model <- with_least(model, context)

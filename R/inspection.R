@@ -32,7 +32,7 @@ calibration_inspections <- function(fit, model = NULL) {
     edge_inspections(fit), tied_inspections(fit), loose_inspections(fit),
     if (!is.null(model)) remainder_inspection(model, fit$measurements),
     if (!is.null(model)) spike_inspection(model, fit$measurements),
-    cause = paste("What its error answers to, and what may cause it, is not part of a calibration:",
+    cause = paste("A calibration does not show what its error responds to, or what may cause it:",
                   "attribute_discrepancy() asks the first, upgrade_model() with a catalogue of",
                   "mechanisms the second."))
 }
@@ -48,7 +48,7 @@ comparison_inspections <- function(comparison) {
     held_out_inspection(best, comparison$measurements),
     edge_inspections(best$fit),
     if (length(answers)) {
-      c(answers = sprintf(paste("Even %s leaves an error that answers to %s: ask",
+      c(answers = sprintf(paste("Even %s leaves an error that responds to %s: ask",
                                 "upgrade_model() for the cause, with mechanisms driven by",
                                 "%s."), best$name, listed(answers), listed(answers, "or")))
     })
@@ -145,13 +145,13 @@ mechanism_inspections <- function(upgrade, model) {
     else if (describes(upgrade$catalogue[[model$mechanism]])) description_inspection(upgrade, model)
     else site_inspection(upgrade, model),
     if ("drift" %in% names(model$doubts)) {
-      c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again later: a",
+      c(drift = sprintf(paste("Compare the sensor of %s with a second one from time to time: a",
                               "drift of it would explain as much as %s."),
                         upgrade$measurements$target, model$mechanism))
     },
     if ("slow" %in% names(model$doubts)) {
-      c(drift = sprintf(paste("Hold the sensor of %s beside a second one now and again",
-                              "later: it tells whether the sensor changes or what it",
+      c(drift = sprintf(paste("Compare the sensor of %s with a second one from time to",
+                              "time: that shows whether the sensor changes or what it",
                               "measures."), upgrade$measurements$target))
     },
     step_inspection(upgrade, model))
@@ -187,18 +187,18 @@ shorter_step_inspection <- function(last) {
                    if (!is.null(moved)) paste0(", and ", moved), ": let it run with finer ones."))
 }
 
-# What would tell two mechanisms apart: conditions that only one answers to, or what each asks to be
-# found on site.
+# What would distinguish two mechanisms: conditions that only one responds to, or what each asks to
+# be found on site.
 separating_words <- function(upgrade, trials, a, b) {
   drivers <- lapply(upgrade$catalogue[c(a, b)], `[[`, "boundary")
   only <- list(setdiff(drivers[[1]], drivers[[2]]), setdiff(drivers[[2]], drivers[[1]]))
   if (!length(unlist(only))) {
     called <- vapply(
       c(a, b), function(name) called_for(trials$parameters[[match(name, trials$mechanism)]]), "")
-    same <- if (length(drivers[[1]])) "answer to the same conditions"
-            else "answer to no condition that was measured"
-    return(sprintf(paste("Since %s and %s %s, only a look on site tells them apart: the one asks",
-                         "for %s, the other for %s."),
+    same <- if (length(drivers[[1]])) "respond to the same conditions"
+            else "respond to no condition that was measured"
+    return(sprintf(paste("Because %s and %s %s, only a look on site distinguishes them: the first",
+                         "asks for %s, the second for %s."),
                    a, b, same, called[1], called[2]))
   }
   together <- correlation_words(upgrade$measurements, drivers[[1]], drivers[[2]])
@@ -206,7 +206,7 @@ separating_words <- function(upgrade, trials, a, b) {
   changing <- if (all(lengths(only)))
                 sprintf("%s changes while %s does not, or vice versa", either[[1]], either[[2]])
               else sprintf("%s changes and nothing else does", listed(unlist(only), "or"))
-  sprintf("To tell %s from %s, measure while %s%s.", a, b, changing, together)
+  sprintf("To distinguish %s from %s, measure while %s%s.", a, b, changing, together)
 }
 
 correlation_words <- function(measurements, a, b) {
@@ -236,7 +236,7 @@ confounded_inspection <- function(upgrade, model) {
   new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
   if (!length(others) || !length(new)) return(NULL)
   labels <- parameter_labels(model$fit, others)
-  sprintf("What %s brings (%s) trades off against %s: with %s measured, it is known better.",
+  sprintf("The estimate of %s (%s) is correlated with %s: measuring %s would narrow it.",
           model$mechanism, listed(parameter_labels(model$fit, new)), listed(labels),
           if (length(labels) > 1) "one of these" else "that")
 }
@@ -290,14 +290,14 @@ nearest_inspection <- function(upgrade) {
   if (!NROW(best) || unjudged(upgrade) || best$upper95 - best$lower95 > rules$too_rough)
     return(NULL)
   if (is_unverified(best, upgrade)) {
-    return(c(nearest = sprintf(paste("Not verified is %s (odds of %s): a larger budget",
-                                     "(control$runs_total) would decide it."),
+    return(c(nearest = sprintf(paste("The mechanism %s was not verified (odds of %s): a",
+                                     "larger budget (control$runs_total) would decide it."),
                                best$mechanism, odds(best$log10_bf))))
   }
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf(
-    "Not decided is %s (odds of %s%s): a longer record%s would decide it%s.",
+    "The mechanism %s remains undecided (odds of %s%s): a longer record%s would decide it%s.",
     best$mechanism, odds(best$log10_bf),
     if (isTRUE(best$error_ratio < rules$clearly_fallen))
       sprintf("; with it the error falls to %s", percent(best$error_ratio))
@@ -318,8 +318,9 @@ undecided_inspections <- function(upgrade) {
     sprintf("odds of %s%s, by numbers that are not trusted", odds(open$log10_bf[k]),
             odds_interval(ends))
   }, "")
-  told <- sprintf(paste("Not ruled out is %s: %s. A larger budget (control$runs_total), or",
-                        "narrower priors, would decide."), open$mechanism, said)
+  told <- sprintf(paste("The mechanism %s is not ruled out: %s. A larger budget",
+                        "(control$runs_total), or narrower priors, would decide."),
+                  open$mechanism, said)
   stats::setNames(told, rep("undecided", length(told)))
 }
 
@@ -335,7 +336,7 @@ group_inspections <- function(attribution) {
   stats::setNames(told, rep("group", length(told)))
 }
 
-# Conditions that the error still answers to, with the mechanisms left that they drive.
+# Conditions that the error still responds to, with the mechanisms left that they drive.
 answer_inspections <- function(upgrade, last) {
   table <- last$attribution$table
   answers <- table$boundary[table$significant & is.na(table$group)]
@@ -351,27 +352,29 @@ answer_inspections <- function(upgrade, last) {
     fallen <- falls[falls$mechanism %in% driven, ]
     if (NROW(fallen)) {
       best <- fallen[which.min(fallen$error_ratio), ]
-      told <- c(told, sprintf(paste("The error still answers to %s. With %s, which it drives, it",
-                                    "falls to %s, but the evidence (odds of %s) does not tell that",
-                                    "from an unknown response to %s: look for %s on site."),
+      told <- c(told, sprintf(paste("The error still responds to %s. With %s, which it drives, it",
+                                    "falls to %s, but the evidence (odds of %s) does not",
+                                    "distinguish that from an unknown response to %s: look for %s",
+                                    "on site."),
                               name, best$mechanism, percent(best$error_ratio), odds(best$log10_bf),
                               name, called_for(best$parameters[[1]])))
     } else if (any(driven %in% open)) {
       undecided[name] <- listed(intersect(driven, open), "or")
     } else if (length(driven)) {
       told <- c(told,
-                sprintf(paste("The error still answers to %s. Of the mechanisms that it drives, %s",
-                              "%s tried but not adopted: look for another way in which %s acts."),
+                sprintf(paste("The error still responds to %s. Among the mechanisms that it",
+                              "drives, %s %s tried but not adopted: look for another way in which",
+                              "%s acts."),
                         name, listed(driven), if (length(driven) > 1) "were" else "was", name))
     } else {
       ever <- any(vapply(upgrade$catalogue, function(entry) name %in% entry$boundary, NA))
-      told <- c(told, sprintf(paste("The error still answers to %s, and no mechanism %s the",
+      told <- c(told, sprintf(paste("The error still responds to %s, and no mechanism %s the",
                                     "catalogue is driven by it: think of what acts with %s, and",
                                     "add it."), name, if (ever) "left in" else "of", name))
     }
   }
   of_reason <- split(answers[answers %in% names(undecided)], factor(undecided, unique(undecided)))
-  told <- c(sprintf("The error still answers to %s: %s may be why, and is not decided.",
+  told <- c(sprintf("The error still responds to %s: %s may be why, and is not decided.",
                     vapply(of_reason, listed, ""), names(of_reason)), told)
   stats::setNames(told, rep("answer", length(told)))
 }
@@ -395,7 +398,7 @@ driver_inspections <- function(upgrade) {
     if (length(absent)) {
       c(driver = sprintf(
         paste("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of",
-              "measurements(), so that the error can answer to it."),
+              "measurements(), so that the error can respond to it."),
         listed(absent), if (length(absent) > 1) "drive" else "drives", driven_by(absent)))
     })
 }
@@ -407,20 +410,21 @@ edge_inspections <- function(fit) {
   rows <- rows[rows$at_edge, ]
   upper <- abs(rows$prior_upper - rows$median) < abs(rows$median - rows$prior_lower)
   end <- with_unit(short(ifelse(upper, rows$prior_upper, rows$prior_lower)), rows$unit)
-  told <- sprintf(paste("At the %s end of its prior (%s) lies %s: measure it, or widen the prior",
-                        "if %s is possible; otherwise it makes up for something else."),
-                  ifelse(upper, "upper", "lower"), end, rows$label, ifelse(upper, "more", "less"))
+  told <- sprintf(paste("The parameter %s lies at the %s end of its prior (%s): measure it, or",
+                        "widen the prior if %s is possible; otherwise it makes up for something",
+                        "else."),
+                  rows$label, ifelse(upper, "upper", "lower"), end, ifelse(upper, "more", "less"))
   stats::setNames(told, rep("edge", length(told)))
 }
 
-# Pairs of parameters that the record cannot tell apart.
+# Pairs of parameters that the record cannot distinguish.
 tied_inspections <- function(fit) {
   r <- posterior_correlation(fit)
   if (ncol(r) < 2) return(NULL)
   pairs <- which(abs(r) > 0.9 & upper.tri(r), arr.ind = TRUE)
   label <- parameter_labels(fit, colnames(r))
-  told <- sprintf(paste("The parameters %s and %s trade off against each other (correlation %.2f):",
-                        "a measurement of either settles both."),
+  told <- sprintf(paste("The parameters %s and %s are correlated (%.2f): a measurement of either",
+                        "settles both."),
                   label[pairs[, 1]], label[pairs[, 2]], r[pairs])
   stats::setNames(told, rep("tied", length(told)))
 }
@@ -448,9 +452,9 @@ remainder_inspection <- function(model, measurements) {
   left <- remaining_error(model, measurements)
   noise <- with_unit(short(measurements$noise_sd), measurements$unit)
   if (left$large && is.null(left$pattern)) {
-    return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: hold a",
-                                   "second sensor beside the first; if that noise is right,",
-                                   "something is still missing from the model%s."),
+    return(c(noise = sprintf(paste("The remaining error is %s times the stated noise of %s: check",
+                                   "that noise with a second sensor; if it is right, something is",
+                                   "still missing from the model%s."),
                              short(left$ratio), noise,
                              if (any(model$attribution$table$significant)) ""
                              else paste(", perhaps something that acts through two conditions at",
@@ -471,7 +475,7 @@ remainder_inspection <- function(model, measurements) {
 
 # ---- models compared
 
-# Where the predictions of two models that are not told apart differ most.
+# Where the predictions of two models that are not clearly distinguished differ most.
 separation_inspection <- function(comparison) {
   table <- comparison$tables$evidence
   best <- table[which.min(table$rank), ]
@@ -486,8 +490,9 @@ separation_inspection <- function(comparison) {
   }, 0)
   name <- names(which.max(abs(conditions)))
   at <- which.max(apart)
-  c(separate = sprintf(paste("Not told apart are %s and %s. Their simulations differ most (by %s)",
-                             "at %s, and the more so the %s %s is: measure under such conditions."),
+  c(separate = sprintf(paste("The record does not clearly distinguish %s from %s. Their",
+                             "simulations differ most (by %s) at %s, and the more so the %s %s is:",
+                             "measure under such conditions."),
                        best$model, best$against, with_unit(short(apart[at]), m$unit),
                        paste0(if (is.numeric(a$time)) "hour ", format(a$time[at])),
                        if (conditions[[name]] > 0) "higher" else "lower", name))

@@ -18,8 +18,9 @@ doubts <- list(
   untried = doubt(function(case) {
     twins <- untried_twins(case$parent, case$entry, case$catalogue)
     if (length(twins)) {
-      sprintf(paste("the error answers to %s as well, which this record cannot tell from %s and no",
-                    "mechanism was given for"), listed(twins), listed(case$entry$boundary, "or"))
+      sprintf(paste("the error responds to %s as well, which this record cannot distinguish from",
+                    "%s and for which no mechanism was given"),
+              listed(twins), listed(case$entry$boundary, "or"))
     }
   }, "a place or driver that nobody thought of is no less likely"),
   untrusted = doubt(function(case) {
@@ -129,7 +130,7 @@ risen_words <- function(parent, model) {
 }
 
 # By how much the mean square of the error held out falls, and its standard error, from sums over
-# days (or eighths of a short record): errors within a day hang together, those of several records
+# days (or eighths of a short record): errors within a day are correlated, those of several records
 # too. Of several the error is in units of each one's noise.
 held_out_gain <- function(parent, model) {
   before <- parent$prediction[parent$prediction$use == "validate", ]
@@ -148,8 +149,8 @@ held_out_gain <- function(parent, model) {
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
 }
 
-# Conditions of which no mechanism of the catalogue is driven, and which the error before cannot
-# tell from those that drive this one.
+# Conditions that drive no mechanism of the catalogue, and that the error before cannot distinguish
+# from those that drive this one.
 untried_twins <- function(parent, entry, catalogue) {
   same <- Filter(function(g) g$significant && any(g$conditions %in% entry$boundary),
                  parent$attribution$groups)
@@ -157,8 +158,8 @@ untried_twins <- function(parent, entry, catalogue) {
   setdiff(unlist(lapply(same, `[[`, "conditions")), driven)
 }
 
-# The condition that drives a mechanism answered before and does so still, with more than half of
-# its evidence.
+# The error responded before to the condition that drives a mechanism, and still does, with more
+# than half of its evidence.
 still_answers <- function(parent, model, boundary) {
   strength <- function(m) {
     table <- m$attribution$table
@@ -179,7 +180,7 @@ confounded_parameters <- function(fit, new) {
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > 0.4]
 }
 
-# In words, where the last of `models` has no evidence on the base model and trades off against what
+# In words, if the last of `models` has no evidence on the base model and is correlated with what
 # was adopted before it: two that imitate a third together look like this.
 only_beside <- function(models, confounded, candidates) {
   mechanism <- models[[length(models)]]$mechanism
@@ -193,7 +194,7 @@ only_beside <- function(models, confounded, candidates) {
   beside <- before[mapply(function(now, then) any(setdiff(now, then) %in% confounded), brought[-1],
                           brought[-length(brought)])]
   if (length(beside))
-    sprintf("it has evidence only beside %s, with which it trades off",
+    sprintf("it has evidence only together with %s, with which it is correlated",
             listed(vapply(beside, `[[`, "", "mechanism")))
 }
 

@@ -190,7 +190,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
     warn_input(c(paste("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do}",
                        "not vary over the calibration rows and {?is/are} left out of the",
                        "analysis."),
-                 i = "A condition that is constant cannot be told from the mean."))
+                 i = "A constant condition cannot be distinguished from the mean."))
     x <- x_keep(x, setdiff(x$names, constant))
   }
   noise <- noise_level(noise_sd, coarse, raw$y)

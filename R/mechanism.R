@@ -142,7 +142,7 @@ warn_absent_drivers <- function(catalogue, measurements) {
                        "{?is/are} not among the boundary conditions analysed",
                        "({.val {measurements$conditions}})."),
                  i = paste("{cli::qty(absent)}Name {?it/them} in {.arg boundary} of",
-                           "{.fun measurements}, so that the discrepancy can answer to",
+                           "{.fun measurements}, so that the discrepancy can respond to",
                            "{?it/them}.")))
   }
 }

@@ -208,8 +208,8 @@ print.amiss_free <- function(x, ...) {
   invisible(x)
 }
 
-# Labels that tell parameters apart: one that two share, or that is the name of another, has its own
-# name behind it.
+# Labels that distinguish parameters: one that two share, or that is the name of another, has its
+# own name behind it.
 distinct_labels <- function(parameters) {
   label <- vapply(parameters, `[[`, "", "label")
   name <- names(parameters)

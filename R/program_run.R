@@ -73,7 +73,7 @@ job_of <- function(filled, simulator, steps, key) {
        inputs = of_steps[length(steps) + seq_along(steps)])
 }
 
-# Tells the runs of a simulator from those of others in the same cache.
+# Distinguishes the runs of a simulator from those of others in the same cache.
 simulator_id <- function(simulator) {
   of <- simulator[c("templates", "files", "drivers", "version", "boundary", "lead_in", "before")]
   steps <- lapply(as_steps(simulator$command), what_counts)

@@ -19,7 +19,7 @@ hush <- function(quiet, frame = rlang::caller_env()) {
   if (quiet) rlang::local_options(amiss.progress = "none", .frame = frame)
 }
 
-# A function that tells what was found, with cli's markup, until `frame` ends.
+# A function that says what was found, with cli's markup, until `frame` ends.
 progress <- function(quiet, frame = rlang::caller_env()) {
   hush(quiet, frame)
   function(text, .envir = parent.frame()) {

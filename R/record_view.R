@@ -1,4 +1,4 @@
-# One of several records of an upgrade, as if it were the only one: what is told or drawn of it.
+# One of several records of an upgrade, as if it were the only one: what is said or drawn of it.
 
 record_model <- function(model, name) {
   model[c("fit", "attribution", "prediction", "scores")] <- list(

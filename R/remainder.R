@@ -27,8 +27,8 @@ worst_pattern <- function(model, measurements) {
   list(what = paste0("in ", worst, ": ", pattern$what), where = pattern$where)
 }
 
-# What it is and where to look, in words; NULL if the calendar explains less than half. What the
-# error `answers` to may be as slow as a drift.
+# What it is and where to look, in words; NULL if the calendar explains less than half. A
+# condition that the error responds to (`answers`) may be as slow as a drift.
 remainder_pattern <- function(r, rows, measurements, answers) {
   hours <- measurements$hours[rows]
   clock <- clock_hour(measurements$time[rows])
@@ -42,7 +42,7 @@ remainder_pattern <- function(r, rows, measurements, answers) {
       what = sprintf("it drifts, by %s from the beginning to the end of the calibration",
                      with_unit(signed(unname(diff(ends))), unit)),
       where = if (length(answers))
-                paste("It may be slow as", listed(answers), "may be, to which it answers.")
+                paste0("It may follow ", listed(answers), ", to which it responds.")
               else "Suspect a drifting sensor, or something slow that the inputs do not hold."))
   }
   profile <- tapply(r, clock, mean)

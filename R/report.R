@@ -142,7 +142,7 @@ template_parts <- function(x) {
   stats::setNames(parts, sub(mark, "\\1", text[starts]))
 }
 
-# What the chunks of a template see: the result, what is told of it, and the package's own
+# What the chunks of a template see: the result, what is said of it, and the package's own
 # functions.
 report_environment <- function(x) {
   list2env(c(list(result = x), report_content(x)), parent = environment(report))

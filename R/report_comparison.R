@@ -61,9 +61,9 @@ comparison_headline <- function(comparison) {
   if (best$log10_bf >= 2 && best$bf_lower95 > 0)
     return(sprintf("The record is decisively for %s among %d models%s.", best$model, nrow(table),
                    rough))
-  sprintf("%s leads among %d models, but not decisively: %s is %s.", best$model, nrow(table),
-          best$against, if (best$bf_lower95 <= 0) "not to be told from it"
-                        else paste("only", power_of_ten(best$log10_bf), "times less probable"))
+  sprintf("%s leads among %d models, but not decisively: %s %s.", best$model, nrow(table),
+          best$against, if (best$bf_lower95 <= 0) "cannot be distinguished from it"
+                        else paste("is only", power_of_ten(best$log10_bf), "times less probable"))
 }
 
 probability_sentences <- function(comparison) {
@@ -82,7 +82,7 @@ remains_sentences <- function(comparison) {
   table <- comparison$tables$attribution
   vapply(names(comparison$models), function(name) {
     driving <- table[table$model == name & table$significant, ]
-    sprintf("%s: the discrepancy answers to %s.", name,
+    sprintf("%s: the discrepancy responds to %s.", name,
             listed(driving$boundary, none = "no boundary condition"))
   }, "", USE.NAMES = FALSE)
 }

@@ -28,7 +28,7 @@ markdown_items <- function(x)
 
 markdown_paragraphs <- function(x) cat("\n", paste0(markdown_text(x), "\n\n"), sep = "")
 
-# The head of what is told of one mechanism.
+# The head of what is said of one mechanism.
 mechanism_head <- function(m) {
   verdict <- if (knitr::is_html_output()) paste0(" [", m$verdict, "]{.chip}")
              else paste0(": ", m$verdict)

@@ -1,4 +1,4 @@
-# What is missing described by what it answers to, where the simulator cannot be changed: the output
+# What is missing described by what it responds to, if the simulator cannot be changed: the output
 # plus a gain times the condition behind a first-order low-pass. Linear in its gain and added to the
 # output, it needs no run.
 
@@ -68,7 +68,7 @@ response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, t
   of <- measurements$target
   entry <- mechanism(
     name, function(model) with_response(model, response, measurements), boundary,
-    sprintf(paste("%s answers to %s in a way that the model lacks: described here by a gain and a",
+    sprintf(paste("%s responds to %s in a way that the model lacks: described here by a gain and a",
                   "time constant, and not explained."), of, boundary))
   entry$response <- response
   structure(entry, class = c("amiss_response_mechanism", class(entry)))
@@ -257,8 +257,8 @@ description_sentence <- function(entry, fit) {
                   "heat in a mass or water in a soil."), response$boundary)
   }
   gains <- paste(vapply(response$gains, number, ""), collapse = " and ")
-  sprintf(paste("This describes and does not explain: %s answers to %s with a gain of %s, smoothed",
-                "over a time constant of %s. %s"), m$target, response$boundary, gains,
+  sprintf(paste("This describes and does not explain: %s responds to %s with a gain of %s,",
+                "smoothed over a time constant of %s. %s"), m$target, response$boundary, gains,
           number(response$time_constant), shape)
 }
 

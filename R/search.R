@@ -75,8 +75,8 @@ look <- function(search, context) {
 # How far a model moves about its run of least squares: its slopes there for a unit of the normal
 # quantile of each parameter (Plumlee 2017), in the mean over what least squares leaves open, so
 # that neighbours on a ridge move alike. A parameter that is pressed against the end of a flat prior
-# moves little: what it cannot do any more, the discrepancy may. They hang on simulator and record
-# alone.
+# moves little: what it cannot do any more, the discrepancy may. They depend on simulator and
+# record alone.
 moves_of <- function(model, least) sweep(least$slopes, 2, normal_units(model, least), "*")
 
 normal_units <- function(model, least) {

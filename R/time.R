@@ -252,7 +252,7 @@ day_order <- function(stamps, name, call) {
   first <- which(given)[1]
   date <- paste(parts[first, c(1, 2, 3, 2, 4)], collapse = "")
   abort_input(c(paste("Time column {.val {name}}: whether the day or the month comes first in",
-                      "{.val {date}} (row {first}) cannot be told from the column."),
+                      "{.val {date}} (row {first}) cannot be decided from the column."),
                 i = paste("Say {.code time_format = \"dmy\"} (day first) or",
                           "{.code time_format = \"mdy\"}.")), call = call)
 }

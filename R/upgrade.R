@@ -150,7 +150,8 @@ upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
   }
   for (name in c("simulator", "measurements")) {
     check_input(if (rlang::is_bare_list(get(name))) TRUE else "it is no list", name,
-                "Of several records give named lists of both, one element for each record.",
+                paste("If there are several records, give named lists of both, one element for",
+                      "each record."),
                 call = call)
   }
   check_records(simulator, measurements, "simulator", check_model, least = 1, call = call)
@@ -160,8 +161,8 @@ upgrade_start <- function(simulator, measurements, call = rlang::caller_env()) {
   }
   given <- vapply(simulator, inherits, NA, "amiss_ensemble")
   if (any(given) && !all(given)) {
-    abort_input(c(paste("Of the records {.val {names[given]}} runs are given, of",
-                        "{.val {names[!given]}} simulators."),
+    abort_input(c(paste("Runs are given for {.val {names[given]}}, but simulators for",
+                        "{.val {names[!given]}}."),
                   i = "Give simulators of all records, or an {.fun ensemble} of each."),
                 call = call)
   }

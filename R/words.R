@@ -59,7 +59,7 @@ pretty_unit <- function(unit) {
 with_unit <- function(text, unit)
   ifelse(rep_len(nzchar(unit), length(text)), paste(text, pretty_unit(unit)), text)
 
-# Two ends of an interval, with as many digits as tell them apart.
+# Two ends of an interval, with as many digits as distinguish them.
 short_ends <- function(lower, upper, digits = 2) {
   for (more in digits + 0:3) {
     ends <- short(c(lower, upper), more)

@@ -1,5 +1,5 @@
 #!/usr/bin/env Rscript
-# Does the evidence hang on the basis or on the design?
+# Does the evidence depend on the basis or on the design?
 # Usage: Rscript bench/basis.R --out FILE [--threads N]
 #
 # log10 evidence of five models of the Twin Houses with 8, 10, 12 and 16 basis vectors, with the

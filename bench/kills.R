@@ -34,18 +34,22 @@ models <- list(
                   values[['offset']] + 0.4 * drivers[, 'Te']
                 }, free('offset', uniform(10, 30), 'K'), boundary = 'Te')",
   program = "program_simulator(c('awk', '-F', ',', '-v', 'OFMT=%.12g', '-v', 'offset={{offset}}',
-                                 'NR == 1 { for (i = 1; i <= NF; i++) { gsub(/\"/, \"\", $i); at[$i] = i }
+                                 'NR == 1 { for (i = 1; i <= NF; i++) {
+                                              gsub(/\"/, \"\", $i); at[$i] = i }
                                             print \"Ti\" }
                                   NR > 1 { print offset + 0.4 * $at[\"Te\"] }', 'drivers.csv'),
-                               free('offset', uniform(10, 30), 'K'), boundary = 'Te', cache = 'runs',
-                               output = c(file = 'stdout.txt', column = 'Ti'))")
+                               free('offset', uniform(10, 30), 'K'), boundary = 'Te',
+                               cache = 'runs', output = c(file = 'stdout.txt', column = 'Ti'))")
 
 # The sun is added to the runs of either.
 suns <- list(
   r_function = "with_parameters(model, free('sun', uniform(0, 0.01)), boundary = 'Gv',
-                  f = function(values, drivers, base) base(values) + values[['sun']] * drivers[, 'Gv'])",
-  program = "program_simulator(c('awk', '-F', ',', '-v', 'OFMT=%.12g', '-v', 'offset={{offset}}', '-v', 'sun={{sun}}',
-                                 'NR == 1 { for (i = 1; i <= NF; i++) { gsub(/\"/, \"\", $i); at[$i] = i }
+                  f = function(values, drivers, base)
+                    base(values) + values[['sun']] * drivers[, 'Gv'])",
+  program = "program_simulator(c('awk', '-F', ',', '-v', 'OFMT=%.12g', '-v', 'offset={{offset}}',
+                                 '-v', 'sun={{sun}}',
+                                 'NR == 1 { for (i = 1; i <= NF; i++) {
+                                              gsub(/\"/, \"\", $i); at[$i] = i }
                                             print \"Ti\" }
                                   NR > 1 { print offset + 0.4 * $at[\"Te\"] + sun * $at[\"Gv\"] }',
                                  'drivers.csv'),

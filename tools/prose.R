@@ -1,9 +1,11 @@
-# How hard the texts are to read, and whether they keep to plain English: README, ARCHITECTURE, the newest section of
-# NEWS, vignettes, help pages, and the sentences in the code. Prints a row for each text that is over a limit; with --all
-# a row for each text; with --worst N the N longest sentences of each. Fails if a text is over a limit.
+# How hard the texts are to read, and whether they keep to plain English: README, ARCHITECTURE, the
+# newest section of NEWS, vignettes, help pages, and the sentences in the code. Prints a row for
+# each text that is over a limit; with --all a row for each text; with --worst N the N longest
+# sentences of each. Fails if a text is over a limit.
 # Usage: Rscript tools/prose.R [--all] [--worst N]
 limits <- c(mean = 18, longest = 45)  # words a sentence; the mean of texts of ten sentences or more
-avoided <- c("^Of ", "\\bhangs? on\\b", "\\banswers? to\\b", "\\btold\\b", "\\btrades? off\\b", "\\bin full\\b")
+avoided <- c("^Of ", "\\bhangs? on\\b", "\\banswers? to\\b", "\\btold\\b", "\\btrades? off\\b",
+             "\\bin full\\b")
 
 main <- function(args) {
   at <- match("--worst", args)
@@ -23,8 +25,8 @@ measure <- function(name, paragraphs) {
   sentences <- sentences_of(paragraphs)
   words <- lengths(strsplit(sentences, " +"))
   found <- vapply(avoided, function(pattern) sum(grepl(pattern, sentences)), 0L)
-  data.frame(text = name, sentences = length(sentences), mean = mean(words), longest = max(words, 0L),
-             over_30 = mean(words > 30), avoided = sum(found))
+  data.frame(text = name, sentences = length(sentences), mean = mean(words),
+             longest = max(words, 0L), over_30 = mean(words > 30), avoided = sum(found))
 }
 
 say_worst <- function(name, paragraphs, worst) {
@@ -45,7 +47,8 @@ sentences_of <- function(paragraphs) {
 }
 
 markdown_texts <- function() {
-  files <- c("README.md", "ARCHITECTURE.md", "NEWS.md", list.files("vignettes", "[.]Rmd$", full.names = TRUE))
+  files <- c("README.md", "ARCHITECTURE.md", "NEWS.md",
+             list.files("vignettes", "[.]Rmd$", full.names = TRUE))
   stats::setNames(lapply(files, markdown_paragraphs), files)
 }
 
@@ -72,24 +75,29 @@ markdown_paragraphs <- function(file) {
 
 help_texts <- function() {
   files <- list.files("man", "[.]Rd$", full.names = TRUE)
-  stats::setNames(lapply(files, function(file) strsplit(rd_text(tools::parse_Rd(file)), "\\s*\n\\s*\n\\s*")[[1]]), files)
+  paragraphs <- function(file)
+    strsplit(rd_text(tools::parse_Rd(file)), "\\s*\n\\s*\n\\s*")[[1]]
+  stats::setNames(lapply(files, paragraphs), files)
 }
 
 # The prose of a help page: code is one word, an item or an argument a paragraph.
 rd_text <- function(node) {
   tag <- attr(node, "Rd_tag")
   if (is.null(tag)) tag <- ""
-  dropped <- c("\\usage", "\\examples", "\\tabular", "\\name", "\\alias", "\\title", "\\keyword", "\\preformatted",
-               "\\eqn", "\\deqn", "COMMENT", "USERMACRO", "\\figure", "\\docType", "\\concept")
+  dropped <- c("\\usage", "\\examples", "\\tabular", "\\name", "\\alias", "\\title", "\\keyword",
+               "\\preformatted", "\\eqn", "\\deqn", "COMMENT", "USERMACRO", "\\figure", "\\docType",
+               "\\concept")
   if (tag %in% dropped) return(if (tag == "\\eqn") "x" else "")
   if (tag == "\\code") return("CODE")
-  if (tag == "\\item" && length(node) == 2) return(paste0("\n\n", rd_text(node[[2]]), "\n\n"))
+  apart <- function(text) paste0("\n\n", text, "\n\n")
+  if (tag == "\\item" && length(node) == 2) return(apart(rd_text(node[[2]])))
   if (tag == "\\item") return("\n\n")
-  if (tag == "\\section" || tag == "\\subsection") return(paste0("\n\n", rd_text(node[[2]]), "\n\n"))
+  if (tag == "\\section" || tag == "\\subsection") return(apart(rd_text(node[[2]])))
   if (tag == "\\href") return(rd_text(node[[2]]))
   if (!is.list(node)) return(paste(as.character(node), collapse = ""))
   inner <- paste(vapply(node, rd_text, ""), collapse = "")
-  if (tag %in% c("\\link", "\\emph", "\\strong", "\\pkg", "\\dQuote", "LIST", "")) inner else paste0("\n\n", inner, "\n\n")
+  within <- c("\\link", "\\emph", "\\strong", "\\pkg", "\\dQuote", "LIST", "")
+  if (tag %in% within) inner else apart(inner)
 }
 
 # Strings of the code that are sentences: five words or more, with what is filled in as one word.
@@ -97,7 +105,8 @@ code_texts <- function() {
   files <- setdiff(list.files("R", "[.]R$", full.names = TRUE), "R/RcppExports.R")
   found <- lapply(files, function(file) {
     tokens <- utils::getParseData(parse(file, keep.source = TRUE, encoding = "UTF-8"))
-    strings <- vapply(tokens$text[tokens$token == "STR_CONST"], function(x) eval(parse(text = x)), "")
+    strings <- vapply(tokens$text[tokens$token == "STR_CONST"],
+                      function(x) eval(parse(text = x)), "")
     strings <- gsub("\\{[.a-z]+ [^{}]*(\\{[^{}]*\\})?[^{}]*\\}|\\{[^{}]*\\}", "CODE", strings)
     strings <- strings[lengths(strsplit(trimws(strings), "\\s+")) >= 5]
     unlist(strsplit(unname(strings), "\n"))

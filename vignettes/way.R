@@ -5,7 +5,7 @@ boxes <- data.frame(
   x = c(1, 1, 2, 3, 4, 4, 3, 2, 1), y = c(3, 2, 2, 2, 2, 1, 1, 1, 1),
   what = c("measurements", "simulator", "runs", "emulator", "calibration", "attribution", "mechanisms", "upgrade", "report"),
   how = c("what was measured", "what should\nreproduce it", "the simulator at\nmany parameters", "a fast stand-in\nfor the simulator",
-          "parameters, error,\ndiscrepancy, evidence", "what the error\nanswers to", "what could be missing,\ntried one by one",
+          "parameters, error,\ndiscrepancy, evidence", "what the error\nresponds to", "what could be missing,\ntried one by one",
           "the model that\nthe evidence supports", "cause, gain,\nwhat remains"))
 arrows <- data.frame(
   x = c(1.42, 2.42, 3.42, 4, 3.58, 2.58, 1.58), y = c(2, 2, 2, 1.68, 1, 1, 1),

@@ -100,7 +100,7 @@ attributed_condition <- function(upgrade) {
 }
 
 # What the tool tells: the condition of the cause it names or, where it names none, the one that the
-# discrepancy answers to.
+# discrepancy responds to.
 told_condition <- function(upgrade, attributed) {
   of_cause <- upgrade$named_cause$boundary
   if (is.null(of_cause) || attributed %in% of_cause) attributed else of_cause[1]

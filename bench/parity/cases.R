@@ -2,7 +2,7 @@
 # they may differ on another machine or after a change that means to change nothing.
 #
 # exact closed computations: nothing but rounding, 1e-8 of their size searched ends of a numerical
-#   search (an emulator's hyper-parameters) and what hangs on them: the search stops where the
+#   search (an emulator's hyper-parameters) and what depends on them: the search stops where the
 #   density gains less than 1e-6 of itself, which moves predictions by some 1e-4 of their spread
 #   sampled by random chains, which part at the first rounding that differs: four standard errors,
 #   given beside them

@@ -1,6 +1,6 @@
 # The history model: its likelihood does not depend on the length of the record.
 
-# Ten microseconds are told apart by the least of five runs.
+# Ten microseconds are distinguished by the least of five runs.
 r <- micro("micro_history")
 again <- replicate(5, {
   once <- micro("micro_history", "likelihood")

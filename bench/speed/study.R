@@ -44,9 +44,9 @@ scaled("history attribution of O5", elapsed(attribute_discrepancy(fit, seed = 1)
 house <- function(name) {
   code <- sprintf('suppressPackageStartupMessages(library(amiss))
     study <- read_study(system.file("studies", "twinhouse_%s.yml", package = "amiss"))
-    seconds <- system.time(upgrade_model(study$model, study$measurements, study$catalogue, runs = study$runs,
-                                         control = study$control, seed = study$seed, threads = 2,
-                                         quiet = TRUE))[["elapsed"]]
+    seconds <- system.time(upgrade_model(study$model, study$measurements, study$catalogue,
+                                         runs = study$runs, control = study$control,
+                                         seed = study$seed, threads = 2, quiet = TRUE))[["elapsed"]]
     peak <- grep("VmHWM", readLines("/proc/self/status"), value = TRUE)
     cat(seconds, as.numeric(gsub("[^0-9]", "", peak)) / 1024)', name)
   out <- system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)), stdout = TRUE)

@@ -11,13 +11,16 @@ write_study_file <- function(folder, ..., drop = character()) {
   data <- linear_data()
   data$Ti <- data$Ti + 0.002 * data$Gv
   utils::write.csv(data, file.path(folder, "data.csv"), row.names = FALSE)
-  writeLines('function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
-    free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te", name = "linear")',
+  writeLines('function_simulator(
+    function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
+    free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), boundary = "Te",
+    name = "linear")',
              file.path(folder, "model.R"))
-  writeLines('catalogue(mechanism("sun", boundary = "Gv", sentence = "The sun shines in.", edit = function(model)
-    function_simulator(function(values, drivers) {
+  writeLines('catalogue(mechanism("sun", boundary = "Gv", sentence = "The sun shines in.",
+    edit = function(model) function_simulator(function(values, drivers) {
       values[["offset"]] + values[["gain"]] * drivers[, "Te"] + values[["sun"]] * drivers[, "Gv"]
-    }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)), free("sun", uniform(0, 0.01), "K/(W/m2)"),
+    }, free("offset", uniform(10, 30), "K"), free("gain", uniform(0, 1)),
+      free("sun", uniform(0, 0.01), "K/(W/m2)"),
       boundary = c("Te", "Gv"))))',
              file.path(folder, "catalogue.R"))
   path <- file.path(folder, "study.yml")
@@ -30,8 +33,9 @@ write_comparison_study <- function(folder, ...) {
     list(level = function_simulator(function(values, drivers) {
            values[["offset"]] + 0 * drivers[, "Te"] + 0.4 * values[["a"]] * drivers[, "Gv"]
          }, offset, free("a", uniform(0, 0.01)), boundary = c("Te", "Gv")),
-         line = function_simulator(function(values, drivers) values[["offset"]] + values[["gain"]] * drivers[, "Te"],
-                                   offset, free("gain", uniform(0, 1)), boundary = "Te"))',
+         line = function_simulator(function(values, drivers) {
+           values[["offset"]] + values[["gain"]] * drivers[, "Te"]
+         }, offset, free("gain", uniform(0, 1)), boundary = "Te"))',
              file.path(folder, "models.R"))
   writeLines('source("values.R", local = TRUE)$value', file.path(folder, "made.R"))
   writeLines(

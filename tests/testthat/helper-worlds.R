@@ -73,7 +73,7 @@ twinhouse_study <- function(house)
 # What print() says, in one line.
 printed <- function(x) gsub("\\s+", " ", paste(utils::capture.output(print(x)), collapse = " "))
 
-# A world that bends: lag and strength hang on one parameter, the sun on another. Three vectors
+# A world that bends: lag and strength depend on one parameter, the sun on another. Three vectors
 # leave out a sixth of the noise.
 bent_simulator <- function(f = bent_run) {
   function_simulator(f, free("a", uniform(0, 1)), free("b", uniform(0, 2)),

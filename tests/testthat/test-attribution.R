@@ -1,4 +1,4 @@
-# A record that answers to `driver`, among fifteen conditions of which all but Te and Gv are named
+# A record that responds to `driver`, among fifteen conditions of which all but Te and Gv are named
 # X.
 fifteen <- function(strength) withr::with_seed(4, {
   data <- linear_data()
@@ -11,7 +11,7 @@ fifteen <- function(strength) withr::with_seed(4, {
   linear_measurements(data, boundary = setdiff(names(data), c("hour", "Ti")))
 })
 
-# A record that answers to Tn, and Tc, which is correlated with it.
+# A record that responds to Tn, and Tc, which is correlated with it.
 twins <- function(r, strength) withr::with_seed(6, {
   data <- linear_data()
   walk <- function() as.numeric(stats::filter(rnorm(240), 0.9, "recursive"))
@@ -47,7 +47,7 @@ test_that("one true condition among fifteen is found, and it alone", {
   expect_setequal(found$table$boundary, fifteen(0.1)$conditions)
 })
 
-test_that("among fifteen conditions none answers where nothing is hidden", {
+test_that("among fifteen conditions none is significant if nothing is hidden", {
   none <- attribute_discrepancy(linear_fit(fifteen(0)), list(surrogates = 99), seed = 1)
   expect_length(significant_conditions(none$table), 0)
 })
@@ -69,15 +69,15 @@ test_that("a copy of the true driver does not hide it: both are named as one", {
   expect_equal(found$table$log10_bf_dropped[members], rep(group$log10_bf_dropped, 2))
   expect_match(printed(found), "driven by Tn or Tc")
   expect_match(printed(found),
-               paste("Tn and Tc cannot be told apart in this record .correlation 1.000.: measure",
-                     "while the two differ"))
+               paste("Tn and Tc cannot be distinguished in this record .correlation 1.000.:",
+                     "measure while the two differ"))
 })
 
-test_that("nearly a copy is named with the driver, and what differs enough is told apart", {
+test_that("nearly a copy is named with the driver, and what differs enough is distinguished", {
   near <- attribute_discrepancy(linear_fit(twins(0.999, 0.1)), list(surrogates = 99), seed = 1)
   expect_identical(significant_conditions(near$table), "Tn or Tc")
   expect_match(amiss:::group_words(near), "correlation 0.999", fixed = TRUE)
-  # At 0.95 the record may tell them apart; if it does, the true one is named. "Nothing" is wrong in
+  # At 0.95 the record may distinguish them; if so, the true one is named. "Nothing" is wrong in
   # either case.
   for (strength in c(0.02, 0.1)) {
     apart <- attribute_discrepancy(linear_fit(twins(0.95, strength)), list(surrogates = 99),

@@ -18,7 +18,7 @@ test_that("calibration finds the parameters and says so", {
 # Of each fit, in decades.
 decades <- function(fits, of) vapply(fits, of, 0) / log(10)
 
-test_that("the evidence does not hang on the number of basis vectors", {
+test_that("the evidence does not depend on the number of basis vectors", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, runs = 40, seed = 2)
   fits <- lapply(c(3, 4, 6, 8), function(q) {

@@ -105,7 +105,7 @@ test_that("a disagreement between criteria and evidence is told", {
   x$tables$ranking$bic <- c(3, 1, 2)
   expect_match(disagreement_sentences(x)[1], "AIC would choose blind; the evidence chooses sunny")
   expect_match(disagreement_sentences(x)[2],
-               "Of 3 pairs of models, AIC puts 1 and BIC puts 1 in another order")
+               "AIC puts 1 and BIC puts 1 of 3 pairs of models in another order")
   x$tables$criteria$lr_p_value[2] <- 0.3
   expect_match(disagreement_sentences(x)[3], "does not prefer sunny to blind")
 })
@@ -215,6 +215,6 @@ test_that("what remains of each model is told with the conditions in a list", {
     table <- data.frame(model = "blind", boundary = c("Te", "Gv"), significant = c(...))
     amiss:::remains_sentences(list(models = list(blind = NULL), tables = list(attribution = table)))
   }
-  expect_identical(told(TRUE, TRUE), "blind: the discrepancy answers to Te and Gv.")
-  expect_identical(told(FALSE, FALSE), "blind: the discrepancy answers to no boundary condition.")
+  expect_identical(told(TRUE, TRUE), "blind: the discrepancy responds to Te and Gv.")
+  expect_identical(told(FALSE, FALSE), "blind: the discrepancy responds to no boundary condition.")
 })

@@ -21,7 +21,7 @@ test_that("what to inspect next names the value that the mechanism asks for", {
   expect_identical(summary(untied())$mechanisms[[1]]$inspect, told[1])
 })
 
-test_that("rivals are told apart by what only one of them answers to, or on site", {
+test_that("rivals are distinguished by what only one of them responds to, or on site", {
   upgrade <- untied()
   upgrade$candidates$probability <- c(0.7, 0.3)
   m <- upgrade$measurements
@@ -29,22 +29,23 @@ test_that("rivals are told apart by what only one of them answers to, or on site
   r <- cor(m$boundary[used, m$condition == 1], m$boundary[used, m$condition == 2])
   told <- about(inspected(upgrade), "rival")
   expect_match(told,
-               "tell sun from drift, measure while Gv changes while Te does not, or vice versa")
+               paste("distinguish sun from drift, measure while Gv changes while Te does not,",
+                     "or vice versa"))
   expect_match(told, sprintf("correlation of Gv and Te is %.2f", r))
   m$boundary[used, m$condition == 2] <- rnorm(sum(used))
   expect_identical(amiss:::correlation_words(m, "Gv", "Te"), "")
   expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- character()
   expect_match(about(inspected(upgrade), "rival"),
-               "Since sun and drift answer to no condition that was measured")
+               "Because sun and drift respond to no condition that was measured")
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- "Gv"
   expect_match(about(inspected(upgrade), "rival"),
-               paste("only a look on site tells them apart: the one asks for a",
+               paste("only a look on site distinguishes them: the first asks for a",
                      "sun_gain of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
   expect_match(about(inspected(upgrade), "rival"),
-               paste("What sun brings \\(gain of the sun\\) trades off against",
-                     "gain: with that measured"), all = FALSE)
+               paste("The estimate of sun \\(gain of the sun\\) is correlated with gain:",
+                     "measuring that would narrow it"), all = FALSE)
 })
 
 test_that("a stand-in and a drifting sensor have tests of their own", {
@@ -55,7 +56,7 @@ test_that("a stand-in and a drifting sensor have tests of their own", {
   upgrade$models[[2]]$doubts <- c(slow = "anything that changes slowly would explain the error too")
   expect_match(about(inspected(upgrade), "drift"), "whether the sensor changes or what it measures")
   upgrade$models[[2]]$doubts <- c(drift = "a drifting sensor would explain the error as well")
-  expect_match(about(inspected(upgrade), "drift"), "sensor of Ti beside a second one")
+  expect_match(about(inspected(upgrade), "drift"), "sensor of Ti with a second one")
 })
 
 test_that("a time of about a step asks for finer steps of the simulator", {
@@ -91,17 +92,19 @@ test_that("conditions that go together, answers without a mechanism and absent d
     about(inspected(upgrade), "answer")
   }
   expect_match(answers(-1, 0.9),
-               "answers to Gv\\. Of the mechanisms that it drives, sun was tried but not adopted",
+               paste("responds to Gv\\. Among the mechanisms that it drives, sun was tried but not",
+                     "adopted"),
                all = FALSE)
   expect_match(answers(-1, 0.7),
                paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against.",
-                     "does not tell that from an unknown response to Gv: look for a sun_gain"),
+                     "does not distinguish that from an unknown response to Gv: look for a",
+                     "sun_gain"),
                all = FALSE)
-  expect_match(answers(1, 0.7), "answers to Gv: sun may be why, and is not decided", all = FALSE)
+  expect_match(answers(1, 0.7), "responds to Gv: sun may be why, and is not decided", all = FALSE)
   plain <- upgrade$catalogue
   upgrade$catalogue$sun$boundary <- c("Te", "Gv")
   expect_match(answers(1, 0.7),
-               "answers to Te and Gv: sun may be why, and is not decided|to Gv and Te: sun may be",
+               "responds to Te and Gv: sun may be why, and is not decided|to Gv and Te: sun may be",
                all = FALSE)
   expect_length(answers(1, 0.7), 1)
   upgrade$catalogue <- plain
@@ -121,7 +124,7 @@ test_that("a candidate that is near is named with what would decide it", {
   upgrade$candidates$log10_bf <- c(1, -1)
   upgrade$candidates$probability <- c(0.8, 0.01)
   expect_match(about(inspected(upgrade), "nearest"),
-               paste("Not decided is sun \\(odds of 10 to 1 in favour; with it",
+               paste("sun remains undecided \\(odds of 10 to 1 in favour; with it",
                      "the error falls to 8.*Gv changes strongly"))
   upgrade$catalogue$sun$boundary <- character()
   upgrade$candidates$error_ratio <- 0.9
@@ -140,10 +143,10 @@ test_that("a trial is near as well, and one that no runs were left to verify ask
   upgrade$candidates <- upgrade$candidates[sun, ]
   upgrade$candidates[c("judged_by", "log10_bf", "lower95", "upper95")] <- list("trial", 1, 0.4, 1.6)
   expect_match(about(inspected(upgrade), "nearest"),
-               "Not decided is sun \\(odds of 10 to 1 in favour")
+               "sun remains undecided \\(odds of 10 to 1 in favour")
   upgrade$candidates[c("log10_bf", "lower95", "upper95")] <- list(3, 2.4, 3.6)
   expect_match(about(inspected(upgrade), "nearest"),
-               "Not verified is sun \\(odds of 1,000 to 1.*runs_total")
+               "sun was not verified \\(odds of 1,000 to 1.*runs_total")
   expect_match(summary(upgrade)$sure, "no runs were left to verify it", all = FALSE)
   expect_match(plot(upgrade, "candidates")$labels$title, "no runs were left to verify the best")
 })
@@ -154,17 +157,19 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
   upgrade$candidates[rough, c("log10_bf", "lower95", "upper95")] <- list(-3.5, -5.9, 3)
   upgrade$candidates[rough, c("judged_by", "trusted")] <- list("trial", FALSE)
   expect_match(about(inspected(upgrade), "undecided"),
-               "Not ruled out is drift.*3,200 to 1 against.*in favour")
+               "drift is not ruled out: .*3,200 to 1 against.*in favour")
   upgrade$candidates$upper95[rough] <- 54
-  expect_match(about(inspected(upgrade), "undecided"), "drift: its numbers are too rough for odds")
+  expect_match(about(inspected(upgrade), "undecided"),
+               "drift is not ruled out: its numbers are too rough for odds")
   expect_length(about(inspected(upgrade), "nothing"), 0)
-  expect_match(paste(summary(upgrade)$sure, collapse = " "), "Not so those of drift")
+  expect_match(paste(summary(upgrade)$sure, collapse = " "),
+               "numbers behind drift, which was not adopted, are not trusted")
   upgrade$candidates$trusted[rough] <- TRUE
   expect_length(about(inspected(upgrade), "undecided"), 0)
   upgrade$candidates$trusted[rough] <- FALSE
   upgrade$candidates$upper95[rough] <- 1.9
   expect_length(about(inspected(upgrade), "undecided"), 0)
-  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "those of drift")
+  expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "numbers behind drift")
   # Beside what was adopted only where it could be better.
   adopted <- small_upgrade()
   upper <- adopted$candidates$log10_bf[adopted$candidates$mechanism == "sun"][1]
@@ -224,7 +229,7 @@ test_that("edges of the prior are told with the end and its value", {
   fit$values[, "gain"] <- 1.9999
   fit$posterior$unit[, match("gain", colnames(fit$values))] <- 0.99995
   expect_match(edge_inspections(fit),
-               paste("At the upper end of its prior \\(2.0\\) lies gain: measure it, .* if",
+               paste("gain lies at the upper end of its prior \\(2.0\\): measure it, .* if",
                      "more is possible"))
 })
 
@@ -244,10 +249,10 @@ test_that("a calibration tells what it does not know", {
   expect_match(about(told, "cause"), "attribute_discrepancy")
   fit$values[, "gain"] <- (fit$values[, "offset"] - 10) / 40
   expect_match(about(calibration_inspections(fit), "tied"),
-               "offset and gain trade off .*correlation 1.00")
+               "offset and gain are correlated .1.00.")
 })
 
-test_that("models that are not told apart are so where their simulations differ most", {
+test_that("models that are not distinguished are so where their simulations differ most", {
   data <- linear_data(90)
   m <- linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60)
   steep <- function_simulator(function(values, drivers) 20 + values[["gain"]] * drivers[, "Te"],

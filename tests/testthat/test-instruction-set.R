@@ -10,17 +10,21 @@ evidence_with <- function(simd) {
                                  free("gain", uniform(0, 1)), boundary = "Te")
     runs <- simulate_design(linear, house, runs = 12, seed = 1)
     emulator <- train_emulator(runs, house)
-    fit <- calibrate(emulator, house, seed = 1, control = list(ais = list(pilot_chains = 48, groups = 4)))
+    fit <- calibrate(emulator, house, seed = 1,
+                     control = list(ais = list(pilot_chains = 48, groups = 4)))
     emulated <- stats::predict(emulator, cbind(gain = 0.37))$mean[40, 1]
     points <- list(setting = 5L, variance = 0.02, t = matrix(c(0, 0.3), 1))
     record <- amiss:::history_data(emulator, house, fit$rows, fit$control)
-    likelihood <- amiss:::run_likelihood_(record, fit$priors, points, runs$outputs[, 3, drop = FALSE],
+    likelihood <- amiss:::run_likelihood_(record, fit$priors, points,
+                                          runs$outputs[, 3, drop = FALSE],
                                           list(seed = 1, threads = 1))
-    middle <- vapply(zone_parameters(paper_box("M3")), function(p) (p$prior$lower + p$prior$upper) / 2, 0)
+    middle <- vapply(zone_parameters(paper_box("M3")),
+                     function(p) (p$prior$lower + p$prior$upper) / 2, 0)
     weather <- synthetic_weather(days = 2, step_h = 0.5, seed = 1)[c("Te", "Gv", "Ws", "Wd")]
-    box <- simulate_zone(paper_box("M3"), t(middle), as.matrix(transform(weather, RHP = 50)), step_s = 1800)
-    cat(amiss:::instruction_set(), format(c(box[96, 1], emulated, likelihood, fit$log_evidence, fit$standard_error,
-                                            coef(fit)), digits = 15))'
+    box <- simulate_zone(paper_box("M3"), t(middle), as.matrix(transform(weather, RHP = 50)),
+                         step_s = 1800)
+    numbers <- c(box[96, 1], emulated, likelihood, fit$log_evidence, fit$standard_error, coef(fit))
+    cat(amiss:::instruction_set(), format(numbers, digits = 15))'
   out <- system2(file.path(R.home("bin"), "Rscript"), c("-e", shQuote(code)), stdout = TRUE,
                  env = c(paste0("AMISS_SIMD=", simd),
                          paste0("R_LIBS=", paste(.libPaths(), collapse = ":"))))

@@ -249,17 +249,20 @@ write_rooms_study <- function(folder, records = NULL, drop = character(), ...) {
                      file.path(folder, paste0(name, ".csv")), row.names = FALSE)
   }
   writeLines('room <- function(base) {
-    function_simulator(function(values, drivers) values[[base]] + values[["gain"]] * drivers[, "Te"],
-                       free("gain", uniform(0, 1)), free(base, uniform(15, 25), "K"), boundary = "Te")
+    function_simulator(
+      function(values, drivers) values[[base]] + values[["gain"]] * drivers[, "Te"],
+      free("gain", uniform(0, 1)), free(base, uniform(15, 25), "K"), boundary = "Te")
   }
   list(a = room("base a"), b = room("base b"))', file.path(folder, "models.R"))
   writeLines('function(measurements) function_simulator(
     function(values, drivers) values[["own"]] + values[["gain"]] * drivers[, "Te"],
-    free("gain", uniform(0, 1)), free("own", uniform(15, 25)), boundary = "Te", name = measurements$name)',
+    free("gain", uniform(0, 1)), free("own", uniform(15, 25)), boundary = "Te",
+    name = measurements$name)',
              file.path(folder, "own.R"))
   writeLines('catalogue(mechanism("sun", function(model, record) {
     with_parameters(model, free("sun", uniform(0, 0.05), "K m2/W"), boundary = "Gv",
-                    f = function(values, drivers, base) base(values) + values[["sun"]] * drivers[, "Gv"])
+                    f = function(values, drivers, base)
+                      base(values) + values[["sun"]] * drivers[, "Gv"])
   }, "Gv", "Sun enters both rooms."))', file.path(folder, "catalogue.R"))
   fields <- list(study = "two rooms", time = "hour", target = "warmth", boundary = list("Te", "Gv"),
                  unit = "K", calibrate = "hour <= 168", validate = "hour > 168", model = "models.R",

@@ -111,7 +111,7 @@ test_that("conditions that no record tells apart are named together", {
   members <- together$table[together$table$boundary %in% c("Gv", "copy"), ]
   expect_true(all(members$significant))
   expect_equal(unique(members$group), "Gv or copy")
-  expect_output(print(together), "cannot be told apart")
+  expect_output(print(together), "cannot be distinguished")
   expect_setequal(amiss:::significant_conditions(together$table), "Gv or copy")
 })
 

@@ -73,16 +73,16 @@ test_that("each doubt makes a mechanism likely", {
   })
 })
 
-test_that(paste("a condition that nobody gave a mechanism for, and that the record cannot tell",
-                "apart, is a doubt"), {
+test_that(paste("a condition that nobody gave a mechanism for, and that the record cannot",
+                "distinguish from another, is a doubt"), {
   twin <- function(u, significant = TRUE) {
     u$models[[1]]$attribution$groups <- list(list(conditions = c("Gs", "Gv"),
                                                   significant = significant))
     u
   }
-  expect_doubt("answers to Gs as well, which this record cannot tell from Gv", twin)
+  expect_doubt("responds to Gs as well, which this record cannot distinguish from Gv", twin)
   expect_length(judged(function(u) twin(u, significant = FALSE))$doubts, 0)
-  # If a mechanism of the catalogue is driven by it, the evidence tells the two apart.
+  # If a mechanism of the catalogue is driven by it, the evidence distinguishes the two.
   expect_length(judged(function(u) {
     u$catalogue$drift$boundary <- "Gs"
     twin(u)
@@ -102,7 +102,7 @@ test_that("so it is of a second sensor of the sun, not of one that is coarse", {
                              control = small_upgrade()$control)
     upgrade$models[[2]]$doubts
   }
-  expect_match(doubts_of(0.5), "answers to Gs as well")
+  expect_match(doubts_of(0.5), "responds to Gs as well")
   expect_length(doubts_of(40), 0)
 })
 
@@ -240,7 +240,7 @@ test_that("what drives a mechanism is still answered to with more than half of i
   expect_true(still(model(10), model(6)))
   expect_false(still(model(10), model(4)))
   expect_false(still(model(10), model(6, FALSE)))
-  expect_false(still(model(10, FALSE), model(6)))  # it did not answer before
+  expect_false(still(model(10, FALSE), model(6)))  # no response before
   expect_true(amiss:::still_answers(model(10), model(1), c("Gv", "Te")))
 })
 
@@ -347,16 +347,17 @@ test_that(
   told <- summary(open)
   expect_identical(told$verdict, "unexplained")
   expect_match(told$headline,
-               "answers to Gv. Whether something is missing .* were not found cannot be told")
+               paste("responds to Gv. The model's emulator is not good enough to decide whether",
+                     ".* not found"))
   expect_match(told$tag, "not good enough")
   expect_no_match(paste(c(told$sure, told$inspect), collapse = " "),
-                  "missing is plain|Not decided is")
+                  "missing is plain|remains undecided")
   stand_in(remaining_error = function(...) list(ratio = 3, large = TRUE, pattern = NULL))
   expect_match(summary(open)$remains,
                "noise is too small, or something else is missing, or the parameters were not",
                all = FALSE)
   sure <- paste(told$sure, collapse = " ")
-  expect_no_match(sure, "odds of|of the probability")
+  expect_no_match(sure, "odds of|most probable")
   expect_match(
     sure,
     "No odds can be given for or against any mechanism: the emulator's error is 0.64 of the noise")
@@ -379,7 +380,7 @@ test_that("where the catalogue was empty, no mechanism of it is said to have fai
                "Gv is missing from the model, but no mechanism was tried")
 })
 
-test_that("what has evidence only beside what it trades off with is likely at most", {
+test_that("what has evidence only with what it is correlated with is likely at most", {
   model <- function(name, mechanism, parameters) {
     list(name = name, mechanism = mechanism,
          fit = list(values = matrix(0, 1, length(parameters), dimnames = list(NULL, parameters)),
@@ -393,7 +394,7 @@ test_that("what has evidence only beside what it trades off with is likely at mo
   told <- function(alone = -1, confounded = c("C", "of_a"), steps = 3) {
     amiss:::only_beside(models[seq_len(steps)], confounded, candidates(alone))
   }
-  expect_identical(told(), "it has evidence only beside a, with which it trades off")
+  expect_identical(told(), "it has evidence only together with a, with which it is correlated")
   expect_null(told(alone = 1))
   expect_null(told(confounded = "C"))
   expect_null(told(steps = 2))

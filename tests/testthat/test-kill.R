@@ -13,9 +13,11 @@ kill_study <- function(folder) {
                 values[['offset']] + 0.4 * drivers[, 'Te']
               }, free('offset', uniform(10, 30), 'K'), boundary = 'Te', name = 'linear')",
              file.path(folder, "model.R"))
-  writeLines("catalogue(mechanism('sun', boundary = 'Gv', sentence = 'The sun shines in.', edit = function(model)
-                with_parameters(model, free('sun', uniform(0, 0.01)), boundary = 'Gv',
-                  f = function(values, drivers, base) base(values) + values[['sun']] * drivers[, 'Gv'])))",
+  writeLines("catalogue(mechanism('sun', boundary = 'Gv', sentence = 'The sun shines in.',
+                edit = function(model)
+                  with_parameters(model, free('sun', uniform(0, 0.01)), boundary = 'Gv',
+                    f = function(values, drivers, base)
+                      base(values) + values[['sun']] * drivers[, 'Gv'])))",
              file.path(folder, "catalogue.R"))
   path <- file.path(folder, "study.yml")
   yaml::write_yaml(list(study = "killed", data = "data.csv", time = "hour", target = "Ti",
@@ -107,8 +109,9 @@ test_that("a study killed at any moment goes on to the result of one that was le
 # session is as before.
 interrupted_session <- "
   out <- commandArgs(TRUE)[2]
-  state <- function() list(getwd(), options('warn', 'digits', 'OutDec', 'amiss.allow_large'), RNGkind(), sink.number(),
-                           sink.number('message'), grDevices::dev.list(), nrow(showConnections()), search())
+  state <- function() list(getwd(), options('warn', 'digits', 'OutDec', 'amiss.allow_large'),
+                           RNGkind(), sink.number(), sink.number('message'),
+                           grDevices::dev.list(), nrow(showConnections()), search())
   invisible(loadNamespace('amiss'))
   repeat {
     before <- state()

@@ -92,7 +92,7 @@ test_that("two mechanisms of a function, adopted one after the other, are both k
   expect_equal(coef(last)[c("gain", "sun", "wind")], c(gain = 0.4, sun = 0.01, wind = -0.5),
                tolerance = 0.1)
   expect_lt(upgrade$models[[3]]$scores$calibrate[["rmse"]], 0.12)  # the noise is 0.1
-  # Had the second no evidence alone and traded off with the first, it would be likely at most.
+  # Had the second no evidence alone and been correlated with the first, it would be likely at most.
   expect_identical(upgrade$models[[3]]$verdict, "named")
   second <- upgrade$models[[3]]$mechanism
   upgrade$candidates$log10_bf[upgrade$candidates$from == "base" &
@@ -100,7 +100,7 @@ test_that("two mechanisms of a function, adopted one after the other, are both k
   expect_identical(rejudged(upgrade)$models[[3]]$verdict, "named")
   at <- match(c("sun", "wind"), names(last$emulator$parameters))
   upgrade$models[[3]]$fit$posterior$unit[, at[1]] <- last$posterior$unit[, at[2]]
-  expect_match(rejudged(upgrade)$models[[3]]$doubts, "evidence only beside")
+  expect_match(rejudged(upgrade)$models[[3]]$doubts, "evidence only together with")
   expect_identical(rejudged(upgrade)$models[[3]]$verdict, "likely")
 })
 

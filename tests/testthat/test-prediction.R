@@ -1,4 +1,4 @@
-# What is measured answers linearly to Tn, of which the simulator knows nothing.
+# What is measured responds linearly to Tn, of which the simulator knows nothing.
 hidden <- withr::with_seed(6, as.numeric(stats::filter(rnorm(480), 0.9, "recursive")))
 lacking <- made_once(function(reach = c(13, 300, Inf), ...) {
   data <- linear_data(480)
@@ -215,14 +215,14 @@ test_that("simulated errors have their variance and memory, and forget it betwee
   expect_equal(mean(errors^2), 14 * fit$posterior$variance[1], tolerance = 0.05)
 })
 
-test_that("the discrepancy of a record of its own answers to its own conditions", {
+test_that("the discrepancy of a record of its own responds to its own conditions", {
   fit <- lacking(Inf)
   data <- linear_data(480)
   data$Tn <- hidden
   warmer <- transform(data, Tn = Tn + 1)
   gain <- predict(fit, as_new(warmer), discrepancy = TRUE)$mean -
     predict(fit, as_new(data), discrepancy = TRUE)$mean
-  expect_equal(mean(gain), 0.3, tolerance = 0.15)  # what was made answers to Tn by 0.3
+  expect_equal(mean(gain), 0.3, tolerance = 0.15)  # what was made responds to Tn by 0.3
 })
 
 test_that("simulated errors are those of the draws whose discrepancy is known", {

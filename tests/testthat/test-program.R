@@ -301,7 +301,7 @@ test_that(
   expect_identical(edited$templates[["in/text"]], c("a", "b", "c, no end", "d"))
 })
 
-test_that("the columns of the drivers are told apart whatever their names", {
+test_that("the columns of the drivers are distinguished whatever their names", {
   bytes <- csv_bytes(data.frame(time = 1, "a,\"b" = 0.5, check.names = FALSE))
   expect_identical(rawToChar(bytes), "time,\"a,\"\"b\"\n1,0.5\n")
   expect_named(utils::read.csv(text = rawToChar(bytes), check.names = FALSE), c("time", "a,\"b"))

@@ -17,7 +17,7 @@ test_that("a small design leads to a calibration that runs of the simulator conf
   expect_true(all(abs(coef(fit) - c(0.6, 0.8)) < 0.05))
 })
 
-test_that("the evidence does not hang on the design, the seed or the number of runs", {
+test_that("the evidence does not depend on the design, the seed or the number of runs", {
   first <- refined()
   m <- bent_measurements()
   reseeded <- calibrate_refined(simulate_design(bent_simulator(), m, 6, seed = 4), m,

@@ -52,7 +52,7 @@ test_that("two days say nothing of every day", {
   expect_null(model_of(noise - 8 * (hours %% 24 == 10), hours)$pattern)
 })
 
-test_that("a large error that answers to nothing makes the verdict unexplained", {
+test_that("a large error that responds to nothing makes the verdict unexplained", {
   upgrade <- base_only(small_upgrade())
   upgrade$models[[1]]$attribution$table$significant <- FALSE
   p <- upgrade$models[[1]]$prediction
@@ -162,12 +162,12 @@ test_that("a cause that a drift rivals is only likely", {
                "a drifting sensor would explain the error as well")
 })
 
-test_that("a drift in what the error answers to does not put the sensor under suspicion", {
+test_that("a drift in what the error responds to does not put the sensor under suspicion", {
   r <- withr::with_seed(1, rnorm(240)) + 8 * (seq_len(240) / 240)^2
   m <- list(hours = seq_len(240), time = seq_len(240), unit = "K", target = "Ti")
   where <- function(answers) amiss:::remainder_pattern(r, seq_len(240), m, answers)$where
   expect_match(where(character()), "Suspect a drifting sensor")
-  expect_identical(where("Ws"), "It may be slow as Ws may be, to which it answers.")
+  expect_identical(where("Ws"), "It may follow Ws, to which it responds.")
 })
 
 test_that("readings that stand apart are told, and what a model leaves otherwise is not", {

@@ -66,12 +66,12 @@ test_that("each step tells what it brought, and what could do the same", {
   upgrade <- small_upgrade()
   upgrade$models[[2]]$confounded_with <- "gain"
   expect_match(summary(upgrade)$change,
-               "How much sun does hangs together with gain .correlation beyond 0.4", all = FALSE)
+               "The estimate of sun is correlated with gain .by more than 0.4", all = FALSE)
   upgrade$models[[2]]["confounded_with"] <- list(character())
   expect_no_match(paste(summary(upgrade)$change, collapse = " "), "could also be done")
 })
 
-test_that("conditions that cannot be told apart are told as such in what remains", {
+test_that("conditions that cannot be distinguished are reported as such in what remains", {
   upgrade <- base_only(small_upgrade())
   attribution <- upgrade$models[[1]]$attribution
   attribution$table[c("significant", "group")] <- list(TRUE, "Te or Gv")
@@ -79,13 +79,13 @@ test_that("conditions that cannot be told apart are told as such in what remains
                                   significant = TRUE, correlation = 0.97))
   upgrade$models[[1]]$attribution <- attribution
   told <- summary(upgrade)
-  expect_match(told$headline, "Something that answers to Te or Gv is missing")
+  expect_match(told$headline, "Something that responds to Te or Gv is missing")
   # Where the error is not larger than the noise, no more is said than that.
   seen <- upgrade$models[[1]]$prediction
   upgrade$models[[1]]$prediction$mean <- seen$observed + 0.05 * rep_len(c(1, -1), nrow(seen))
   expect_match(summary(upgrade)$headline,
-               "of the size of the stated noise .1.0 times.*answers to Te or Gv: something small")
-  expect_match(told$remains, "Te and Gv cannot be told apart in this record", all = FALSE)
+               "of the size of the stated noise .1.0 times.*responds to Te or Gv: something small")
+  expect_match(told$remains, "Te and Gv cannot be distinguished in this record", all = FALSE)
 })
 
 test_that("an upgrade prints each mechanism with its verdict, within fifteen lines", {
@@ -96,7 +96,7 @@ test_that("an upgrade prints each mechanism with its verdict, within fifteen lin
   # As if five had been adopted, and all doubted: each is printed.
   upgrade$models[[2]][c("verdict", "doubts")] <- list("likely", c(
     "other causes are possible", "the numbers behind it are not trusted",
-    "the error in calibration rose with it", "the error still answers to what drives it",
+    "the error in calibration rose with it", "the error still responds to what drives it",
     "its value lies at the edge of what was thought possible", "a good part of the error remains",
     "a drifting sensor would explain the error as well"))
   sun <- upgrade$models[[2]]
@@ -288,7 +288,7 @@ test_that("a report says what result.json says", {
   method <- table_with(tables, "quantity")
   expect_identical(as.numeric(method[1:3, 3]), as.numeric(unlist(last[c("N", "Q", "M")])))
   if (!any(vapply(last$attribution, `[[`, NA, "significant")))
-    expect_match(text("wide"), "answers to no boundary", all = FALSE)
+    expect_match(text("wide"), "responds to no boundary", all = FALSE)
 })
 
 test_that("a report of one calibration has its tables in Word, too", {
@@ -373,7 +373,8 @@ seen_in_browser <- function(browser, file, width) {
   script <- "frame.onload = function() {
     const page = frame.contentDocument, images = [...page.images];
     probe.textContent = JSON.stringify({width: page.documentElement.scrollWidth,
-      letters: Math.min(...[...page.querySelectorAll('p, li')].map(e => parseFloat(getComputedStyle(e).fontSize))),
+      letters: Math.min(...[...page.querySelectorAll('p, li')].map(
+        e => parseFloat(getComputedStyle(e).fontSize))),
       natural: images.map(i => i.naturalWidth), shown: images.map(i => i.clientWidth)});
   }"
   writeLines(sprintf("<pre id='probe'></pre><script>%s</script>",

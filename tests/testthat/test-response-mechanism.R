@@ -59,7 +59,7 @@ test_that("the priors have the scale of the record", {
   expect_equal(unname(lapply(narrow, `[[`, "prior")), list(uniform(0, 1), uniform(2, 5)))
 })
 
-test_that("a circular condition answers by its sine and its cosine", {
+test_that("a circular condition acts by its sine and its cosine", {
   data <- room_data
   data$Wd <- (1:240 * 37) %% 360
   m <- measurements(data, time = "time", target = "Ti", boundary = ~ Te + circular(Wd),
@@ -149,7 +149,7 @@ test_that(paste("the loop extends given runs by the response that lacks, measure
   told <- summary(upgrade)
   expect_equal(told$tag, "Described, not explained")
   sentence <- paste(
-    "describes and does not explain: Ti answers to Gv with a gain of 0.006.* K per W/m\u00b2",
+    "describes and does not explain: Ti responds to Gv with a gain of 0.006.* K per W/m\u00b2",
     ".*time constant of .* h .*store")
   expect_match(paste(told$change, collapse = " "), sentence)
   expect_match(told$mechanisms[[1]]$sentence, sentence)

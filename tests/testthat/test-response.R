@@ -10,7 +10,7 @@ felt <- function(driver, hours) {
 
 of_response <- function(...) amiss:::responses_factor(base_fit(), ..., threads = 1)
 
-test_that("the response that is hidden is told from one that is not there", {
+test_that("the response that is hidden is distinguished from one that is not there", {
   own <- of_response(0.006 * felt("Gv", 3))
   expect_gt(own$lower95, 2)
   expect_gt(own$log10_bf, 5)
@@ -24,7 +24,7 @@ test_that("a response of nothing says nothing: its factor is one", {
   expect_lt(abs(own$log10_bf), 1e-6)
 })
 
-test_that("the factor of a response lies near that of the mechanism, calibrated in full", {
+test_that("the factor of a response lies near that of the mechanism, fully calibrated", {
   upgrade <- small_upgrade()
   full <- upgrade$candidates$beside_unknown[upgrade$candidates$mechanism == "sun"]
   # The prior of the sun is uniform to 0.02, of standard deviation 0.0058.

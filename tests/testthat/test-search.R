@@ -128,7 +128,7 @@ test_that("the most probable point within limits is that of trying every set of 
 })
 
 test_that("so it is on a ridge a hundred times as long as it is wide", {
-  # Two parameters that trade off, and one at its limit that pulls one of them.
+  # Two parameters that are correlated, and one at its limit that pulls one of them.
   ridge <- rbind(c(1, 0.9998, 0.5), c(0.9998, 1, 0.5), c(0.5, 0.5, 1))
   mean <- c(0, 0, 3)
   limit <- data.frame(lower = -c(4, 4, 1.7), upper = c(4, 4, 1.7))

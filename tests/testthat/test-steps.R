@@ -100,7 +100,7 @@ test_that("what is an amount of a row is shared among shorter ones", {
     expect_setequal(amiss:::likely_amounts(names(counts), off_by(right)), right)
 })
 
-test_that("nothing is said of steps that are not those of the rows, or that cannot be told", {
+test_that("nothing is said of steps that are not those of the rows, or that cannot be known", {
   by_row <- store(1, function(values, drivers) store_level(values, drivers[, "rain"], 1, 2))
   expect_null(effect_of(by_row))
   unheeded <- store(1,
