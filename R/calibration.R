@@ -34,7 +34,7 @@ calibration_control <- list(
 #' measurement error as the likelihood weighs it. That is the autocorrelated error that was seen; if
 #' more error was seen than stated, it is the noise stated. The check fails if
 #'
-#' * the emulator's error is above a third of the noise,
+#' * the emulator's error is larger than a third of the noise,
 #' * fewer than a tenth of the `exact` draws are effective, or
 #' * more than a twentieth of the posterior lies in the outer tenth of the emulator's region.
 #'

@@ -4,8 +4,8 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 
 #' Compare models by their evidence, and what practice does beside it
 #'
-#' Simulates every model on one design seed, trains its emulator and calibrates it on the same
-#' record. The result has
+#' Simulates every model, trains its emulator and calibrates it on the same record, all with one
+#' seed. The result has
 #'
 #' * the evidence with its interval, and Bayes factors in the words of the paper's table 1,
 #' * posterior probabilities (equal ones beforehand),
@@ -40,9 +40,9 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #' @param measurements The [measurements()].
 #' @param method `"paper"`: [calibrate_paper()] with its variance index; `"history"`: [calibrate()]
 #'   and [attribute_discrepancy()].
-#' @param runs Runs of the first design of each model. Predictions and the least-squares search take
-#'   more. `"history"` takes more for searches, regions and checks as well, if the first runs do not
-#'   suffice ([calibrate_refined()]). `"paper"` is neither checked by runs nor refined.
+#' @param runs Runs of the design of each model for `"paper"`, which is neither checked by runs nor
+#'   refined. `"history"` does not use them: it makes runs for searches, regions and checks
+#'   ([calibrate_refined()]). Predictions and the least-squares search take more runs.
 #' @param control List of lists: `emulator`, `calibration` and `attribution` (only for `"history"`),
 #'   as the stages take them.
 #' @param truth For a synthetic record, a list of the `simulator` and the named `values` that made

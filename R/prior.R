@@ -1,12 +1,14 @@
 #' Priors of model parameters
 #'
-#' A prior is a distribution on one parameter, in that parameter's unit. The design, the emulator
-#' and the sampler work on the unit cube; a prior's quantile function maps the cube onto the
-#' parameters, so that the prior is uniform there. `normal()` and `lognormal()` may be truncated.
+#' A prior is a distribution on one parameter, in that parameter's unit. `normal()` and
+#' `lognormal()` may be truncated.
 #'
-#' @param lower,upper Of `uniform()`, `triangular()` and `beta_prior()` the ends of the distribution
-#'   (the shape of `beta_prior()` is stretched to them); of `normal()` and `lognormal()` where it is
-#'   cut off and scaled up again.
+#' The design, the emulator and the sampler work on the unit cube. A prior's quantile function maps
+#' the cube onto the parameters, so the prior is uniform on the cube.
+#'
+#' @param lower,upper Ends of the distribution of `uniform()`, `triangular()` and `beta_prior()`
+#'   (the shape of `beta_prior()` is stretched to them). `normal()` and `lognormal()` are cut off
+#'   there and scaled up again.
 #' @param mean,sd Mean and standard deviation (before truncation).
 #' @param meanlog,sdlog Mean and standard deviation of the logarithm.
 #' @param shape1,shape2 Shapes of the beta distribution on `[lower, upper]`.
