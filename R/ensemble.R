@@ -1,10 +1,10 @@
 #' Design and runs: an ensemble of simulations
 #'
-#' Draws a Latin hypercube over the priors and runs the simulator at each point. Runs that were made
-#' elsewhere enter by [ensemble()].
+#' Draws a Latin hypercube over the priors and runs the simulator at each point. [ensemble()] takes
+#' runs that were made elsewhere.
 #'
 #' @param simulator A simulator: [zone()], [function_simulator()].
-#' @param measurements [measurements()]; the simulator is driven by them.
+#' @param measurements The [measurements()] that drive the simulator.
 #' @param runs Number of runs.
 #' @param seed Seed of the design; if `NULL`, R's generator gives one.
 #' @param threads Number of threads.

@@ -179,15 +179,16 @@ print.amiss_prior <- function(x, ...) {
 
 #' Declare a free parameter where it stands
 #'
-#' A number in a model's description may be replaced by a free parameter: an unknown that
-#' calibration finds. The same name may stand in several places; it is then one parameter, and must
-#' carry the same prior.
+#' Puts a free parameter, an unknown that calibration finds, in place of a number in a model's
+#' description. The same name may stand in several places. It is then one parameter, and must carry
+#' the same prior.
 #'
 #' @param name Name of the parameter.
 #' @param prior Its [prior].
 #' @param unit Its unit, for people.
-#' @param label One short phrase for people; the name if not given. A label that two parameters of a
-#'   model share, or that is the name of another, is shown with the parameter's name behind it.
+#' @param label One short phrase for people; the name if not given. If two parameters of a model
+#'   share a label, or the label is the name of another parameter, it is shown with the parameter's
+#'   name behind it.
 #' @return An object of class `amiss_free`.
 #' @examples
 #' free("k_insulation", uniform(0.03, 0.05), unit = "W/mK")
