@@ -1,5 +1,6 @@
 #' amiss: find what a simulation gets wrong, name the cause, measure the gain
 #'
+#' @description
 #' The data take this path:
 #'
 #' 1. [measurements()] prepares the record. [zone()], [function_simulator()] and others make a
@@ -14,6 +15,7 @@
 #' * [report()] writes either down.
 #' * [run_study()] does all of it from one file.
 #'
+#' @details
 #' Words that choose something (`method = "history"`) and names of options and columns are
 #' case-sensitive.
 #'
@@ -45,7 +47,8 @@
 #'   * `amiss_warning_result`. A special case is `amiss_warning_missing` (a file of a study's
 #'     results that could not be made).
 #'
-#'   Messages have the classes `amiss_message_gap`, `_time`, `_kept`, `_noise` and `_base_case`.
+#'   Messages have the class `amiss_message_gap`, `amiss_message_time`, `amiss_message_kept`,
+#'   `amiss_message_noise` or `amiss_message_base_case`.
 #'
 #'   Numbers that cannot be trusted are not signalled as a condition: see `trust` and `check` of a
 #'   calibration.

@@ -5,6 +5,7 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 
 #' Which boundary conditions drive the discrepancy
 #'
+#' @description
 #' Gives three numbers for each boundary condition:
 #'
 #' * the evidence that the model loses if its discrepancy may not respond to the condition,

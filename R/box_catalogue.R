@@ -1,5 +1,6 @@
 #' A catalogue of mechanisms for the test box
 #'
+#' @description
 #' Lists what may be missing in a model such as [paper_box()]`("M2")`:
 #'
 #' * wind-driven infiltration,
@@ -11,6 +12,7 @@
 #' * wind-dependent outside convection,
 #' * neighbour coupling.
 #'
+#' @details
 #' The model must have the components of [paper_box()]: walls `front`, `back`, `left`, `right` and
 #' `roof`, a window `window` and a heater `heater`.
 #'

@@ -1,5 +1,6 @@
 #' Read runs as Calibro and ESP-r write them
 #'
+#' @description
 #' Reads a folder of four tables:
 #'
 #' * `obs.csv`: the record of the target (N x 1).
@@ -10,6 +11,7 @@
 #' Each may have a line of names. Without it, conditions are called `bc1`, `bc2`, ..., and
 #' parameters `p1`, `p2`, ... or as in `parameters`.
 #'
+#' @details
 #' ESP-r puts a row of zeros, the base case, first in `inputs.csv`. The row stays if it has its run
 #' and lies between the others, as it does if values are relative to their ranges. Otherwise it is
 #' no run of the design and is left out.

@@ -4,6 +4,7 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 
 #' Compare models by their evidence, and what practice does beside it
 #'
+#' @description
 #' Simulates every model, trains its emulator and calibrates it on the same record, all with one
 #' seed. The result has
 #'

@@ -1,10 +1,12 @@
 #' The discrepancy over time
 #'
+#' @description
 #' Gives what the calibrated simulation leaves unexplained, over time:
 #'
 #' * the measurement less the simulation at the posterior mean of its parameters, and
 #' * the whole response to the boundary conditions that the model lacks, with a 95 % band.
 #'
+#' @details
 #' For a calibration as in the paper, the discrepancy is that of equation 8, at the same time step.
 #'
 #' @param fit A calibration ([calibrate()], [calibrate_paper()]).

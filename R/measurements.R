@@ -1,5 +1,6 @@
 #' Measurements: the target, the boundary conditions and what each row is for
 #'
+#' @description
 #' Checks a table of measurements and prepares it for all later stages:
 #'
 #' * The record is cut into segments wherever time is broken.

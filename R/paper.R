@@ -4,6 +4,7 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 
 #' Calibrate a simulator as in the paper
 #'
+#' @description
 #' Calibrates by the method of Monari (2022), with the paper's misprints corrected. The package's
 #' own method is [calibrate()] followed by [attribute_discrepancy()].
 #'

@@ -284,6 +284,7 @@ prediction_scores <- function(prediction) {
 
 #' Simulate the record that a calibration expects
 #'
+#' @description
 #' Draws the calibration record from the posterior, for checks of the model, as `bayesplot` makes
 #' them. Each draw is a run of the simulator at a posterior draw and a new error:
 #'

@@ -1,11 +1,13 @@
 #' Sobol indices of the parameters
 #'
+#' @description
 #' Says which parameters move the simulation, measured or not. The variance of the simulation over
 #' the priors, which are independent, is shared out among the parameters:
 #'
 #' * The first-order index of a parameter is the part that goes when its value is known.
 #' * The total index is the part that stays when all others are known. It counts interactions too.
 #'
+#' @details
 #' Indices of a whole series are those of its steps, weighted by the steps' variances (generalised
 #' indices of Lamboni et al. and of Gamboa et al.):
 #'

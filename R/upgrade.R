@@ -4,6 +4,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 
 #' The loop: show, name the cause, extend, measure
 #'
+#' @description
 #' Finds what a model lacks and extends it:
 #'
 #' 1. The model is calibrated and its discrepancy attributed.
@@ -21,10 +22,10 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' the mode, with one run a step. About thirty runs in the region of the mode train an emulator.
 #' Runs at draws of its posterior check the emulator ([calibrate_refined()]).
 #'
-#' A trial of a mechanism begins at the mode of the present model. It reuses the runs of that model
-#' with the mechanism switched off. Four runs check the trial. Trials that can still win are
-#' verified like the base model, the best first, until no other can reach the leader. Two steps with
-#' eight mechanisms take about 400 runs.
+#' A trial of a mechanism begins at the mode of the present model. It takes the runs of that model
+#' for its own with the mechanism switched off. Four runs check the trial. Trials that can still win
+#' are verified like the base model, the best first, until no other can reach the leader. Two steps
+#' with eight mechanisms take about 400 runs.
 #'
 #' [decision_rules()] lists every number that decides.
 #'
@@ -63,8 +64,10 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' @return An object of class `amiss_upgrade`:
 #'   * `models`: the models adopted, first the base model (see *Models*).
 #'   * `candidates`: all mechanisms tried, one a row (see *Candidates*).
-#'   * `named_cause`: the cause that was named.
-#'   * `gain`: what the upgrade gains.
+#'   * `named_cause`: the cause that was named or, if there is none, the first that is likely:
+#'     `mechanism`, `boundary`, `log10_bf` and `sentence`. `NULL` if there is none of either.
+#'   * `gain`: `log10_bf` of the last model against the first with its `interval`, and the scores of
+#'     both.
 #'   * `stopped_because`: why the loop stopped; `stopped_id` is the same in a word.
 #'   * `runs_total`: the runs of the simulator that the loop took.
 #'   * `runs_found`: further runs that a program's cache had.
