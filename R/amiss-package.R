@@ -47,8 +47,9 @@
 #'   * `amiss_warning_result`. A special case is `amiss_warning_missing` (a file of a study's
 #'     results that could not be made).
 #'
-#'   Messages have the class `amiss_message_gap`, `amiss_message_time`, `amiss_message_kept`,
-#'   `amiss_message_noise` or `amiss_message_base_case`.
+#'   Messages have one of the classes `amiss_message_gap`, `amiss_message_time`,
+#'   `amiss_message_kept`, `amiss_message_noise`, `amiss_message_base_case`, `amiss_message_file`,
+#'   `amiss_message_lead` and `amiss_message_render`.
 #'
 #'   Numbers that cannot be trusted are not signalled as a condition: see `trust` and `check` of a
 #'   calibration.

@@ -2,7 +2,7 @@ comparison_methods <- c("paper", "history")
 
 comparison_control <- list(emulator = list(), calibration = list(), attribution = list())
 
-#' Compare models by their evidence, and what practice does beside it
+#' Compare models by their evidence and by the criteria of practice
 #'
 #' @description
 #' Simulates every model, trains its emulator and calibrates it on the same record, all with one

@@ -234,12 +234,13 @@ check_program <- function(simulator, call = rlang::caller_env()) {
 
 #' Edit the templates of a program
 #'
-#' A mechanism of a [program_simulator()] is an edit of its templates, with parameters of its own.
+#' Edits the templates of a [program_simulator()] and adds parameters. A mechanism of a program is
+#' such an edit.
 #'
 #' @param simulator A [program_simulator()].
-#' @param templates Named list of templates, new ones or in place of those of the same name: a path,
-#'   text in [I()], or a function of the lines that are there, also of a file of the model's folder.
-#'   Functions stack: they keep what other mechanisms have put in.
+#' @param templates Named list of templates, new ones or in place of those of the same name. Each is
+#'   a path, text in [I()], or a function of the lines that are there. A function may also be given
+#'   for a file of the model's folder. Functions stack: they keep what other mechanisms have put in.
 #' @param ... Parameters to add, each made by [free()].
 #' @param boundary Driver columns to add.
 #' @return The edited simulator.
