@@ -50,7 +50,7 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 #'   it. They are marked in tables and figures. `NULL` if the truth is not known.
 #' @inheritParams upgrade_model
 #' @return An object of class `amiss_comparison` with `models`, and the tables that `tidy()` gives
-#'   (next section). Each of the `models` has
+#'   (see *Tables*). Each of the `models` has
 #'   * `fit`, `attribution`, `prediction`, `scores`: the calibration and what follows from it.
 #'   * `best`: the least-squares parameters.
 #'   * `heat_loss`: 200 draws of the heat loss coefficient in W/K, if the model is a [zone()]. Each
