@@ -1,51 +1,63 @@
 #' Annealed importance sampling of any posterior
 #'
-#' The sampler behind [calibrate()], for a likelihood written in R: draws from the posterior and its
+#' Samples a posterior whose likelihood is written in R. It gives draws from the posterior and its
 #' normalising constant (the evidence), with an interval, a second estimator and a verdict.
+#' [calibrate()] uses the same sampler.
 #'
-#' *How it works.* A pilot finds a ladder of temperatures from the prior to the posterior and, for
-#' each, how the chains move and how often. Then all is frozen and fresh, independent groups of
-#' chains give the estimate: unbiased, with an interval by bootstrap over the groups. A second
-#' estimator (an importance sample from a Student-t mixture fitted to the draws or, where none comes
-#' close, annealing from that mixture) must not lie above the one reported. Groups or draws are
-#' added until the standard error is at most `precision`.
+#' # How it works
 #'
-#' *Modes.* Chains lose a mode that is much narrower than another, because it has little mass while
-#' they are warm. So climbs follow from points of the prior that do not lead to the draws. If they
-#' reach a peak without draws that holds two hundredths of the posterior or more, an importance
-#' sample of it joins the draws, and the verdict says so. A mode to which less than a thousandth of
-#' the prior leads is not seen (`bench/trusted.R`).
+#' A pilot finds a ladder of temperatures from the prior to the posterior. For each temperature it
+#' finds how the chains move and how often. Then all is frozen, and fresh, independent groups of
+#' chains give the estimate. The estimate is unbiased, with an interval by bootstrap over the
+#' groups.
+#'
+#' The second estimator is an importance sample from a Student-t mixture fitted to the draws. If no
+#' mixture comes close, it is annealing from that mixture. The second estimate must not be larger
+#' than the one reported. Groups or draws are added until the standard error is at most `precision`.
+#'
+#' # Modes
+#'
+#' Chains lose a mode that is much narrower than another, because it has little mass while they are
+#' warm. Therefore climbs follow from points of the prior that do not lead to the draws. A climb may
+#' reach a peak without draws that holds two hundredths of the posterior or more. An importance
+#' sample of it then joins the draws, and the verdict says so. A mode to which less than a
+#' thousandth of the prior leads is not seen (`bench/trusted.R`).
 #'
 #' @param log_likelihood Function of a numeric matrix (one point a row, columns named like `priors`)
 #'   that returns the log-likelihood of each point; `-Inf` where it is zero.
 #' @param priors Named list of [prior]s.
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param gradient Function of the same matrix that returns the gradient of the log-likelihood with
-#'   respect to the parameters, a matrix of the same shape; the chains then make Hamiltonian moves
+#'   respect to the parameters, a matrix of the same shape. The chains then make Hamiltonian moves
 #'   too.
-#' @param control List of options:
-#'   * `pilot_chains` (16 per dimension, at least 256), `chains` in a group (3 per dimension, at
-#'     least 32);
-#'   * `groups` (8), at most `max_groups` (64) until the standard error of the log evidence is below
-#'     `precision` (0.1);
-#'   * `sweeps` and `max_sweeps`: least and greatest number of moves of a chain at a temperature (3,
-#'     in the thinned records of [calibrate_paper()] 1; 30);
-#'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7);
-#'   * `gradient`: Hamiltonian moves where the likelihood has a gradient (`TRUE`; in [calibrate()]
-#'     along the parameters: they follow a curved posterior, at up to twice the cost). [ais()] makes
-#'     them if it is given one;
-#'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001);
-#'   * `importance_draws` (1000; 0 leaves the second estimator and the search for modes out) and
-#'     `max_components` (3) of the mixture.
-#' @return An object of class `amiss_ais`: `draws` (matrix), `weights`, `log_evidence`,
-#'   `standard_error`, `interval` (95 %), `annealed` and `second` (estimate and standard error of
-#'   each estimator), `ladder`, `evaluations`, `trusted`, `verdict`.
+#' @param control List of options, with their defaults:
+#'   * `pilot_chains`: chains of the pilot (16 per dimension, at least 256).
+#'   * `chains`: chains in a group (3 per dimension, at least 32).
+#'   * `groups` (8), `max_groups` (64), `precision` (0.1): groups are added, up to `max_groups`,
+#'     until the standard error of the log evidence is below `precision`.
+#'   * `sweeps`, `max_sweeps`: least and greatest number of moves of a chain at a temperature (3, in
+#'     the thinned records of [calibrate_paper()] 1; 30).
+#'   * `ess_drop`: effective share of the chains that the step to the next temperature leaves (0.7).
+#'   * `gradient`: Hamiltonian moves if the likelihood has a gradient (`TRUE`). [calibrate()] makes
+#'     them along the parameters: they follow a curved posterior, at up to twice the cost. [ais()]
+#'     makes them if it is given a gradient.
+#'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001).
+#'   * `importance_draws`: draws of the mixture (1000). 0 leaves out the second estimator and the
+#'     search for modes.
+#'   * `max_components`: most components of the mixture (3).
+#' @return An object of class `amiss_ais`:
+#'   * `draws` (matrix), `weights`.
+#'   * `log_evidence`, `standard_error`, `interval` (95 %).
+#'   * `annealed`, `second`: estimate and standard error of each estimator.
+#'   * `ladder`, `evaluations`.
+#'   * `trusted`, `verdict`.
 #' @source Neal (2001), Annealed importance sampling, Statistics and Computing 11, 125-139. Del
 #'   Moral, Doucet and Jasra (2006), Sequential Monte Carlo samplers, Journal of the Royal
 #'   Statistical Society B 68, 411-436 (the pilot). Rodriguez and Laio (2014), Clustering by fast
 #'   search and find of density peaks, Science 344, 1492-1496 (where climbs begin). Hesterberg
 #'   (1995), Weighted average importance sampling and defensive mixture distributions, Technometrics
-#'   37, 185-194. In full: `vignette("algorithm", "amiss")`, *Annealed importance sampling*.
+#'   37, 185-194. The vignette has the whole: `vignette("algorithm", "amiss")`, *Annealed importance
+#'   sampling*.
 #' @examples
 #' y <- c(1.2, 0.7, 1.9)
 #' ais(function(z) vapply(z[, "mean"], function(m) sum(dnorm(y, m, 1, log = TRUE)), 0),

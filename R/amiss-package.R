@@ -1,36 +1,58 @@
 #' amiss: find what a simulation gets wrong, name the cause, measure the gain
 #'
-#' The way the data goes: [measurements()] and a simulator ([zone()], [function_simulator()]) give
-#' an ensemble ([simulate_design()], or [ensemble()] for runs made elsewhere); [train_emulator()],
-#' [calibrate()], [attribute_discrepancy()] follow. [upgrade_model()] runs the whole loop with a
-#' [catalogue()] of [mechanism()]s, [compare_models()] sets several simulators against each other,
-#' [report()] writes either down, and [run_study()] does all of it from one file.
+#' @description
+#' The data take this path:
 #'
-#' Long work shows how far it is and what time it will take: at a terminal in a line that changes,
-#' elsewhere (log files, batches) in a line now and then, in tests and knitr documents not at all.
-#' It is silent in functions called with `quiet = TRUE`. It can be interrupted: the session goes on,
-#' and [upgrade_model()], [compare_models()] and [run_study()] go on from their `checkpoint` or
-#' folder.
+#' 1. [measurements()] prepares the record. [zone()], [function_simulator()] and others make a
+#'   simulator.
+#' 2. [simulate_design()] makes an ensemble of runs; [ensemble()] takes runs made elsewhere.
+#' 3. [train_emulator()], [calibrate()] and [attribute_discrepancy()] follow.
 #'
+#' Four functions do more at once:
+#'
+#' * [upgrade_model()] runs the whole loop with a [catalogue()] of [mechanism()]s.
+#' * [compare_models()] compares several simulators.
+#' * [report()] writes either down.
+#' * [run_study()] does all of it from one file.
+#'
+#' @details
 #' Words that choose something (`method = "history"`) and names of options and columns are
 #' case-sensitive.
 #'
+#' # Progress
+#'
+#' Long work shows its progress and the time at which it will end. A terminal shows a line that
+#' changes. Elsewhere (log files, batches) a line appears now and then. Tests and knitr documents
+#' show nothing, nor do functions called with `quiet = TRUE`.
+#'
+#' Long work can be interrupted, and the session goes on. [upgrade_model()], [compare_models()] and
+#' [run_study()] then go on from their `checkpoint` or folder.
+#'
 #' @section Options:
-#' * `amiss.progress`: `"bar"`, `"lines"` or `"none"` for progress as at a terminal, as in a log, or
-#'   none, wherever the session runs.
-#' * `amiss.progress_interval`: least number of seconds between two such lines (30).
-#' * `amiss.allow_large`: `TRUE` lets work begin that is estimated to need more than a day or 4 GB.
-#' * `amiss.font`: font of the figures.
+#'   * `amiss.progress`: `"bar"`, `"lines"` or `"none"` for progress as at a terminal, as in a log,
+#'     or none, wherever the session runs.
+#'   * `amiss.progress_interval`: least number of seconds between two such lines (30).
+#'   * `amiss.allow_large`: `TRUE` lets work begin that is estimated to need more than a day or 4
+#'     GB.
+#'   * `amiss.font`: font of the figures.
 #'
-#' @section Conditions: Errors have the class `amiss_error` and one of `amiss_error_input` (what was
-#'   asked cannot be done as it was given; also `amiss_error_trust`, a study whose trust was not
-#'   given, `amiss_error_edit`, a mechanism that cannot be applied, and `amiss_error_fmu`, an FMU
-#'   that cannot be used) or `amiss_error_numerical` (the computation failed). Warnings have
-#'   `amiss_warning` and one of `amiss_warning_input` or `amiss_warning_result` (also
-#'   `amiss_warning_missing`, a file of a study's results that could not be made); messages
-#'   `amiss_message_gap`, `_time`, `_kept`, `_noise` and `_base_case`. That numbers are not to be
-#'   trusted is no condition: see `trust` and `check` of a calibration.
+#' @section Conditions: Errors have the class `amiss_error` and one of these:
+#'   * `amiss_error_input`: what was asked cannot be done as it was given. Special cases are
+#'     `amiss_error_trust` (a study whose trust was not given), `amiss_error_edit` (a mechanism that
+#'     cannot be applied) and `amiss_error_fmu` (an FMU that cannot be used).
+#'   * `amiss_error_numerical`: the computation failed.
 #'
+#'   Warnings have the class `amiss_warning` and one of these:
+#'   * `amiss_warning_input`.
+#'   * `amiss_warning_result`. A special case is `amiss_warning_missing` (a file of a study's
+#'     results that could not be made).
+#'
+#'   Messages have one of the classes `amiss_message_gap`, `amiss_message_time`,
+#'   `amiss_message_kept`, `amiss_message_noise`, `amiss_message_base_case`, `amiss_message_file`,
+#'   `amiss_message_lead` and `amiss_message_render`.
+#'
+#'   Numbers that cannot be trusted are not signalled as a condition: see `trust` and `check` of a
+#'   calibration.
 #' @useDynLib amiss, .registration = TRUE
 #' @importFrom Rcpp evalCpp
 #' @importFrom rlang %||% .data

@@ -1,24 +1,24 @@
 #' Calibrate with runs made elsewhere, in one call
 #'
-#' What was measured, the values that a simulator was run with and its runs: [measurements()],
-#' [ensemble()], [train_emulator()] and [calibrate()] one after the other, each with its defaults.
+#' Calibrates on what was measured, the values that a simulator was run with, and its runs. It calls
+#' [measurements()], [ensemble()], [train_emulator()] and [calibrate()], each with its defaults.
 #' [report()] writes down what was found.
 #'
-#' @param data The [measurements()], or a data frame of one regular record, all of which calibrates:
-#'   its first column is the time, its second the measured target, and the others are boundary
-#'   conditions (as [read_calibro()] gives them).
+#' @param data The [measurements()], or a data frame of one regular record, as [read_calibro()]
+#'   gives it. All rows of a data frame calibrate. Its first column is the time, its second the
+#'   measured target, and the others are boundary conditions.
 #' @param design,runs Values of the parameters, one run a row, and the runs, one a column: `design`
 #'   and `outputs` of [ensemble()].
-#' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not
+#' @param parameters The [free()] parameters that the columns of `design` are, in a list. If not
 #'   given, each gets a uniform prior over the range of its column.
-#' @param noise_sd Of a data frame: standard deviation of the target's measurement error. If not
-#'   given, it is taken from second differences of the record (Gasser, Sroka and Jennen-Steinmetz
-#'   1986), which a smooth course does not enter; that is a scale, which the calibration hardly
-#'   believes (`confidence` of [calibrate()]).
+#' @param noise_sd Standard deviation of the target's measurement error, if `data` is a data frame.
+#'   If not given, it is estimated from second differences of the record (Gasser, Sroka and
+#'   Jennen-Steinmetz 1986), which cancel a smooth course. The estimate is only a scale: the
+#'   calibration hardly believes it (`confidence` of [calibrate()]).
 #' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and
 #'   [calibrate()] take them.
 #' @inheritParams calibrate
-#' @return A calibration, as of [calibrate()].
+#' @return A calibration, as from [calibrate()].
 #' @source Gasser, Sroka and Jennen-Steinmetz (1986), Residual variance and residual pattern in
 #'   nonlinear regression, Biometrika 73, 625-633.
 #' @examples

@@ -5,56 +5,85 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 
 #' Which boundary conditions drive the discrepancy
 #'
-#' For each condition: the evidence that the model loses when its discrepancy may not answer to the
-#' condition, its share, and a p-value from surrogates (all conditions shifted in time together,
-#' which keeps their autocorrelation and their correlation with one another), for all conditions
-#' together by the step-down method of Westfall and Young (1993), whose least p-value does not grow
-#' with the number of conditions.
+#' @description
+#' Gives three numbers for each boundary condition:
 #'
-#' *What the p-value assumes.* A shifted record stands for another one of the same weather, so the
-#' conditions are taken as stationary over the record, in mean, variance and autocorrelation. Of a
-#' condition that only rises or falls no shift is alike; nothing checks that.
+#' * the evidence that the model loses if its discrepancy may not respond to the condition,
+#' * the condition's share of the misfit, and
+#' * a p-value from surrogates.
 #'
-#' *What it does not see.* Responses are linear in each condition's history: an effect that is a
-#' product of two conditions shows only as far as one of them tells of it. A mechanism that holds
-#' such a product is judged by its own runs ([upgrade_model()]), and can be found where no condition
-#' is significant.
+#' # P-values
 #'
-#' *A condition is not yet a cause.* What changes how much a system loses or stores changes its
-#' answer to everything. The error may then be a response to what moves the output most (in a heated
-#' room the heating), not to the condition that the mechanism is called after. Conditions say where
+#' A surrogate shifts all conditions in time together. This keeps their autocorrelation and their
+#' correlation with one another. The p-values of all conditions together come from the step-down
+#' method of Westfall and Young (1993). Their smallest p-value does not grow with the number of
+#' conditions.
+#'
+#' A shifted record stands for another record of the same weather. The conditions are therefore
+#' taken as stationary over the record, in mean, variance and autocorrelation. No shift resembles a
+#' condition that only rises or falls; nothing checks that.
+#'
+#' # Limits
+#'
+#' *Products.* Responses are linear in each condition's history. An effect that is a product of two
+#' conditions shows only as far as one of them indicates it. A mechanism that holds such a product
+#' is judged by its own runs ([upgrade_model()]). It can be found even if no condition is
+#' significant.
+#'
+#' *A condition is not yet a cause.* A fault that changes how much a system loses or stores changes
+#' its response to everything. The error may then respond to what moves the output most (in a heated
+#' room the heating), not to the condition that the mechanism is named after. Conditions say where
 #' to look; trials of mechanisms say what it is.
 #'
-#' *Groups.* Conditions that say the same hide one another: each can be dropped without harm, but
-#' not both. Among those that can be dropped alone a set is sought that cannot be dropped together,
-#' nor be made smaller. Such a group is tested like a condition, and its members are named together:
-#' what they say cannot be told apart in this record. Of several records a group of one of them is
-#' dropped from all: another record may tell its members apart.
+#' # Groups
 #'
-#' *Share.* A set of conditions takes a part of the misfit away, its sum of squares weighed by the
-#' covariance of error and simulator. The share of a condition is its Shapley value: what it adds to
-#' those before it, averaged over all orders of the conditions and over the posterior. So shares are
-#' not negative and add up to what all conditions explain together, also where conditions are
-#' correlated; two conditions that say the same share evenly. Beyond 10 conditions that act, 400
-#' random orders stand for all.
+#' Conditions with the same information hide one another: each can be dropped without harm, but not
+#' both. Among conditions that can be dropped alone, a set is sought that cannot be dropped together
+#' and cannot be made smaller. Such a group is tested like a condition. Its members are named
+#' together, because this record cannot separate their effects. If there are several records, a
+#' group of one record is dropped from all, because another record may separate its members.
+#'
+#' # Shares
+#'
+#' A set of conditions takes away a part of the misfit: its sum of squares, weighed by the
+#' covariance of error and simulator. The share of a condition is its Shapley value. That is what it
+#' adds to the conditions before it, averaged over all orders of the conditions and over the
+#' posterior.
+#'
+#' Shares are therefore not negative. They add up to what all conditions explain together, even if
+#' conditions are correlated. Two conditions with the same information share evenly. If more than 10
+#' conditions act, 400 random orders stand for all.
 #'
 #' @param fit A calibration ([calibrate()], [calibrate_refined()]), or that of several records
 #'   ([calibrate_jointly()]).
-#' @param control List of options: `surrogates` (99; 39 where no condition earns enough evidence to
-#'   matter), `smallest_shift` (0.05 of the record), `level` (0.05), `least_log10_bf` (0.5: what a
-#'   condition must earn besides its p-value), and `ais` for the sampler.
+#' @param control List of options, with their defaults:
+#'   * `surrogates`: number of surrogates (99; 39 if no condition earns enough evidence to matter).
+#'   * `smallest_shift`: shortest shift as a share of the record (0.05).
+#'   * `level`: largest p-value that is significant (0.05).
+#'   * `least_log10_bf`: evidence that a condition must earn besides its p-value (0.5).
+#'   * `ais`: options of [ais()].
 #' @inheritParams calibrate
-#' @return An object of class `amiss_attribution`. Its `table`, ranked, has a row for each condition
-#'   (`boundary`): the evidence lost without it (`log10_bf_dropped`, with its `standard_error`), its
-#'   `share`, its p-value among all conditions and by itself (`p_value`, `p_value_single`), whether
-#'   it is `significant` (a p-value of at most `level` and a loss of at least `least_log10_bf`) and
-#'   whether the sampler is `trusted`; `group` names the conditions that it cannot be told apart
-#'   from (`NA` for none), and `significant` of a member is that of the group. `groups` is a list,
-#'   one element for each group: `conditions`, `log10_bf_dropped`, `p_value`, `significant` and
-#'   `correlation`, the largest between two members. Of several records: an object of class
-#'   `amiss_joint_attribution` with `records`, one such object each, and `table` and `groups` of all
-#'   together.
-#' @source Westfall and Young (1993), Resampling-based multiple testing, Wiley.
+#' @return An object of class `amiss_attribution` with
+#'
+#'   * `table`: one row for each condition, ranked (see below).
+#'   * `groups`: a list with one element for each group: `conditions`, `log10_bf_dropped`,
+#'     `p_value`, `significant` and `correlation`, the largest between two members.
+#'
+#'   The columns of `table` are
+#'
+#'   * `boundary`: the condition.
+#'   * `log10_bf_dropped`, `standard_error`: the evidence lost without the condition, with its
+#'     error.
+#'   * `share`: its share of the misfit.
+#'   * `p_value`, `p_value_single`: the p-value among all conditions, and by itself.
+#'   * `significant`: a p-value of at most `level` and a loss of at least `least_log10_bf`. A member
+#'     of a group has the value of the group.
+#'   * `trusted`: whether the sampler is trusted.
+#'   * `group`: the group, that is, conditions whose effects this record cannot separate (`NA` for
+#'     none).
+#'
+#'   For several records: an object of class `amiss_joint_attribution` with `records`, one such
+#'   object each, and `table` and `groups` of all together.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

@@ -1,12 +1,24 @@
 #' A catalogue of mechanisms for the test box
 #'
-#' What may be missing in a model such as [paper_box()]`("M2")`, with the driver columns `Te`, `Gv`,
-#' `Ws`, `Wd`, `RHP`, `Lw` (long-wave radiation of the sky, W/m2) and `Tn` (temperature of a
-#' neighbour, degC); a mechanism is left out if its column is not among `columns`. The model must
-#' have the components of [paper_box()]: walls `front`, `back`, `left`, `right` and `roof`, a window
-#' `window` and a heater `heater`. The mechanisms: wind-driven infiltration, window transmission,
-#' heater lag, missing thermal mass, glazing U-value, sky exchange, wind-dependent outside
-#' convection and neighbour coupling.
+#' @description
+#' Lists what may be missing in a model such as [paper_box()]`("M2")`:
+#'
+#' * wind-driven infiltration,
+#' * window transmission,
+#' * heater lag,
+#' * missing thermal mass,
+#' * glazing U-value,
+#' * sky exchange,
+#' * wind-dependent outside convection,
+#' * neighbour coupling.
+#'
+#' @details
+#' The model must have the components of [paper_box()]: walls `front`, `back`, `left`, `right` and
+#' `roof`, a window `window` and a heater `heater`.
+#'
+#' The driver columns are `Te`, `Gv`, `Ws`, `Wd`, `RHP`, `Lw` (long-wave radiation of the sky, W/m2)
+#' and `Tn` (temperature of a neighbour, degC). A mechanism is left out if its column is not among
+#' `columns`.
 #'
 #' @param columns Names of the driver columns that the measurements have.
 #' @param azimuth Direction that the front faces, degrees from north, clockwise.

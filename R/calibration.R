@@ -7,53 +7,80 @@ calibration_control <- list(
 
 #' Calibrate a simulator on measurements
 #'
-#' The joint posterior of the parameters, the error and the discrepancy, given the whole record,
-#' sampled by annealed importance sampling. Its normalising constant is the evidence of the model,
-#' as a density of the calibration record.
+#' Samples the joint posterior of the parameters, the error and the discrepancy, given the whole
+#' record. The sampler is annealed importance sampling. Its normalising constant is the evidence of
+#' the model, a density of the calibration record.
 #'
-#' *Model.* The record is the simulation, plus a discrepancy that answers to the history of the
-#' boundary conditions, plus an autocorrelated error, in one covariance: nothing is split off, so
-#' that the evidence does not hang on the basis of the emulator. How far the discrepancy reaches
-#' into what the parameters can do is learned: `reach` is a grid of numbers kappa, equally probable
-#' beforehand; with a small one the discrepancy keeps out of the directions in which the runs differ
-#' by much more than `sqrt(kappa)` times the noise, with `Inf` it is free. A posterior that wants a
-#' free discrepancy says that the model is wrong where its parameters could hide it.
+#' # Model
 #'
-#' *The simulator has the last word.* If the ensemble knows its simulator, it is run at `check`
-#' draws of the posterior, or at `exact` if these are more. The emulator's error there, over the
-#' measurement error as the likelihood weighs it (autocorrelated as it was seen; if more was seen
-#' than stated, over the noise stated), is the check that counts: above a third, neither the
-#' posterior nor the evidence is trusted ([calibrate_refined()] then makes an emulator for the
-#' region and tries again). The likelihoods of `exact` such runs correct the evidence, so that it is
-#' the simulator's own; fewer than a tenth effective among them fail the check too, and so does more
-#' than a twentieth of the posterior in the outer tenth of the emulator's region. For an ensemble
-#' made elsewhere the check uses runs left out one by one, the fifth (at least 20) that lie nearest
-#' to the posterior.
+#' The record is the sum of three terms: the simulation, a discrepancy that responds to the history
+#' of the boundary conditions, and an autocorrelated error. All have one covariance. Nothing is
+#' split off, so the evidence does not depend on the basis of the emulator.
+#'
+#' The fit learns how far the discrepancy reaches into what the parameters can do. `reach` is a grid
+#' of numbers kappa, equally probable beforehand:
+#'
+#' * With a small kappa the discrepancy keeps out of some directions: those in which the runs differ
+#'   by much more than `sqrt(kappa)` times the noise.
+#' * With `Inf` the discrepancy is free.
+#'
+#' If the posterior prefers a free discrepancy, the model is wrong where its parameters could hide
+#' the error.
+#'
+#' # The simulator has the last word
+#'
+#' If the ensemble knows its simulator, the simulator is run at `check` draws of the posterior, or
+#' at `exact` draws if these are more. The check compares the emulator's error there with the
+#' measurement error as the likelihood weighs it. That is the autocorrelated error that was seen; if
+#' more error was seen than stated, it is the noise stated. The check fails if
+#'
+#' * the emulator's error is larger than a third of the noise,
+#' * fewer than a tenth of the `exact` draws are effective, or
+#' * more than a twentieth of the posterior lies in the outer tenth of the emulator's region.
+#'
+#' If the check fails, trust neither the posterior nor the evidence. [calibrate_refined()] then
+#' makes an emulator for the region and tries again. The likelihoods of the `exact` runs correct the
+#' evidence, so that it is the simulator's own.
+#'
+#' For an ensemble made elsewhere, the check uses runs left out one by one. It takes the fifth of
+#' them (at least 20) that lie nearest to the posterior.
 #'
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].
-#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed;
-#'   default 2/N), `inclusion` (prior probability that a condition drives the discrepancy at all,
-#'   0.2), `amplitude` (scale of the half-Cauchy prior of the discrepancy's standard deviation if it
-#'   does, in the target's unit; default the noise), `reach` (see *Model*; `c(13, 300, Inf)`, in the
-#'   region of a mode 13), `time_constants` (hours) of the filter bank, `error_times` (hours) and
-#'   `error_ratios` (variance beside the white noise) of the autocorrelated error, `error_draws`
-#'   (posterior draws kept for the discrepancy over time), `check` (runs of the simulator at
-#'   posterior draws, 40; 0 for none), `exact` (runs that correct the evidence; default those of the
-#'   check; 0 for none), and `ais`, options of [ais()] (here `pilot_chains` 400, `groups` 8,
-#'   `max_groups` 16, `max_sweeps` 12, `precision` 0.2, with gradients). Defaults of the times:
-#'   `time_constants` of 0, 2, 4, 8, ... 64 steps of the record, up to a sixth of the calibration
-#'   rows: give longer ones where the system is slower; `error_times` of 2 and 8 steps.
+#' @param control List of options, with their defaults:
+#'   * `confidence`: how firmly `noise_sd` is believed, c in `[2/N, 1]` (2/N).
+#'   * `inclusion`: prior probability that a condition drives the discrepancy at all (0.2).
+#'   * `amplitude`: scale of the half-Cauchy prior of the discrepancy's standard deviation if a
+#'     condition drives it, in the target's unit (the noise).
+#'   * `reach`: see *Model* (`c(13, 300, Inf)`; in the region of a mode 13).
+#'   * `time_constants`: time constants of the filter bank in hours (0, 2, 4, 8, ... 64 steps of the
+#'     record, up to a sixth of the calibration rows). Give longer ones if the system is slower.
+#'   * `error_times`: time constants of the autocorrelated error in hours (2 and 8 steps).
+#'   * `error_ratios`: variance of the autocorrelated error relative to the white noise (`c(0, 0.3,
+#'     1, 3, 10, 30, 100)`).
+#'   * `error_draws`: posterior draws kept for the discrepancy over time (32).
+#'   * `check`: runs of the simulator at posterior draws (40; 0 for none).
+#'   * `exact`: runs that correct the evidence (those of the check; 0 for none).
+#'   * `ais`: options of [ais()], here with gradients and the defaults `pilot_chains` 400, `groups`
+#'     8, `max_groups` 16, `max_sweeps` 12 and `precision` 0.2.
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @param threads Number of threads; the result does not depend on it.
-#' @return An object of class `amiss_calibration`. `values` and `weights` are the draws of the
-#'   parameters; `log_evidence`, `standard_error` and `interval` its evidence (natural logarithms;
-#'   what is printed has those to the base of 10); `trust`, whether the numbers can be believed
-#'   (`trusted`) and why not (`verdict`); `reach` the posterior probability of each reach; `check`
-#'   what the runs said of the emulator: `error` (RMS at the record's rows), `ratio` (over the
-#'   noise), `border` (share of the posterior in the outer tenth of the emulator's region), `z2`
-#'   (mean square in units of the emulator's own standard deviations), `effective` (effective share
-#'   of the draws under the exact weights), `passed` and `verdict`.
+#' @return An object of class `amiss_calibration`:
+#'   * `values`, `weights`: the draws of the parameters.
+#'   * `log_evidence`, `standard_error`, `interval`: the evidence in natural logarithms. The printed
+#'     evidence is in logarithms to the base of 10.
+#'   * `trust`: whether the numbers can be believed (`trusted`) and why not (`verdict`).
+#'   * `reach`: the posterior probability of each reach.
+#'   * `check`: what the runs said about the emulator, see below.
+#'
+#'   The elements of `check` are
+#'
+#'   * `error`: the emulator's error, RMS at the record's rows.
+#'   * `ratio`: that error divided by the noise.
+#'   * `border`: share of the posterior in the outer tenth of the emulator's region.
+#'   * `z2`: mean square error in units of the emulator's own standard deviations.
+#'   * `effective`: effective share of the draws under the exact weights.
+#'   * `passed` and `verdict`: whether the check passed, and the same in words.
 #' @source Kennedy and O'Hagan (2001), Bayesian calibration of computer models, Journal of the Royal
 #'   Statistical Society B 63, 425-464, for simulation plus discrepancy plus error. The covariance,
 #'   its priors and the check are in `vignette("algorithm", "amiss")`, *One covariance*, *The

@@ -1,35 +1,50 @@
 #' Read runs as Calibro and ESP-r write them
 #'
-#' A folder of four tables: `obs.csv`, the record of the target (N x 1); `bc.csv`, the boundary
-#' conditions (N x S); `inputs.csv`, the parameters, one run a row (M x P); and `sims.csv`, the
-#' runs, one a column (N x M). Each may have a line of names; otherwise conditions are called `bc1`,
-#' `bc2`, ... and parameters `p1`, `p2`, ... or as in `parameters`.
+#' @description
+#' Reads a folder of four tables:
 #'
-#' ESP-r puts a row of zeros, the base case, first in `inputs.csv`. It stays if it has its run and
-#' lies between the others, as it does where values are relative to their ranges; otherwise it is no
-#' run of the design and is left out.
+#' * `obs.csv`: the record of the target (N x 1).
+#' * `bc.csv`: the boundary conditions (N x S).
+#' * `inputs.csv`: the parameters, one run a row (M x P).
+#' * `sims.csv`: the runs, one a column (N x M).
+#'
+#' Each may have a line of names. Without it, conditions are called `bc1`, `bc2`, ..., and
+#' parameters `p1`, `p2`, ... or as in `parameters`.
+#'
+#' @details
+#' ESP-r puts a row of zeros, the base case, first in `inputs.csv`. The row stays if it has its run
+#' and lies between the others, as it does if values are relative to their ranges. Otherwise it is
+#' no run of the design and is left out.
 #'
 #' @section The command: `exec/calibrino -c NAME -b bc.csv -i inputs.csv -o obs.csv -s sims.csv
-#'   --fmt json,html` reads such tables, calls [amiss()] and writes `calibro_report.json` and, by
-#'   [report()], the other formats into the working directory; `--help` lists the options. What
-#'   ESP-r reads there: of each parameter the median and 95 % limits, in the values of `inputs.csv`
-#'   (`CALIBRATION_RESULTS`, `theta.stats`), and the RMSE of the simulation before the calibration
-#'   (of the base case if it is among the runs kept, else of the emulator at the middle of each
-#'   prior) and after it (`CALIBRATED_MODEL_GOF`). Priors are uniform over the range of each column
-#'   of `inputs.csv`. ESP-r's names `what:where` become `what.where`. Besides: [Sobol
-#'   indices][sobol_indices()], the training of the emulator, the data set. One record is calibrated
-#'   at a time. Where nothing can be calibrated the file holds the `error` alone, and the exit
-#'   status is 1 (2 where the usage is bad).
+#'   --fmt json,html` reads such tables and calls [amiss()]. It writes `calibro_report.json` and, by
+#'   [report()], the other formats into the working directory. `--help` lists the options.
+#'
+#'   ESP-r reads this in `calibro_report.json`:
+#'   * `CALIBRATION_RESULTS`, `theta.stats`: the median and 95 % limits of each parameter, in the
+#'     values of `inputs.csv`.
+#'   * `CALIBRATED_MODEL_GOF`: the RMSE of the simulation before and after the calibration. Before,
+#'     it is that of the base case if this is among the runs kept, else of the emulator at the
+#'     middle of each prior.
+#'
+#'   The file also has the [Sobol indices][sobol_indices()], the training of the emulator and the
+#'   data set. ESP-r's names `what:where` become `what.where`.
+#'
+#'   Priors are uniform over the range of each column of `inputs.csv`. One record is calibrated at a
+#'   time. If nothing can be calibrated, the file holds the `error` alone and the exit status is 1
+#'   (2 if the usage is bad).
 #'
 #' @param folder The folder.
 #' @param parameters The [free()] parameters that the columns of `inputs.csv` are, in their order,
-#'   in a list; if not given, the columns stay as they are.
+#'   in a list. If not given, the columns stay as they are.
 #' @param relative `TRUE` if the values in `inputs.csv` go from -1 to 1, the lower and the upper
-#'   limit of the parameter's prior, as ESP-r writes them; this needs `parameters`.
+#'   limit of the parameter's prior, as ESP-r writes them. This needs `parameters`.
 #' @param step_h Length of an interval in hours.
-#' @param files Names of the tables, where they differ: `obs`, `bc`, `inputs`, `sims`.
-#' @return A list: `data`, a data frame of `hour`, `target` and the conditions for [measurements()];
-#'   `boundary`, the names of the conditions; `design` and `outputs` for [ensemble()].
+#' @param files Names of the tables, if they differ: `obs`, `bc`, `inputs`, `sims`.
+#' @return A list:
+#'   * `data`: a data frame of `hour`, `target` and the conditions for [measurements()].
+#'   * `boundary`: the names of the conditions.
+#'   * `design`, `outputs`: for [ensemble()].
 #' @examples
 #' folder <- file.path(tempdir(), "calibro")
 #' dir.create(folder, showWarnings = FALSE)

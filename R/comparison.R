@@ -2,56 +2,79 @@ comparison_methods <- c("paper", "history")
 
 comparison_control <- list(emulator = list(), calibration = list(), attribution = list())
 
-#' Compare models by their evidence, and what practice does beside it
+#' Compare models by their evidence and by the criteria of practice
 #'
-#' Every model is simulated on one design seed, trained and calibrated on the same record. What
-#' comes out is the evidence with its interval, Bayes factors in the words of the paper's table 1,
-#' posterior probabilities (equal ones beforehand), what each model's discrepancy answers to, and
-#' its parameters. Beside them stand the criteria by which models are chosen in practice, so that
-#' one sees where they mislead.
+#' @description
+#' Simulates every model, trains its emulator and calibrates it on the same record, all with one
+#' seed. The result has
 #'
-#' *The criteria.* The root mean squared error is that of the simulation averaged over the
-#' posterior, in calibration and on held-out rows. Likelihood, AIC, BIC and likelihood ratio are
-#' taken where the simulator itself (not its emulator) has the least squared error within the
-#' priors, as if errors were independent and normal with one unknown variance: k counts the
-#' parameters and that variance, as `AIC()` of an [lm()] does. The likelihood ratio is that against
-#' the last earlier model that is nested: whose parameters all stand in this one with the same
-#' priors. By names alone it cannot be known whether the smaller model is a special case of the
-#' larger within the priors; where an added parameter ends at the edge of its range the chi-square
-#' distribution of the statistic does not hold, and `lr_note` says so. None of these criteria knows
-#' that a simulation has a discrepancy; `autocorrelation` (of the least-squares errors at one step)
-#' shows how far they are from the independence that they take for granted.
+#' * the evidence with its interval, and Bayes factors in the words of the paper's table 1,
+#' * posterior probabilities (equal ones beforehand),
+#' * the conditions to which each model's discrepancy responds, and
+#' * the parameters of each model.
+#'
+#' Criteria by which models are chosen in practice are listed as well, so that one sees where they
+#' mislead.
+#'
+#' # Criteria
+#'
+#' The root mean squared error is that of the simulation averaged over the posterior, in calibration
+#' and on held-out rows.
+#'
+#' Likelihood, AIC, BIC and likelihood ratio are those of the parameters at which the simulator
+#' itself (not its emulator) has the least squared error within the priors. They assume that errors
+#' are independent and normal with one unknown variance. k counts the parameters and that variance,
+#' as `AIC()` of an [lm()] does.
+#'
+#' The likelihood ratio compares a model with the last earlier model that is nested in it. A model
+#' is nested if all its parameters are in the larger model with the same priors. Names alone do not
+#' show whether the smaller model is a special case of the larger within the priors. If an added
+#' parameter ends at the edge of its range, the chi-square distribution of the statistic does not
+#' hold. `lr_note` then says so.
+#'
+#' None of these criteria knows that a simulation has a discrepancy. They take independent errors
+#' for granted. `autocorrelation` (of the least-squares errors at one step) shows how far that is
+#' wrong.
 #'
 #' @param models A named list of simulators. Runs made elsewhere ([ensemble()]) are not compared
 #'   here: calibrate each and use [bayes_factor()].
 #' @param measurements The [measurements()].
 #' @param method `"paper"`: [calibrate_paper()] with its variance index; `"history"`: [calibrate()]
 #'   and [attribute_discrepancy()].
-#' @param runs Runs of the first design of each model. On top come those for predictions and the
-#'   least-squares search and, of `"history"`, where the runs are not used, of searches, regions and
-#'   checks ([calibrate_refined()]). `"paper"` is neither checked by runs nor refined.
-#' @param control List of lists: `emulator`, `calibration` and `attribution` (of `"history"` only),
+#' @param runs Runs of the design of each model for `"paper"`, which is neither checked by runs nor
+#'   refined. `"history"` does not use them: it makes runs for searches, regions and checks
+#'   ([calibrate_refined()]). Predictions and the least-squares search take more runs.
+#' @param control List of lists: `emulator`, `calibration` and `attribution` (only for `"history"`),
 #'   as the stages take them.
-#' @param truth Of a synthetic record: a list of the `simulator` and the named `values` that made
-#'   it, to be marked in tables and figures; `NULL` if it is not known.
+#' @param truth For a synthetic record, a list of the `simulator` and the named `values` that made
+#'   it. They are marked in tables and figures. `NULL` if the truth is not known.
 #' @inheritParams upgrade_model
-#' @return An object of class `amiss_comparison`: `models` (of each the calibration `fit`,
-#'   `attribution`, `prediction`, `scores`, `best` (the least-squares parameters) and, of a
-#'   [zone()], draws of its `heat_loss` coefficient), and the tables that `tidy()` gives:
-#'   * `"evidence"`: `log10_evidence` with `lower95` and `upper95`, `trusted`, `log10_bf` of the
-#'     best model against the second, of every other against the one ranked above it (that is
-#'     `against`), with `bf_lower95`, `bf_upper95` and `word`, `log10_bf_first` against the first
-#'     model of the list, posterior `probability`, and `rank`;
+#' @return An object of class `amiss_comparison` with `models`, and the tables that `tidy()` gives
+#'   (see *Tables*). Each of the `models` has
+#'   * `fit`, `attribution`, `prediction`, `scores`: the calibration and what follows from it.
+#'   * `best`: the least-squares parameters.
+#'   * `heat_loss`: 200 draws of the heat loss coefficient in W/K, if the model is a [zone()]. Each
+#'     driver is at its mean over the calibration rows. Name the wind's direction as `circular(Wd)`
+#'     in [measurements()]: otherwise degrees are averaged, and 350 and 10 give 180.
+#'
+#' @section Tables:
+#'   * `"evidence"`: the evidence of each model, see below.
 #'   * `"criteria"`: `k`, `rmse_calibration`, `rmse_validation`, `rmse_best`, `log_likelihood`,
 #'     `aic`, `bic`, `nested`, `lr`, `lr_df`, `lr_p_value`, `lr_note`, `autocorrelation`,
-#'     `converged` (the least-squares search);
-#'   * `"ranking"`: the rank of each model by each criterion;
-#'   * `"attribution"` (columns as in [calibrate_paper()], `index`, or in [attribute_discrepancy()])
-#'     and `"parameters"`, with the column `model`.
+#'     `converged` (the least-squares search).
+#'   * `"ranking"`: the rank of each model by each criterion.
+#'   * `"attribution"`: columns as in [attribute_discrepancy()], or as `index` in
+#'     [calibrate_paper()], with the column `model`.
+#'   * `"parameters"`: the posteriors of the parameters, with the column `model`.
 #'
-#'   `heat_loss` holds 200 draws in W/K at the mean of each driver over the calibration rows. Name
-#'   the wind's direction as `circular(Wd)` in [measurements()]: otherwise degrees are averaged, and
-#'   350 and 10 give 180.
+#'   The columns of `"evidence"` are
+#'   * `log10_evidence`, `lower95`, `upper95`, `trusted`.
+#'   * `log10_bf`, `bf_lower95`, `bf_upper95`, `word`: the Bayes factor against the model named in
+#'     `against`. The best model is compared with the second, every other with the one ranked above
+#'     it.
+#'   * `log10_bf_first`: the factor against the first model of the list.
+#'   * `probability`: posterior probability.
+#'   * `rank`.
 #' @source Monari (2022), table 1 for the words. The likelihood criteria are those of [logLik()],
 #'   [AIC()] and [BIC()].
 #' @examples

@@ -1,18 +1,24 @@
 #' Diagnosis in words
 #'
-#' What is wrong, how sure that is, what would change, what it brings and what remains, as plain
-#' sentences and tables; [report()] sets it out.
+#' Says in plain sentences and tables what is wrong and how sure that is, what would change, what it
+#' brings and what remains. [report()] lays it out.
 #'
 #' @param object An upgrade ([upgrade_model()]).
 #' @param x The summary.
 #' @param ... Not used.
-#' @return A list: `title`, `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`),
-#'   `tag`, `headline`; the sentences `record` (faults of the record), `note`, `sure`, `change`,
-#'   `gain`, `remains` and `inspect` (what to inspect next, to settle what is open); `mechanisms`,
-#'   for each that was adopted its `verdict`, what it `brought`, what speaks `against` it, what fits
-#'   `also` and what to `inspect`; and the tables `scores`, `changes`, `candidates`, `parameters`,
-#'   `attribution` and `method`. Of several records the sentences and `scores` are in units of each
-#'   one's noise, and `records` and `of_records` have the scores of each in its own unit.
+#' @return A list:
+#'   * `title`, `tag`, `headline`.
+#'   * `verdict`: `"named"`, `"likely"`, `"unexplained"` or `"nothing"`.
+#'   * `record`, `note`, `sure`, `change`, `gain`, `remains`: sentences. `record` has the faults of
+#'     the record.
+#'   * `inspect`: sentences that say what to inspect next, to settle what is open.
+#'   * `mechanisms`: for each mechanism adopted, its `verdict`, what it `brought`, what speaks
+#'     `against` it, what fits `also`, and what to `inspect`.
+#'   * `scores`, `changes`, `candidates`, `parameters`, `attribution`, `method`: tables.
+#'   * `stopped_because`, `seed`: as in the upgrade.
+#'
+#'   If there are several records, the sentences and `scores` are in units of each record's noise.
+#'   `records` and `of_records` then have the scores of each in its own unit.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

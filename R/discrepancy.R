@@ -1,15 +1,20 @@
 #' The discrepancy over time
 #'
-#' What the calibrated simulation leaves: the measurement less the simulation at the posterior mean
-#' of its parameters, and the whole response to the boundary conditions that the model lacks, with a
-#' 95 % band.
+#' @description
+#' Gives what the calibrated simulation leaves unexplained, over time:
 #'
-#' Of a calibration as in the paper the discrepancy is that of equation 8, at the same time step.
+#' * the measurement less the simulation at the posterior mean of its parameters, and
+#' * the whole response to the boundary conditions that the model lacks, with a 95 % band.
+#'
+#' @details
+#' For a calibration as in the paper, the discrepancy is that of equation 8, at the same time step.
 #'
 #' @param fit A calibration ([calibrate()], [calibrate_paper()]).
-#' @return An object of class `amiss_discrepancy`: `series`, a data frame with the columns `time`,
-#'   `observed`, `simulated`, `residual`, `discrepancy`, `lower95` and `upper95`; `responses`, one
-#'   column for each condition (`NULL` for the paper's, which has no sum of responses).
+#' @return An object of class `amiss_discrepancy`:
+#'   * `series`: a data frame with the columns `time`, `observed`, `simulated`, `residual`,
+#'     `discrepancy`, `lower95` and `upper95`.
+#'   * `responses`: one column for each condition. `NULL` for [calibrate_paper()], which has no sum
+#'     of responses.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

@@ -5,58 +5,85 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 
 #' Train the emulator of an ensemble
 #'
-#' The runs are put on a basis (singular vectors of the centred runs and a vector of ones) and each
-#' coefficient gets a Gaussian process over the parameters.
+#' Puts the runs on a basis and gives each coefficient a Gaussian process over the parameters. The
+#' basis is the singular vectors of the centred runs and a vector of ones.
 #'
-#' *Mode.* The hyper-parameters, before variances are widened (*Errors*), are those of the greatest
-#' joint density (equation 3 of the paper): likelihood times priors, as a density of `s2`, `eta2`,
-#' `beta` (all in (0, 1)) and `lambda` themselves. The search runs on logits and logarithms, but no
-#' Jacobian enters: with the uniform default priors, `s2`, `eta2` and `beta` are those of the
-#' greatest likelihood.
+#' # Mode
 #'
-#' *Selection.* `"ard"` gives each parameter its own `beta` at once. `"forward"` is the forward
-#' selection of Welch et al. (1992): all parameters share one `beta`; at each stage each of those
-#' that still share it is given its own in turn, and the one that raises the joint density most
-#' keeps it. The selection ends when twice that rise is not significant as chi-squared with one
-#' degree of freedom at `significance / k`, the best of k candidates having been taken (Bonferroni).
-#' It is greedy and costs about 17 times as many evaluations; on the boxes of [paper_box()] its
-#' leave-one-out errors are about 2 % larger.
+#' The hyper-parameters are those of the greatest joint density (equation 3 of the paper):
+#' likelihood times priors. Variances are widened afterwards (*Errors*). The density is one of `s2`,
+#' `eta2`, `beta` (all in (0, 1)) and `lambda` themselves. The search runs on logits and logarithms,
+#' but no Jacobian enters. With the uniform default priors, `s2`, `eta2` and `beta` are therefore
+#' those of the greatest likelihood.
 #'
-#' *Errors.* A run's coefficient varies about the smooth part of its process by the nugget and `1 /
-#' lambda`, as those of the training runs do: both belong to the variance of a prediction and of a
-#' run left out. The series of a run also holds what the basis leaves out. Its standard deviation at
-#' each step, `basis$discarded_sd`, comes from the training runs; as the basis was chosen with them,
-#' it is raised by `M / (M - Q + 1)`, as in generalised cross-validation (Golub, Heath and Wahba
-#' 1979). The mode ignores the uncertainty of the hyper-parameters and that the covariance function
-#' is only a model: where the leave-one-out errors of a coefficient are larger than stated, all its
-#' variances are multiplied by the mean square of these errors in units of their standard deviations
-#' (Bachoc 2013). Means stay as they are. These errors are of hyper-parameters that have not seen
-#' the run left out: those of the mode, moved by one Newton step away from the density of that run
-#' (infinitesimal jackknife with the run's leverage; average information of Gilmour, Thompson and
-#' Cullis 1995). At the mode itself they would be too small (`bench/emulator_coverage.R`).
+#' # Selection
+#'
+#' `"ard"` gives each parameter its own `beta` at once.
+#'
+#' `"forward"` is the forward selection of Welch et al. (1992). All parameters share one `beta` at
+#' first. At each stage each parameter that still shares it is given its own `beta` in turn. The
+#' parameter that raises the joint density most keeps its own. The selection ends when twice that
+#' rise is not significant as chi-squared with one degree of freedom at `significance / k`, because
+#' the best of k candidates was taken (Bonferroni). The selection is greedy and costs about 17 times
+#' as many evaluations. On the boxes of [paper_box()] its leave-one-out errors are about 2 % larger.
+#'
+#' # Errors
+#'
+#' A run's coefficient varies about the smooth part of its process by the nugget and `1 / lambda`,
+#' like those of the training runs. Both belong to the variance of a prediction and of a run left
+#' out.
+#'
+#' The series of a run also holds what the basis leaves out. `basis$discarded_sd` is its standard
+#' deviation at each step, from the training runs. Because the basis was chosen with these runs, it
+#' is raised by `M / (M - Q + 1)`, as in generalised cross-validation (Golub, Heath and Wahba 1979).
+#'
+#' The mode ignores the uncertainty of the hyper-parameters, and the covariance function is only a
+#' model. If the leave-one-out errors of a coefficient are larger than stated, all its variances are
+#' therefore widened (Bachoc 2013). The factor is the mean square of these errors in units of their
+#' standard deviations. Means stay as they are.
+#'
+#' The leave-one-out errors are of hyper-parameters that have not seen the run left out. They are
+#' those of the mode, moved by one Newton step away from the density of that run. This is the
+#' infinitesimal jackknife with the run's leverage and the average information of Gilmour, Thompson
+#' and Cullis (1995). At the mode itself the errors would be too small
+#' (`bench/emulator_coverage.R`).
 #'
 #' @param ensemble An ensemble: [simulate_design()] or [ensemble()].
 #' @param noise_sd Standard deviation of the measurement noise, or the [measurements()], which know
 #'   it. Vectors are kept until `explained` is reached and what is left out (RMS) is below
-#'   `noise_fraction` of it, `max_vectors` at most.
-#' @param control List of options: `explained` (share of variance kept, 0.99), `noise_fraction`
-#'   (discarded RMS as a share of the noise, 0.05), `max_vectors` (30); `selection` (`"ard"` or
-#'   `"forward"`) and its `significance` (0.05); `s2`, `eta2` and `beta`, the two shapes of their
-#'   beta priors (each at least 1; `c(1, 1)`, uniform), and `lambda`, shape a and rate b (squared
-#'   unit of the outputs) of the gamma prior of the noise precision (`c(2, NA)`; `NA` is the square
-#'   root of the machine epsilon times the square of the largest singular value: where the basis
-#'   leaves nothing out, noise at each step of 1.7e-4 of the runs' RMS); `starts` (points looked
-#'   at), `searches` (from the best so many) and `max_evaluations` (for each) of the gradient
-#'   search.
+#'   `noise_fraction` of the noise, but at most `max_vectors`.
+#' @param control List of options, with their defaults:
+#'   * `explained`: share of variance kept (0.99).
+#'   * `noise_fraction`: discarded RMS as a share of the noise (0.05).
+#'   * `max_vectors`: most basis vectors (30).
+#'   * `selection`: `"ard"` or `"forward"` (`"ard"`).
+#'   * `significance`: of the forward selection (0.05).
+#'   * `s2`, `eta2`, `beta`: the two shapes of their beta priors, each at least 1 (`c(1, 1)`,
+#'     uniform).
+#'   * `lambda`: shape a and rate b of the gamma prior of the noise precision (`c(2, NA)`). The rate
+#'     is in the squared unit of the outputs. `NA` is the square root of the machine epsilon times
+#'     the square of the largest singular value. If the basis leaves nothing out, this is noise at
+#'     each step of 1.7e-4 of the runs' RMS.
+#'   * `starts`: points looked at by the gradient search (3).
+#'   * `searches`: searches from the best of these points (1).
+#'   * `max_evaluations`: evaluations of each search (120).
 #' @param threads Number of threads; results do not depend on it.
-#' @return An object of class `amiss_emulator`: `basis`, `processes`, `selection` (data frame of the
-#'   steps of the forward selection: `vector`, `step`, `parameter`, `gain` of the log density),
-#'   `diagnostics`, all leave-one-out, of hyper-parameters that have not seen the run (*Errors*;
-#'   `coefficients`, with `r2` and `coverage95` of each and the factor by which its variances were
-#'   `widened`; `coverage95`, after widening, of all coefficients; `series_rmse`, `series_r2` and
-#'   `series_coverage95` of the reconstructed series), and `trust` (`trusted`, and `verdict`: what
-#'   is wrong with it). `tidy()` gives one row for each coefficient and parameter: its `beta` and,
-#'   after forward selection, the `step` in which it got its own.
+#' @return An object of class `amiss_emulator`:
+#'   * `basis`, `processes`: the basis and the Gaussian processes.
+#'   * `selection`: a data frame of the steps of the forward selection, with `vector`, `step`,
+#'     `parameter` and `gain` of the log density.
+#'   * `diagnostics`: leave-one-out errors (*Errors*), see below.
+#'   * `trust`: `trusted`, and `verdict`, which says what is wrong with the emulator.
+#'
+#'   The elements of `diagnostics` are
+#'
+#'   * `coefficients`: `r2` and `coverage95` of each coefficient, and the factor by which its
+#'     variances were `widened`.
+#'   * `coverage95`: that of all coefficients, after widening.
+#'   * `series_rmse`, `series_r2`, `series_coverage95`: those of the reconstructed series.
+#'
+#'   `tidy()` gives one row for each coefficient and parameter: its `beta` and, after forward
+#'   selection, the `step` in which it got its own.
 #' @source Monari (2022), An approach for identifying sources of inadequacy and upgrades in models
 #'   with high-dimensional outputs and boundary conditions. Welch, Buck, Sacks, Wynn, Mitchell and
 #'   Morris (1992), Screening, predicting, and computer experiments, Technometrics 34, 15-25. Bachoc

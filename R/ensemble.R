@@ -1,10 +1,10 @@
 #' Design and runs: an ensemble of simulations
 #'
-#' Draws a Latin hypercube over the priors and runs the simulator at each point. Runs that were made
-#' elsewhere enter by [ensemble()].
+#' Draws a Latin hypercube over the priors and runs the simulator at each point. [ensemble()] takes
+#' runs that were made elsewhere.
 #'
 #' @param simulator A simulator: [zone()], [function_simulator()].
-#' @param measurements [measurements()]; the simulator is driven by them.
+#' @param measurements The [measurements()] that drive the simulator.
 #' @param runs Number of runs.
 #' @param seed Seed of the design; if `NULL`, R's generator gives one.
 #' @param threads Number of threads.
@@ -43,22 +43,29 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 
 #' Runs that were made elsewhere
 #'
-#' A design and its runs as an ensemble. Given runs at the validation rows too, a calibration of
-#' them predicts held-out rows, and [upgrade_model()] judges mechanisms by them, each another set of
-#' runs.
+#' Makes an ensemble of a design and its runs. If the runs have the validation rows too, a
+#' calibration of them predicts held-out rows. [upgrade_model()] then judges mechanisms by them;
+#' each mechanism is another set of runs.
 #'
-#' With the `measurements`, `outputs` may hold their calibration rows, calibration and validation
-#' rows in the order of the record, all rows, or all rows of the data before they were averaged:
-#' then the runs are averaged alike. With `time` rows may stand in any order, and what the
-#' measurements do not use may be there too. Either way the ensemble keeps the times of its rows,
-#' and is refused for measurements of others.
+#' # Rows of the runs
 #'
-#' @param design Matrix or data frame of parameter values, one run a row, named columns; at least
-#'   five runs, and two more than there are parameters.
-#' @param outputs Matrix or data frame of outputs, one run a column (one that is not finite is left
-#'   out, with a warning): at the calibration rows of the measurements (those that calibrate and
-#'   have a target), or as said below.
-#' @param parameters The [free()] parameters that the columns of `design` are, in a list; if not
+#' If `measurements` are given, `outputs` may hold one of these:
+#'
+#' * their calibration rows,
+#' * calibration and validation rows in the order of the record,
+#' * all rows, or
+#' * all rows of the data before they were averaged. The runs are then averaged in the same way.
+#'
+#' If `time` is given, rows may be in any order, and may include rows that the measurements do not
+#' use. In both cases the ensemble keeps the times of its rows. Measurements with other times are
+#' then refused.
+#'
+#' @param design Matrix or data frame of parameter values, one run a row, with named columns. At
+#'   least five runs are needed, and two more than there are parameters.
+#' @param outputs Matrix or data frame of outputs, one run a column, at the calibration rows of the
+#'   measurements (those that calibrate and have a target). Other rows are possible, see *Rows of
+#'   the runs*. A run that is not finite is left out, with a warning.
+#' @param parameters The [free()] parameters that the columns of `design` are, in a list. If not
 #'   given, each gets a uniform prior over the range of its column.
 #' @param measurements The [measurements()] that the runs are compared with. Without them `outputs`
 #'   are taken to be at the calibration rows, and validation rows are not known.

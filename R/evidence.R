@@ -1,8 +1,9 @@
 #' Bayes factor of two calibrated models
 #'
-#' Both evidences are densities of the same measured record, so that models with different bases may
-#' be compared. The words are those of Monari (2022), table 1, for what the whole interval supports:
-#' a Bayes factor of 10^3.6 that may as well be 10^-18 is "undecided".
+#' Compares two models by their evidence. Both evidences are densities of the same measured record,
+#' so models with different bases may be compared. The words are those of Monari (2022), table 1.
+#' They say what the whole interval supports: a Bayes factor of 10^3.6 that may as well be 10^-18 is
+#' "undecided".
 #'
 #' @param model,reference Calibrations on the same measurements by the same method ([calibrate()] or
 #'   [calibrate_paper()]).

@@ -1,30 +1,38 @@
 #' Fitted values, evidence and repetition of a calibration
 #'
-#' What R's users expect of a fitted model; of an upgrade it is that of its last model.
+#' Methods of a fitted model for a calibration. For an upgrade they are those of its last model.
 #'
-#' @section The likelihood: `logLik()` is an error, and with it `AIC()` and `BIC()`: the discrepancy
-#' is integrated out and its settings are shares and grids with priors, so that no number of free
-#' parameters goes with a greatest likelihood. The evidence, `log_evidence` of the fit, is what
-#' models are compared by ([bayes_factor()]; `logml()` and `bf()` of the package `bridgesampling`
-#' give it as well). AIC and BIC of the simulator fitted by least squares are among the criteria of
-#' [compare_models()].
+#' @section The likelihood: `logLik()` is an error, and so are `AIC()` and `BIC()`. The discrepancy
+#'   is integrated out and its settings are shares and grids with priors. No number of free
+#'   parameters goes with a greatest likelihood.
 #'
-#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or, but for `update()`, an
+#'   Compare models by the evidence, `log_evidence` of the fit ([bayes_factor()]; `logml()` and
+#'   `bf()` of the package `bridgesampling` give it as well). AIC and BIC of the simulator fitted by
+#'   least squares are among the criteria of [compare_models()].
+#'
+#' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or, except for `update()`, an
 #'   upgrade ([upgrade_model()]).
 #' @param data Not used; the record is part of the fit.
 #' @param newdata As in [predict.amiss_fit()].
 #' @param emulator,measurements What is calibrated; by default the same again.
 #' @param control Options that change; the others stay as they were given.
-#' @param ... Not used, but in `augment()` with `newdata`, where [predict.amiss_fit()] takes them:
-#'   an argument that is not known is an error.
+#' @param ... Only used by `augment()` with `newdata`: arguments of [predict.amiss_fit()]. An
+#'   argument that is not known is an error.
 #' @inheritParams calibrate
-#' @return `fitted()`, `residuals()`: the posterior mean of the simulation at the calibration rows,
-#'   without the discrepancy, and what it leaves. `nobs()`: the number of these rows. `glance()`: a
-#'   data frame of one row with `log10_evidence` and its interval, `trusted`, `emulator_error` (of
-#'   the check by runs, in units of the noise), `sigma` (of what the simulation leaves), `nobs`,
-#'   `vectors` and `runs`. `augment()`: the record with `.fitted` and `.resid`; with `newdata` its
-#'   prediction, with `.lower` and `.upper` too. `update()`: a new calibration by the same emulator
-#'   (one that was refined for its region is not refined again).
+#' @return
+#'   * `fitted()`: the posterior mean of the simulation at the calibration rows, without the
+#'     discrepancy.
+#'   * `residuals()`: what `fitted()` leaves.
+#'   * `nobs()`: the number of these rows.
+#'   * `glance()`: a data frame of one row, see below.
+#'   * `augment()`: the record with `.fitted` and `.resid`; with `newdata` its prediction, with
+#'     `.lower` and `.upper` too.
+#'   * `update()`: a new calibration by the same emulator. A calibration that was refined for its
+#'     region is not refined again.
+#'
+#'   The columns of `glance()` are `log10_evidence` and its interval, `trusted`, `emulator_error`
+#'   (of the check by runs, in units of the noise), `sigma` (of what the simulation leaves), `nobs`,
+#'   `vectors` and `runs`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

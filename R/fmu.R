@@ -1,36 +1,41 @@
 #' A simulator that is an FMU
 #'
-#' Modelica tools, Simulink and many others export a model as a functional mock-up unit (FMU): an
-#' archive with the model's description and its compiled code. `fmu_simulator()` calibrates
-#' parameters of one that is exported for *co-simulation* by FMI 2.0 or 3.0. [fmu_variables()] lists
-#' what an FMU has.
+#' Calibrates parameters of a functional mock-up unit (FMU) that is exported for *co-simulation* by
+#' FMI 2.0 or 3.0. Modelica tools, Simulink and many others export a model as an FMU: an archive
+#' with the model's description and its compiled code. [fmu_variables()] lists what an FMU has.
+#'
+#' # Parameters and inputs
 #'
 #' *Parameters* are named as in the FMU. Their priors lie within its limits. All other parameters
 #' keep their start values, but for those in `fixed`. A state whose start the FMU lets be set can
 #' stand in both places, too.
 #'
-#' *Inputs* are driven by columns of the record, in the FMU's units: convert the columns (a Modelica
-#' model wants K, not degC). A value holds for its whole row; of a Boolean, 0 is `FALSE`. An input
-#' that is not driven keeps its start value; `print()` says so.
+#' *Inputs* are driven by columns of the record, in the FMU's units. Convert the columns if
+#' necessary: a Modelica model wants K, not degC. A value holds for its whole row. For a Boolean, 0
+#' is `FALSE`. An input that is not driven keeps its start value; `print()` says so.
 #'
-#' *The output* is in the FMU's unit, too. By default it is the mean over each row, as most records
-#' hold means: the trapezoidal rule over the communication points, `steps_per_row` in each row. More
-#' steps make it closer. An FMU cannot be held at the record while it warms up: give a `warmup` that
-#' is long enough for its start to be forgotten.
+#' # Output and time
+#'
+#' *The output* is in the FMU's unit, too. By default it is the mean over each row, because most
+#' records hold means. The mean is the trapezoidal rule over the communication points,
+#' `steps_per_row` in each row. More steps make it closer. An FMU cannot be held at the record while
+#' it warms up: give a `warmup` that is long enough for its start to be forgotten.
 #'
 #' *Time* begins at `start` with the first row of each unbroken segment. A model that knows the
 #' date, by the sun or by a schedule, needs a function: `function(time) as.numeric(difftime(time,
 #' as.POSIXct("2024-01-01", tz = "UTC"), units = "secs"))`.
 #'
+#' # Trust and processes
+#'
 #' *Trust.* The code of an FMU can do whatever you can. To describe or print it runs none of it; its
 #' library is loaded at the first run. A study file that uses one is refused unless you trust it
 #' ([run_study()]).
 #'
-#' *Processes.* An FMU runs in a process of its own, one for each worker of [future::plan()], which
-#' is kept from run to run. If the FMU crashes, or a run takes longer than `time_limit`, that run
-#' alone is lost: it is `NaN`, a warning says why, and the next run has a new process. No process
-#' stays when R ends, is interrupted or is killed. Text that the FMU prints is not shown, but its
-#' last lines are part of the warning.
+#' *Processes.* An FMU runs in a process of its own, one for each worker of [future::plan()]. The
+#' process is kept from run to run. If the FMU crashes, or a run takes longer than `time_limit`,
+#' that run alone is lost. It is `NaN`, a warning says why, and the next run has a new process. No
+#' process stays when R ends, is interrupted or is killed. Text that the FMU prints is not shown,
+#' but its last lines are part of the warning.
 #'
 #' @param file Path of the FMU.
 #' @param ... The parameters, each made by [free()], with the name of a parameter of the FMU.
@@ -54,9 +59,10 @@
 #' @param logging Whether the FMU is asked for all its messages, to see why runs fail.
 #' @param name A name for people; the FMU's own if not given.
 #' @return An object of class `amiss_fmu_simulator`.
-#' @section Errors: `amiss_error_fmu` (and `amiss_error_input`) if the archive is damaged, unsafe to
-#'   unpack, for model exchange only or for another platform; `amiss_error_input` for names that the
-#'   FMU does not have, or uses in another way.
+#' @section Errors:
+#'   * `amiss_error_fmu` (and `amiss_error_input`): the archive is damaged, unsafe to unpack, for
+#'     model exchange only or for another platform.
+#'   * `amiss_error_input`: a name that the FMU does not have, or uses in another way.
 #' @seealso `vignette("fmu", "amiss")`
 #' @examplesIf requireNamespace("xml2", quietly = TRUE) && nzchar(Sys.which("make"))
 #' source(system.file("examples", "fmu", "build.R", package = "amiss"))

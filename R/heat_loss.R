@@ -1,14 +1,14 @@
 #' Heat loss coefficient of a zone
 #'
-#' The heat that holding the zone's air warmer than all that surrounds it takes in the steady state,
-#' per kelvin: conduction through walls and windows, and air exchange. It comes from the simulator
-#' itself, so that whatever the zone is composed of counts. Sun and gains are off, and the sky is as
-#' warm as the air outside.
+#' Gives the heat per kelvin that it takes, in the steady state, to hold the zone's air warmer than
+#' its surroundings. It counts conduction through walls and windows, and air exchange. It comes from
+#' the simulator itself, so all that the zone is composed of counts. Sun and gains are off, and the
+#' sky is as warm as the air outside.
 #'
 #' @param simulator A [zone()].
 #' @param values Matrix of parameter values, one row a point, named columns; or one named vector.
 #' @param drivers Named vector of the driver columns that are neither temperatures nor sun, sky or
-#'   power, such as wind speed and direction; what is not named is 0.
+#'   power, such as wind speed and direction. What is not named is 0.
 #' @param outside,inside Temperatures, degC. Only buoyancy and the density of air depend on them.
 #' @return Heat loss coefficients, W/K, one for each point.
 #' @examples

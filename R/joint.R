@@ -4,34 +4,44 @@
 
 #' Calibrate several records together
 #'
-#' Two or more measured series, each with its own noise, error and discrepancy, and one set of
-#' parameters: temperature and heat flux of one room, two rooms, two houses with the same walls.
-#' Given the parameters the records are independent; parameters of the same name are one parameter
-#' with one prior, others belong to the records whose simulators have them, or that go by another
-#' name ([rename_parameters()]). Emulators are trained and checked by runs for each record, and
-#' refined where the joint posterior lies, as [calibrate_refined()] does for one.
+#' Calibrates one set of parameters on two or more measured series, each with its own noise, error
+#' and discrepancy. Examples are temperature and heat flux of one room, two rooms, or two houses
+#' with the same walls.
 #'
-#' @param simulators Named list of simulators, one for each record. Several outputs of one function
-#'   are [outputs_of()] it; the heat flux into a wall of a zone is [zone_flux()].
+#' Given the parameters the records are independent. Parameters of the same name are one parameter
+#' with one prior. Others belong to the records whose simulators have them. [rename_parameters()]
+#' gives a parameter another name in one record.
+#'
+#' Emulators are trained and checked by runs for each record. They are refined where the joint
+#' posterior lies, as [calibrate_refined()] does for one record.
+#'
+#' @param simulators Named list of simulators, one for each record. [outputs_of()] makes them of one
+#'   function with several outputs; [zone_flux()] is the heat flux into a wall of a zone.
 #' @param measurements Named list of [measurements()], with the same names.
 #' @param runs `simulate_jointly()`: runs of each simulator, all of one design.
 #'   `calibrate_jointly()`: as in [calibrate_refined()], for each record.
 #' @param ensembles Named list of ensembles: those of `simulate_jointly()`, or of [ensemble()] for
 #'   runs that were made elsewhere (which are checked, but not refined).
 #' @inheritParams calibrate_refined
-#' @return `simulate_jointly()`: a named list of ensembles. `calibrate_jointly()`: an object of
-#'   class `amiss_joint`: `records`, a named list of calibrations ([calibrate()]) whose draws are
-#'   those of the joint posterior, for [discrepancy()], `predict()`, `plot()` and all else that
-#'   concerns one record; `values` and `weights`, draws of all parameters; `log_evidence`,
-#'   `standard_error`, `interval`: the evidence, a density of all records; `trust`; `rounds` and
-#'   `runs_made` as [calibrate_refined()] has them. `coef()`, `confint()`, `vcov()`, `tidy()`,
-#'   `as.data.frame()`, `predict()` (a list by record) and [bayes_factor()] work on it.
+#' @return `simulate_jointly()`: a named list of ensembles.
+#'
+#'   `calibrate_jointly()`: an object of class `amiss_joint` with
+#'   * `records`: a named list of calibrations ([calibrate()]) whose draws are those of the joint
+#'     posterior. Use them for [discrepancy()], `predict()`, `plot()` and all else that concerns one
+#'     record.
+#'   * `values`, `weights`: draws of all parameters.
+#'   * `log_evidence`, `standard_error`, `interval`: the evidence, a density of all records.
+#'   * `trust`.
+#'   * `rounds`, `runs_made`: as in [calibrate_refined()].
+#'
+#'   `coef()`, `confint()`, `vcov()`, `tidy()`, `as.data.frame()`, `predict()` (a list by record)
+#'   and [bayes_factor()] work on it.
 #' @section Errors: `amiss_error_input` if names differ, a parameter has two priors, or fewer than
 #'   two records are given.
 #' @source The joint posterior is that of [calibrate()] with the product of the records'
 #'   likelihoods; `vignette("algorithm", "amiss")`, *Several records*.
-#' @seealso [attribute_discrepancy()] tells which conditions drive the discrepancy of each record,
-#'   and of all; [upgrade_model()] takes several records as well.
+#' @seealso [attribute_discrepancy()] says which conditions drive the discrepancy of each record,
+#'   and of all. [upgrade_model()] takes several records as well.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)

@@ -1,42 +1,54 @@
 #' Measurements: the target, the boundary conditions and what each row is for
 #'
-#' Checks a table of measurements and prepares it for all later stages: the record is cut into
-#' segments wherever time is broken, averaged to a coarser step if asked (blocks follow the UTC
-#' clock), and each row is given its use: calibration, validation or warm-up. Time stamps mark the
-#' end of each interval: where yours mark the beginning, add a step first.
+#' @description
+#' Checks a table of measurements and prepares it for all later stages:
+#'
+#' * The record is cut into segments wherever time is broken.
+#' * It is averaged to a coarser step if asked (blocks follow the UTC clock).
+#' * Each row is given its use: calibration, validation or warm-up.
+#'
+#' Time stamps mark the end of each interval. If yours mark the beginning, add a step first.
 #'
 #' # Time
 #'
 #' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text in
-#' one format: ISO 8601 (`2013-08-30T00:10:00`, with an offset such as `Z` or `+02:00` or without),
-#' `30.08.2013 00:10`, `30/08/2013 00:10` or `08/30/2013 12:10 AM` (where the whole column tells day
-#' from month), the stamps of EnergyPlus (` 01/21 24:00:00`, hours of a year that is not known),
-#' numbers. Midnight may be `24:00:00`. A `Date` is its beginning, 00:00 UTC: for daily values that
-#' are dated by their day give `date + 1`.
+#' one format:
 #'
-#' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Unix time, digits of a date
-#' such as 201308300010, and days that Excel, MATLAB or astronomers count are recognised, with a
-#' message, if they cannot be hours. Numbers that could be several things are an error that names
-#' the `time_format` of each: daily digits of two-digit years, whole days of Excel, steps of 5, 10,
-#' 60 or 600, a column called `day` or `seconds`. What stays open is an error, and `time_format`
-#' settles it.
+#' * ISO 8601 (`2013-08-30T00:10:00`), with or without an offset such as `Z` or `+02:00`;
+#' * `30.08.2013 00:10`;
+#' * `30/08/2013 00:10` or `08/30/2013 12:10 AM`, if the whole column tells day from month;
+#' * the stamps of EnergyPlus (` 01/21 24:00:00`, hours of a year that is not known);
+#' * numbers.
 #'
-#' Text without an offset is UTC, or local in `time_zone`: of the hour that is there twice when
-#' daylight saving ends, the column's order tells the first from the second; a time that its
-#' beginning leaves out is an error. Text that steps as the clocks of a common zone do on such a day
-#' is not read as UTC unless `time_zone = "UTC"` says so.
+#' Midnight may be `24:00:00`. A `Date` is its beginning, 00:00 UTC. For daily values that are dated
+#' by their day, give `date + 1`.
 #'
-#' The record keeps time as `POSIXct`, with the clock of `time_zone`, or as hours where no date is
-#' known; simulators and figures are given that.
+#' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Other numbers are recognised,
+#' with a message, if they cannot be hours: Unix time, digits of a date such as 201308300010, and
+#' days that Excel, MATLAB or astronomers count. Numbers that could be several things are an error
+#' that names the `time_format` of each. Examples are daily digits of two-digit years, whole days of
+#' Excel, steps of 5, 10, 60 or 600, and a column called `day` or `seconds`. What stays open is an
+#' error, and `time_format` settles it.
+#'
+#' Text without an offset is UTC, or local in `time_zone`. When daylight saving ends, one hour is
+#' there twice; the column's order tells the first from the second. A time that the beginning of
+#' daylight saving leaves out is an error. Text that steps as the clocks of a common zone do on such
+#' a day is not read as UTC unless `time_zone = "UTC"` says so.
+#'
+#' The record keeps time as `POSIXct`, with the clock of `time_zone`. If no date is known, it keeps
+#' hours. Simulators and figures are given that.
 #'
 #' # Gaps
 #'
-#' Rows whose target is `NA` drive the simulator and are left out of the comparison; so is an
-#' average that holds one. A lost row does not break the record: its drivers are interpolated
-#' linearly. So are those of longer gaps, and values that a driver lacks, up to `fill_gaps` hours.
-#' Where more is lost the record is cut. Stamps that stray by up to a quarter of a step are taken at
-#' the nearest of equal steps; rows at none, up to a tenth of all, are left out. Each of these is
-#' told.
+#' Rows whose target is `NA` drive the simulator and are left out of the comparison. An average that
+#' holds such a row is left out, too.
+#'
+#' A lost row does not break the record: its drivers are interpolated linearly. Longer gaps, and
+#' values that a driver lacks, are filled in the same way up to `fill_gaps` hours. If more is lost,
+#' the record is cut.
+#'
+#' Stamps that stray by up to a quarter of a step are taken at the nearest of equal steps. Rows at
+#' no step, up to a tenth of all, are left out. Each of these changes is reported.
 #'
 #' # Faults of a record
 #'
@@ -56,33 +68,32 @@
 #' [upgrade_model()] adds what its base model shows: clocks that differ, a start that is not
 #' forgotten, a step of the sensor. While a finding stands, a mechanism is *likely* at most.
 #'
-#' @param data A data frame, or a series of class `zoo`, `xts`, `ts` or `tsibble`; every numeric
+#' @param data A data frame, or a series of class `zoo`, `xts`, `ts` or `tsibble`. Every numeric
 #'   column may drive the simulator. A `ts` of 24 values a cycle, or a multiple of that, counts
 #'   days.
 #' @param time Name of the time column; a series that knows its own needs none.
 #' @param target Name of the measured target.
 #' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws +
-#'   circular(Wd)` or their names. A circular quantity (degrees) enters as sine and cosine, one that
-#'   is `TRUE` or `FALSE` as 1 or 0.
+#'   circular(Wd)`, or their names. A circular quantity (degrees) enters as sine and cosine. One
+#'   that is `TRUE` or `FALSE` enters as 1 or 0.
 #' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's
-#'   unit; or `"bootstrap"` or [bootstrap_noise()], which estimate it from the readings inside each
-#'   average. If not given, the standard error of the averages is taken. Both need `average`.
+#'   unit. `"bootstrap"` or [bootstrap_noise()] estimate it from the readings inside each average.
+#'   If not given, the standard error of the averages is taken. Both need `average`.
 #' @param average Width of the averages in hours; `NULL` keeps the step of the data.
-#' @param calibrate,validate Logical vectors (or expressions in the columns of `data`, as text) that
-#'   say which rows calibrate and which validate. Without both all rows calibrate; without
-#'   `calibrate`, all but those that validate; without `validate`, none validate. At least 20 rows
-#'   must calibrate. Rows of neither use still drive the simulator. In text the record's time may be
-#'   called `time`. Texts in quotes are compared with times as times, in the format of their column
-#'   or as ISO 8601 and in `time_zone` (`"time >= '2013-09-02'"`), with numbers as numbers.
+#' @param calibrate,validate Which rows calibrate and which validate: logical vectors, or
+#'   expressions in the columns of `data`, as text (see *Choosing rows*).
 #' @param warmup Hours at the start of each segment that are left out, so that the simulator's
 #'   unknown initial state is forgotten.
 #' @param name,unit A name for the record, and the target's unit, for people.
-#' @param time_format What the time column holds, if it does not tell itself: of text `"dmy"` or
-#'   `"mdy"`; of numbers `"seconds"`, `"minutes"`, `"hours"`, `"days"` (`warmup`, `average` and
-#'   `fill_gaps` stay in hours: 5 s are `5 / 3600`), `"unix"` (since 1970, in seconds, milliseconds,
-#'   microseconds or nanoseconds), or days counted from a date: `"excel"` (41516 is 30 August 2013),
-#'   `"matlab"`, `"julian"`, `"mjd"` (modified Julian), `"unix_days"` (since 1970); of either a
-#'   format of [strptime()] (`"%Y%m%d%H"`).
+#' @param time_format What the time column holds, if it does not show that itself:
+#'   * text: `"dmy"` or `"mdy"`;
+#'   * numbers: `"seconds"`, `"minutes"`, `"hours"` or `"days"` (`warmup`, `average` and `fill_gaps`
+#'     stay in hours: 5 s are `5 / 3600`);
+#'   * numbers since 1970: `"unix"` (seconds, milliseconds, microseconds or nanoseconds) or
+#'     `"unix_days"`;
+#'   * days counted from a date: `"excel"` (41516 is 30 August 2013), `"matlab"`, `"julian"`,
+#'     `"mjd"` (modified Julian);
+#'   * either: a format of [strptime()] (`"%Y%m%d%H"`).
 #' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in:
 #'   `"UTC"`, or a name such as `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight
@@ -92,12 +103,25 @@
 #'   condition are refused.
 #' @param range Lower and upper end of the range of the target's sensor. Rows at an end, or beyond,
 #'   are left out of the comparison.
-#' @return An object of class `amiss_measurements`. Of each row, after averaging, `time`, `hours`,
-#'   the target `y` and `use` (`"calibrate"`, `"validate"`, `"warmup"` or `"none"`); the calibration
-#'   rows are those of the first use whose `y` is not `NA`. `noise` says how `noise_sd` came about
-#'   (`method`, and `per_step`, the value of each average, where it was estimated). `findings` is a
-#'   data frame with a row for each fault of the record: `id`, `column`, `rows`, `value`, and what
-#'   it `says`.
+#' @return An object of class `amiss_measurements`:
+#'   * `time`, `hours`: of each row, after averaging.
+#'   * `y`: the target in each row.
+#'   * `use`: `"calibrate"`, `"validate"`, `"warmup"` or `"none"`. The calibration rows are those
+#'     with `"calibrate"` whose `y` is not `NA`.
+#'   * `noise`: how `noise_sd` came about (`method`). If it was estimated, `per_step` has the value
+#'     of each average.
+#'   * `findings`: a data frame with a row for each fault of the record: `id`, `column`, `rows`,
+#'     `value`, and what it `says`.
+#' @section Choosing rows: `calibrate` and `validate` set the use of the rows:
+#'   * With neither, all rows calibrate.
+#'   * Without `calibrate`, all rows calibrate but those that validate.
+#'   * Without `validate`, none validate.
+#'
+#'   At least 20 rows must calibrate. Rows of neither use still drive the simulator.
+#'
+#'   In an expression the record's time may be called `time`. Texts in quotes are compared with
+#'   numbers as numbers, and with times as times (`"time >= '2013-09-02'"`). They are then read in
+#'   the format of their column or as ISO 8601, and in `time_zone`.
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6)
@@ -458,18 +482,22 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 
 #' Noise of averages, by bootstrapping the readings
 #'
-#' Given as `noise_sd` to [measurements()], which must `average`: the readings inside each averaging
-#' window are drawn again with replacement, and the standard deviation of the means of these draws
-#' is the noise of that average. The RMS over the calibration steps is the noise of the record. As
-#' the number of replicates grows, the plain bootstrap tends to `sqrt((n - 1) / n) * s / sqrt(n)`
-#' for n readings of standard deviation `s`.
+#' Estimates the noise of averages, as `noise_sd` of [measurements()], which must `average`.
+#'
+#' The readings inside each averaging window are drawn again with replacement. The standard
+#' deviation of the means of these draws is the noise of that average. The RMS over the calibration
+#' steps is the noise of the record. As the number of replicates grows, the plain bootstrap tends to
+#' `sqrt((n - 1) / n) * s / sqrt(n)` for n readings of standard deviation `s`.
+#'
+#' # What is taken for noise
 #'
 #' What changes inside a window counts as noise: a trend of `d` per reading adds `d^2 (n^2 - 1) /
 #' 12` to `s^2 (n - 1) / n`. `detrend` takes a straight line off each window first and bootstraps
-#' the residuals, raised by `sqrt(n / (n - 2))` for the two degrees of freedom that the line uses,
-#' so that neither a trend nor the line biases the variance. Either way the readings' errors are
-#' taken as independent: what they have in common over a window, such as an offset of the sensor, is
-#' not seen, and the noise is then larger than the estimate.
+#' the residuals. They are raised by `sqrt(n / (n - 2))` for the two degrees of freedom that the
+#' line uses. Neither a trend nor the line then biases the variance.
+#'
+#' Either way the readings' errors are taken as independent. What they have in common over a window,
+#' such as an offset of the sensor, is not seen. The noise is then larger than the estimate.
 #'
 #' @param replicates Number of bootstrap draws of each window.
 #' @param detrend Take a straight line off each window first; the paper does not.

@@ -1,23 +1,30 @@
 #' Mechanisms and catalogues
 #'
-#' A mechanism is a named physical change to a model: the edit that makes it, the boundary
-#' conditions that drive it and one sentence for a person. A catalogue holds the mechanisms that
-#' make sense for a model.
+#' `mechanism()` makes a named physical change to a model. It consists of the edit that makes the
+#' change, the boundary conditions that drive it and one sentence for a person. `catalogue()`
+#' collects the mechanisms that make sense for a model.
+#'
+#' # Mechanisms of given runs
+#'
+#' If the model is an [ensemble()] of given runs, `edit` is another ensemble, of runs with the
+#' mechanism. It may also be a function of the present ensemble that returns one. An ensemble is
+#' tried only while it has the parameters of all that was adopted before it.
+#'
+#' # Several records
+#'
+#' If `edit` has two arguments, the second is the name of the record. If there are several records,
+#' `edit` is called for each in turn. It may return the simulator as it is if the mechanism does not
+#' act there. A single record that is not given in a list has the name of the measurements.
 #'
 #' @param name Short name.
 #' @param edit Function of a simulator that returns the extended simulator, with the mechanism's
-#'   parameters declared by [free()]: an edit of a [zone()], [with_parameters()] of a function,
-#'   [with_template()] of a program, [with_fmu()] of an FMU. Of a model that is an [ensemble()] of
-#'   given runs, another ensemble, of runs with the mechanism, or a function of the present ensemble
-#'   that returns one. An ensemble is tried while it has the parameters of all that was adopted
-#'   before it. A function of two arguments gets the name of the record as the second: of several
-#'   records it is called for each in turn, and may return the simulator as it is where the
-#'   mechanism does not act. Of a single record that is not given in a list it is the name of the
-#'   measurements.
-#' @param boundary Names of the boundary conditions that drive the mechanism: those without which it
-#'   would do nothing, or always the same; `character()` for none. Of a mechanism that acts on a
-#'   state, those that drive the state. The order of trials, what is told of the cause and one doubt
-#'   (`vignette("algorithm", "amiss")`, *Naming*) go by them; evidence does not.
+#'   parameters declared by [free()]. It may be an edit of a [zone()], [with_parameters()] of a
+#'   function, [with_template()] of a program or [with_fmu()] of an FMU.
+#' @param boundary Names of the boundary conditions that drive the mechanism; `character()` for
+#'   none. Without them it would do nothing, or always the same. If the mechanism acts on a state,
+#'   give the conditions that drive the state. They decide the order of trials, what is reported as
+#'   the cause, and one doubt (`vignette("algorithm", "amiss")`, *Naming*). They do not change the
+#'   evidence.
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
 #' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class
 #'   `amiss_catalogue`.

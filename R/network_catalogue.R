@@ -1,19 +1,29 @@
 #' A catalogue of mechanisms for a network of a house
 #'
-#' What may be missing in a grey-box model of a house: sun on the air, sun on the envelope, heater
-#' lag, interior mass, direct loss to outdoors, wind-driven leakage, an envelope that stores heat,
-#' heat to a neighbour, heat to the ground, heating output. A mechanism is left out if its driver is
-#' `NULL`, or if the network has it already.
+#' @description Lists what may be missing in a grey-box model of a house:
 #'
-#' The priors have the size of the house that the model describes: conductances up to its loss,
-#' capacities up to a multiple of its own, both at the medians of its priors. Replace a mechanism by
-#' your own where you know more.
+#'   * sun on the air,
+#'   * sun on the envelope,
+#'   * heater lag,
+#'   * interior mass,
+#'   * direct loss to outdoors,
+#'   * wind-driven leakage,
+#'   * an envelope that stores heat,
+#'   * heat to a neighbour,
+#'   * heat to the ground,
+#'   * heating output.
+#'
+#' @details A mechanism is left out if its driver is `NULL`, or if the network has it already.
+#'
+#'   The priors have the size of the house that the model describes. Conductances and capacities go
+#'   up to multiples of the house's own loss and capacity, both at the medians of its priors. If you
+#'   know more, replace a mechanism by your own.
 #'
 #' @param network A [network()], temperatures in degC, heat in kW.
 #' @param air Node of the room's air.
 #' @param envelope Node of the outermost layer of the envelope, or `NULL` if the network has none.
 #' @param outdoors,sun,heating,wind,neighbour Driver columns: outdoor temperature (degC), sun (W/m2,
-#'   or `sun_factor` times kW/m2), heating (kW), wind speed (m/s), temperature next door (degC);
+#'   or `sun_factor` times kW/m2), heating (kW), wind speed (m/s), temperature next door (degC).
 #'   `NULL` if there is none.
 #' @param sun_factor Factor that turns the column of the sun into kW/m2.
 #' @return A [catalogue()].

@@ -19,7 +19,8 @@ network_fields <- list(
 
 #' Parts of a network
 #'
-#' What a [network()] is composed of. Every number may be a [free()] parameter where it stands.
+#' Make the parts that a [network()] is composed of. Every number may be a [free()] parameter where
+#' it stands.
 #'
 #' A *place* is the name of a node or, if no node has that name, of a driver column: a temperature
 #' outside of the network. `by` names a driver column that multiplies the part: wind speed for a
@@ -31,8 +32,8 @@ network_fields <- list(
 #'   state is an amount. `Inf`: the state stays at its `start`, as that of the ground.
 #' @param start State at the start; `NULL`: see [network()].
 #' @param from,to Places. A link joins two, and its sign is that of the heat from the first to the
-#'   second. A flow carries what `from` holds to `to`; with `to = NULL` it is lost, with `from =
-#'   NULL` it brings a constant amount.
+#'   second. A flow carries what `from` holds to `to`. With `to = NULL` it is lost; with `from =
+#'   NULL` the flow brings a constant amount.
 #' @param conductance,resistance One of the two: the heat that a difference of one unit drives, or
 #'   its inverse.
 #' @param rate Amount that is carried each hour for a unit of the state of `from`: a flow in m3/h

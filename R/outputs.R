@@ -2,10 +2,10 @@
 
 #' Outputs of one simulator
 #'
-#' A simulator whose function returns several series in one run, as one simulator for each of them
-#' ([calibrate_jointly()]). They share their runs: for the same values, drivers and, if the function
-#' asks for it, `info`, the function is called once, as long as a session lasts or until the memory
-#' of runs holds ten million numbers.
+#' Makes one simulator for each output of a simulator whose function returns several series in one
+#' run ([calibrate_jointly()]). The simulators share their runs. For the same values, drivers and,
+#' if the function asks for it, `info`, the function is called only once. Runs are kept as long as
+#' the session lasts, or until the memory of runs holds ten million numbers.
 #'
 #' @param simulator A [function_simulator()] whose function returns a matrix with named columns, or
 #'   a data frame.

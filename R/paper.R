@@ -4,54 +4,82 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 
 #' Calibrate a simulator as in the paper
 #'
-#' The method of Monari (2022), its misprints corrected, beside the package's own ([calibrate()],
-#' [attribute_discrepancy()]): the parameters from the measurement's coefficients on the basis
-#' (equation 5), the discrepancy as a Gaussian process over the boundary conditions of the same time
-#' step (equation 6), both by annealed importance sampling, and the variance index of each
-#' condition. It knows neither the history of the conditions nor autocorrelated errors.
+#' @description
+#' Calibrates by the method of Monari (2022), with the paper's misprints corrected. The package's
+#' own method is [calibrate()] followed by [attribute_discrepancy()].
 #'
-#' *Evidence.* The product of the normalising constants of (5) and (6), with the Jacobian
-#' `|K'K|^(-1/2)`, is a density of the calibration record, so that models with different bases may
-#' be compared. The precision `lambda*` of the noise is one quantity, but is drawn once for each
-#' basis vector and once for the discrepancy, as in the paper: the product is the evidence of a
-#' model with as many independent noises. `shared_lambda` draws it once for all basis vectors;
+#' * Equation 5 gives the parameters from the coefficients of the measurement on the basis.
+#' * Equation 6 gives the discrepancy: a Gaussian process over the boundary conditions of the same
+#'   time step.
+#' * The variance index says how much each condition explains.
+#'
+#' Both equations are sampled by annealed importance sampling. The method knows neither the history
+#' of the conditions nor autocorrelated errors.
+#'
+#' # Evidence
+#'
+#' The evidence is the product of the normalising constants of (5) and (6), with the Jacobian
+#' `|K'K|^(-1/2)`. It is a density of the calibration record, so models with different bases may be
+#' compared.
+#'
+#' The precision `lambda*` of the noise is one quantity. As in the paper, it is drawn once for each
+#' basis vector and once for the discrepancy. The product is therefore the evidence of a model with
+#' as many independent noises. `shared_lambda` draws the precision once for all basis vectors;
 #' [calibrate()] draws it once.
 #'
-#' *Variance index.* `R2_s` is the variance of the discrepancy predicted from condition s alone over
-#' the variance of the discrepancy; `R2_0` that of a fictitious condition, white noise; `difference`
-#' = `R2_s - R2_0`. A condition is significant if 0 lies outside the highest-density interval of the
-#' difference. An interval below 0 means that it explains less than white noise does; its rank shows
+#' The prior of the discrepancy's variance is `(1 - t2) / t2` with `t2` uniform. Its median is 1 in
+#' the target's unit squared. The evidence therefore depends on that unit beyond the change of
+#' density, unless `unit` changes with it. The evidence of [calibrate()] does not.
+#'
+#' # Variance index
+#'
+#' `R2_s` is the variance of the discrepancy predicted from condition s alone, divided by the
+#' variance of the discrepancy. `R2_0` is the same for a fictitious condition, white noise.
+#' `difference` is `R2_s - R2_0`.
+#'
+#' A condition is significant if 0 lies outside the highest-density interval of the difference. If
+#' the whole interval is below 0, the condition explains less than white noise does; its rank shows
 #' that.
 #'
-#' The prior of the discrepancy's variance, `(1 - t2) / t2` with `t2` uniform, has its median at 1
-#' in the target's unit squared: unlike [calibrate()]'s, the evidence depends on that unit beyond
-#' the change of density, unless `unit` changes with it.
+#' # Cost
 #'
-#' *Cost.* The kernel of (6) is smooth in the values of the conditions and so of low rank. Beyond
-#' 120 steps its posterior is annealed by way of every 4th, 16th, ... step of the record, with
-#' values that are approximate to `tolerance` nats; at 32 of the final draws they are compared with
-#' certified ones, and the evidence is corrected. `tolerance = 0` computes every value densely, at a
-#' cost that grows with N^3, and anneals from the prior.
+#' The kernel of (6) is smooth in the values of the conditions, so its rank is low. If the record
+#' has more than 120 steps, the posterior of (6) is annealed by way of every 4th, 16th, ... step.
+#' These values are approximate to `tolerance` nats. At 32 of the final draws they are compared with
+#' certified values, and the evidence is corrected. With `tolerance = 0` every value is computed
+#' densely and the annealing starts from the prior; the cost then grows with N^3.
 #'
 #' @inheritParams calibrate
-#' @param control List of options: `confidence` (c in `[2/N, 1]`: how firmly `noise_sd` is believed;
-#'   default 2/N), `shared_lambda` (one noise precision for all basis vectors; `FALSE`), `alpha` and
-#'   `t2` (the two shapes of their beta priors, `c(1, 0.1)` and `c(1, 1)`), `unit` (of the target,
-#'   in whose square `(1 - t2) / t2` is the discrepancy's variance; 1), `fictitious_seed` (of the
-#'   white noise, which is part of the data; 1), `probability` of the highest-density intervals
-#'   (0.95), `tolerance` (0.01, in nats; 0 for dense values), and `ais`, options of [ais()], with
-#'   its defaults (not those of [calibrate()]).
-#' @return An object of class `amiss_paper_calibration`: `values` and `weights` (posterior draws of
-#'   the parameters), `log_evidence`, `standard_error` and `interval` (total), `evidence` (table of
-#'   equations 5 and 6 and the total), `hyperparameters` (draws of `alpha`, the fictitious condition
-#'   last, `t2`, `lambda` and their weights), `lambda` (draws of the precisions of equation 5),
-#'   `index` (ranked: `boundary`, `difference` (posterior median of its `R2` less that of the
-#'   fictitious condition), `mean`, `lower95` and `upper95` (the highest-density interval, so called
-#'   whatever `probability` is), `significant`, `rank`), `share` (draws of `R2`), `trust`, and
-#'   `posterior` and `outside`, all that the sampler said of (5) and (6); `outside$approximation`
-#'   tells the largest error among the certified draws, the correction of the log evidence, and how
-#'   many values were computed: in the stages before the last, and in the last by skeletons and
-#'   directly. [tidy()][posterior] gives the table of the parameters.
+#' @param control List of options, with their defaults:
+#'   * `confidence`: how firmly `noise_sd` is believed, c in `[2/N, 1]` (2/N).
+#'   * `shared_lambda`: one noise precision for all basis vectors (`FALSE`).
+#'   * `alpha`, `t2`: the two shapes of their beta priors (`c(1, 0.1)` and `c(1, 1)`).
+#'   * `unit`: the unit of the target in whose square `(1 - t2) / t2` is the discrepancy's variance
+#'     (1).
+#'   * `fictitious_seed`: seed of the white noise, which is part of the data (1).
+#'   * `probability`: of the highest-density intervals (0.95).
+#'   * `tolerance`: in nats (0.01); 0 computes dense values.
+#'   * `ais`: options of [ais()], with its defaults (not those of [calibrate()]).
+#' @return An object of class `amiss_paper_calibration`:
+#'   * `values`, `weights`: posterior draws of the parameters.
+#'   * `log_evidence`, `standard_error`, `interval`: the total evidence.
+#'   * `evidence`: a table of equations 5 and 6 and the total.
+#'   * `hyperparameters`: draws of `alpha` (the fictitious condition last), `t2`, `lambda`, and
+#'     their weights.
+#'   * `lambda`: draws of the precisions of equation 5.
+#'   * `index`: the ranked variance index, see below.
+#'   * `share`: draws of `R2`.
+#'   * `trust`: whether the numbers can be believed.
+#'   * `posterior`, `outside`: all that the sampler reported about (5) and (6).
+#'     `outside$approximation` has the largest error among the certified draws and the correction of
+#'     the log evidence. It also has the number of values computed: in the stages before the last,
+#'     and in the last by skeletons and directly.
+#'
+#'   The columns of `index` are `boundary`, `difference` (posterior median), `mean`, `lower95`,
+#'   `upper95`, `significant` and `rank`. `lower95` and `upper95` are the ends of the
+#'   highest-density interval; they keep these names for any `probability`.
+#'
+#'   [tidy()][posterior] gives the table of the parameters.
 #' @examples
 #' data <- data.frame(hour = 1:60, Te = 5 + 3 * sin(1:60 / 4), Gv = cos(1:60 / 3)^2)
 #' data$Ti <- 20 + 0.4 * data$Te + 0.5 * data$Gv + 0.1 * sin(61 * (1:60)^2)

@@ -1,16 +1,24 @@
 #' The test box of the method's paper, as its models M1 to M6
 #'
-#' A cube of 0.96 m inside with walls of 12 cm all round, a window of 0.60 x 0.60 m in the front and
-#' a heater; the box stands free, so that outside air is all around it. M1 has walls of one layer,
-#' the others of 3 + 6 + 3 cm. M4 is M2 with a free transmission of the window; M5 is M3 with other
-#' limits of its cracks; M6 is M5 with a wider prior of the outer layers' capacity. M3, M5 and M6
-#' leak through two equal openings, low in the front and high in the back, so that wind and buoyancy
-#' drive the exchange. Driver columns: `Te` (degC), `Gv` (W/m2, front), `Ws` (m/s), `Wd` (degrees)
-#' and `RHP` (heater power, W); the first and last in every model, wind only in those that leak.
+#' Makes a model of the paper's test box: a cube of 0.96 m inside with walls of 12 cm all round. It
+#' has a window of 0.60 x 0.60 m in the front and a heater. The box stands free, so that outside air
+#' is all around it.
 #'
-#' Where the paper gives no value: film coefficients, solar absorptance and the window's thermal
-#' transmittance (1.5 W/m2K) are this package's; together they give the measured heat loss
-#' coefficient of about 4 W/K.
+#' # Models
+#'
+#' * M1 has walls of one layer; the others have walls of 3 + 6 + 3 cm.
+#' * M3, M5 and M6 leak through two equal openings, low in the front and high in the back. Wind and
+#'   buoyancy drive the exchange.
+#' * M4 is M2 with a free transmission of the window.
+#' * M5 is M3 with other limits of its cracks.
+#' * M6 is M5 with a wider prior of the outer layers' capacity.
+#'
+#' The driver columns are `Te` (degC), `Gv` (W/m2, front), `Ws` (m/s), `Wd` (degrees) and `RHP`
+#' (heater power, W). Only the models that leak need `Ws` and `Wd`.
+#'
+#' The paper gives no value of film coefficients, solar absorptance and the window's thermal
+#' transmittance (1.5 W/m2K). Those here are this package's. Together they give the measured heat
+#' loss coefficient of about 4 W/K.
 #'
 #' @param model `"M1"` to `"M6"`.
 #' @param azimuth Direction that the front faces, degrees from north, clockwise.

@@ -8,25 +8,42 @@ record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_
 
 #' Figures
 #'
-#' `plot()` draws a figure and returns it invisibly; `autoplot()` of ggplot2 returns it undrawn, to
+#' `plot()` draws a figure and returns it invisibly. `autoplot()` of ggplot2 returns it undrawn, to
 #' be changed or saved.
 #'
-#' @param x,object [measurements()]; a calibration ([calibrate()], not [calibrate_paper()]); what
-#'   [attribute_discrepancy()], [discrepancy()], [sobol_indices()], [ais()], [compare_models()] or
-#'   [upgrade_model()] return. Of several records plot one of `records`.
-#' @param which Which figure of an upgrade: `"fit"` (measured and simulated), `"attribution"` (what
-#'   the error answers to), `"candidates"` (mechanisms tried), `"parameters"`, `"discrepancy"` (over
-#'   time), `"response"` (error against the leading boundary condition), `"gain"` (scores before and
-#'   after), `"mean_day"`, `"priors"` (against posteriors), `"moved"` (parameters that moved between
-#'   the models, and what they trade off with), `"steps"` (what each mechanism brought), `"missing"`
-#'   (the response that the first model lacks, by boundary condition), `"emulator"` (its errors on
-#'   runs left out) or `"sampler"` (how the annealing went). Of a comparison: `"evidence"`,
-#'   `"criteria"` (ranks by each), `"attribution"`, `"fit"` (measured and simulated),
-#'   `"discrepancy"` (over time), `"parameters"`, `"heat_loss"` (of zones) or `"held_out"` (where
-#'   rows validate). Of an upgrade of several records, figures that show a series are of one record:
-#'   `"fit of NAME"`, with `"fit"` for that of the first.
+#' @param x,object [measurements()]; a calibration ([calibrate()], not [calibrate_paper()]); or the
+#'   result of [attribute_discrepancy()], [discrepancy()], [sobol_indices()], [ais()],
+#'   [compare_models()] or [upgrade_model()]. If there are several records, plot one of `records`.
+#' @param which Which figure of an upgrade or a comparison, see below.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A ggplot.
+#' @section Figures of an upgrade:
+#'   * `"fit"`: measured and simulated.
+#'   * `"attribution"`: what the error responds to.
+#'   * `"candidates"`: mechanisms tried.
+#'   * `"parameters"`: their estimates.
+#'   * `"discrepancy"`: the discrepancy over time.
+#'   * `"response"`: the error against the leading boundary condition.
+#'   * `"gain"`: scores before and after.
+#'   * `"mean_day"`: the mean day.
+#'   * `"priors"`: priors against posteriors.
+#'   * `"moved"`: parameters that moved between the models, and what they are correlated with.
+#'   * `"steps"`: what each mechanism brought.
+#'   * `"missing"`: the response that the first model lacks, by boundary condition.
+#'   * `"emulator"`: the emulator's errors on runs left out.
+#'   * `"sampler"`: how the annealing went.
+#'
+#'   If an upgrade has several records, figures that show a series are of one record: `"fit of
+#'   NAME"`. `"fit"` then shows the first record.
+#' @section Figures of a comparison:
+#'   * `"evidence"`: the evidence of the models.
+#'   * `"criteria"`: ranks by each criterion.
+#'   * `"attribution"`: what the error responds to.
+#'   * `"fit"`: measured and simulated.
+#'   * `"discrepancy"`: the discrepancy over time.
+#'   * `"parameters"`: their estimates.
+#'   * `"heat_loss"`: the heat loss coefficients of zones.
+#'   * `"held_out"`: the held-out rows, if rows validate.
 #' @examples
 #' table <- data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4))
 #' plot(measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,

@@ -35,19 +35,23 @@ parameter_table <- function(fit) {
 
 #' The posterior of the parameters
 #'
-#' What R's users expect of a fitted model, from the weighted draws of a calibration; of an upgrade
-#' it is that of its last model.
+#' Medians, intervals and covariance from the weighted draws of a calibration. For an upgrade they
+#' are those of its last model.
 #'
 #' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade
 #'   ([upgrade_model()]).
 #' @param parm Names or numbers of parameters; all by default.
 #' @param level,conf.level Probability that the intervals hold; their ends cut off equal tails.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return `coef()`: the posterior medians. `confint()`: a matrix of the ends of credible intervals.
-#'   `vcov()`: the covariance of the posterior. `tidy()`: a data frame with one row for each
-#'   parameter: `term`, `label`, `unit`, `estimate` (the median), `std.error` (the posterior's
-#'   standard deviation), `conf.low`, `conf.high`, and how many `modes` the posterior has: over
-#'   several, median and interval describe none.
+#' @return
+#'   * `coef()`: the posterior medians.
+#'   * `confint()`: a matrix of the ends of credible intervals.
+#'   * `vcov()`: the covariance of the posterior.
+#'   * `tidy()`: a data frame with one row for each parameter, see below.
+#'
+#'   The columns of `tidy()` are `term`, `label`, `unit`, `estimate` (the median), `std.error` (the
+#'   posterior's standard deviation), `conf.low`, `conf.high` and `modes`, the number of modes of
+#'   the posterior. If there are several modes, median and interval describe none of them.
 #' @seealso [as_draws][as.data.frame.amiss_fit] for the draws themselves.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
@@ -129,19 +133,22 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
 
 #' Posterior draws as other packages take them
 #'
-#' The draws of a calibration carry importance weights; here they are resampled to equal weights by
-#' a systematic rule and stand in an order that says nothing, as one chain: what `posterior` and
-#' `bayesplot` take. Draws of more weight than one of `draws` are repeated, so that the effective
-#' number of draws that `posterior` states is too large, and R-hat means nothing: whether the
-#' sampler can be trusted is `trust` of the fit.
+#' Gives the draws of a calibration as one chain of equal weights, as `posterior` and `bayesplot`
+#' take them. The draws of a calibration carry importance weights. Here they are resampled to equal
+#' weights by a systematic rule. Their order has no meaning.
 #'
-#' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]), of
-#'   which it is the last model.
+#' Do not judge the sampler by these draws: `trust` of the fit says whether it can be trusted. Draws
+#' of more weight than one of `draws` are repeated. The effective number of draws that `posterior`
+#' states is therefore too large, and R-hat means nothing.
+#'
+#' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]),
+#'   whose last model is taken.
 #' @param draws Number of draws; by default as many as the fit has.
 #' @param row.names,optional As [as.data.frame()] has them; `optional` is not used.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame or matrix with one row for each draw and one column for each parameter; of
-#'   `as_draws()`, `as_draws_df()` and `as_draws_matrix()` of `posterior` the class of that name.
+#' @return A data frame or matrix with one row for each draw and one column for each parameter.
+#'   `as_draws()`, `as_draws_df()` and `as_draws_matrix()` of `posterior` give the class of that
+#'   name.
 #' @examplesIf requireNamespace("posterior", quietly = TRUE)
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)

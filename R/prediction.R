@@ -1,34 +1,45 @@
 #' Predict with a calibrated simulator
 #'
-#' The simulator itself is run at draws of the posterior (no emulator error); errors as large as
-#' those that calibration left widen the band. Of an [ensemble()] made elsewhere, the emulator of
-#' its runs at the rows asked for predicts, and its own uncertainty widens the band too.
+#' Runs the simulator itself at draws of the posterior, so there is no emulator error. Errors as
+#' large as those that calibration left widen the band. If the runs are an [ensemble()] made
+#' elsewhere, the emulator of these runs at the rows asked for predicts, and its own uncertainty
+#' widens the band too.
+#'
+#' # New data
+#'
+#' `newdata` is a record of its own. It may be
+#'
+#' * [measurements()] with the same time step and boundary conditions, or
+#' * a data frame of equal steps, as long as those of the data that were given to [measurements()],
+#'   one row for each interval. It needs a column `time` (whatever it was called there), all
+#'   boundary conditions of the record, and what else drives the simulator.
+#'
+#' If a data frame has the column of the target, the target is compared with the prediction. Nothing
+#' is learned from it. A data frame has no warm-up: begin it before the rows that count.
+#'
+#' A data frame is checked as the record was. `missing` and `range` of [measurements()] hold, and
+#' other codes for a missing value are refused. A warning names values far outside all others,
+#' readings that are stuck, and counters.
 #'
 #' @param object A calibration ([calibrate()], [calibrate_paper()]), or an upgrade
-#'   ([upgrade_model()]), of which it is the last model.
-#' @param newdata A record of its own: [measurements()] with the same time step and boundary
-#'   conditions; or a data frame of equal steps, as long as those of the data that were given to
-#'   [measurements()], with a column `time` (whatever it was called there), all boundary conditions
-#'   of the record and what else drives the simulator, one row for each interval. Its target, if it
-#'   has that column, is compared with the prediction, and nothing is learned from it. A data frame
-#'   has no warm-up: begin it before the rows that count. It is checked as the record was: `missing`
-#'   and `range` of [measurements()] hold, other codes for a missing value are refused, and a
-#'   warning names values far outside all others, readings that are stuck, and counters. By default
-#'   the record that was calibrated on.
+#'   ([upgrade_model()]), whose last model predicts.
+#' @param newdata Another record (see *New data*); by default the record that was calibrated on. For
+#'   several records a list by record.
 #' @param use Which rows: `"calibrate"`, `"validate"` or both; every row of a data frame.
 #' @param draws Number of posterior draws.
 #' @param discrepancy `TRUE` adds the response to the boundary conditions that the model lacks, as
-#'   it was seen in calibration ([discrepancy()]). Where its reach is limited, the runs of the
-#'   ensemble are made again at the rows asked for.
+#'   it was seen in calibration ([discrepancy()]). If its reach is limited, the runs of the ensemble
+#'   are made again at the rows asked for.
 #' @param interval `"prediction"`, a band of new measurements, or `"confidence"`, one of the
 #'   simulation (and the discrepancy) alone.
 #' @param level Probability that the band holds.
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame with `time`, `use`, `observed`, `mean`, `lower95`, `upper95` (the band; the
-#'   number is `level`), and `crps`, the continuous ranked probability score of each row; of a data
-#'   frame also `segment`, the number of the unbroken part. Of several records `newdata` and what is
-#'   returned are lists by record.
+#' @return A data frame (for several records a list by record) with
+#'   * `time`, `use`, `observed`, `mean`.
+#'   * `lower95`, `upper95`: the band, at the probability `level`.
+#'   * `crps`: the continuous ranked probability score of each row.
+#'   * `segment`: the number of the unbroken part, if `newdata` is a data frame.
 #' @source Gneiting and Raftery (2007), Strictly proper scoring rules, prediction, and estimation,
 #'   Journal of the American Statistical Association 102, 359-378, for the CRPS.
 #' @examples
@@ -273,20 +284,22 @@ prediction_scores <- function(prediction) {
 
 #' Simulate the record that a calibration expects
 #'
-#' Draws of the calibration record from the posterior: for checks of the model, as `bayesplot` makes
-#' them. Each is a run of the simulator at a posterior draw and a new error. Of [calibrate()], the
-#' discrepancy of that draw is added (its mean given the draw), and the error has the draw's
-#' variance and autocorrelation; of [calibrate_paper()], errors are independent and as large as
-#' those that calibration left.
+#' @description
+#' Draws the calibration record from the posterior, for checks of the model, as `bayesplot` makes
+#' them. Each draw is a run of the simulator at a posterior draw and a new error:
+#'
+#' * [calibrate()]: the discrepancy of that draw is added (its mean given the draw). The error has
+#'   the draw's variance and autocorrelation.
+#' * [calibrate_paper()]: errors are independent and as large as those that calibration left.
 #'
 #' @param object A calibration ([calibrate()], [calibrate_paper()]) of an ensemble that knows its
-#'   simulator, or an upgrade ([upgrade_model()]), of which it is the last model.
-#' @param nsim Number of records. The draws of a calibration's discrepancy (`error_draws` of
-#'   [calibrate()]) serve again where there are fewer.
+#'   simulator, or an upgrade ([upgrade_model()]), whose last model is simulated.
+#' @param nsim Number of records. If a calibration has fewer draws of its discrepancy (`error_draws`
+#'   of [calibrate()]), they serve again.
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ...,
-#'   whose attribute `seed` makes them again.
+#' @return A data frame with one row for each calibration row and the columns `sim_1`, `sim_2`, ...
+#'   Its attribute `seed` makes them again.
 #' @source `vignette("algorithm", "amiss")`, *One covariance*.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),

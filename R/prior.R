@@ -1,12 +1,14 @@
 #' Priors of model parameters
 #'
-#' A prior is a distribution on one parameter, in that parameter's unit. The design, the emulator
-#' and the sampler work on the unit cube; a prior's quantile function maps the cube onto the
-#' parameters, so that the prior is uniform there. `normal()` and `lognormal()` may be truncated.
+#' A prior is a distribution on one parameter, in that parameter's unit. `normal()` and
+#' `lognormal()` may be truncated.
 #'
-#' @param lower,upper Of `uniform()`, `triangular()` and `beta_prior()` the ends of the distribution
-#'   (the shape of `beta_prior()` is stretched to them); of `normal()` and `lognormal()` where it is
-#'   cut off and scaled up again.
+#' The design, the emulator and the sampler work on the unit cube. A prior's quantile function maps
+#' the cube onto the parameters, so the prior is uniform on the cube.
+#'
+#' @param lower,upper Ends of the distribution of `uniform()`, `triangular()` and `beta_prior()`
+#'   (the shape of `beta_prior()` is stretched to them). `normal()` and `lognormal()` are cut off
+#'   there and scaled up again.
 #' @param mean,sd Mean and standard deviation (before truncation).
 #' @param meanlog,sdlog Mean and standard deviation of the logarithm.
 #' @param shape1,shape2 Shapes of the beta distribution on `[lower, upper]`.
@@ -177,15 +179,16 @@ print.amiss_prior <- function(x, ...) {
 
 #' Declare a free parameter where it stands
 #'
-#' A number in a model's description may be replaced by a free parameter: an unknown that
-#' calibration finds. The same name may stand in several places; it is then one parameter, and must
-#' carry the same prior.
+#' Puts a free parameter, an unknown that calibration finds, in place of a number in a model's
+#' description. The same name may stand in several places. It is then one parameter, and must carry
+#' the same prior.
 #'
 #' @param name Name of the parameter.
 #' @param prior Its [prior].
 #' @param unit Its unit, for people.
-#' @param label One short phrase for people; the name if not given. A label that two parameters of a
-#'   model share, or that is the name of another, is shown with the parameter's name behind it.
+#' @param label One short phrase for people; the name if not given. If two parameters of a model
+#'   share a label, or the label is the name of another parameter, it is shown with the parameter's
+#'   name behind it.
 #' @return An object of class `amiss_free`.
 #' @examples
 #' free("k_insulation", uniform(0.03, 0.05), unit = "W/mK")

@@ -1,53 +1,61 @@
 #' A simulator that is an external program
 #'
-#' Any program that reads text files and writes numbers can be calibrated: ESP-r, EnergyPlus, a
+#' Makes a simulator of any program that reads text files and writes numbers: ESP-r, EnergyPlus, a
 #' Modelica model, a script. Each run gets a fresh directory with the files of the model, the
-#' rendered `templates` and the drivers; the program is started there, without a shell, and its
+#' rendered `templates` and the drivers. The program is started there, without a shell, and its
 #' output is read. `vignette("programs", "amiss")` has recipes for ESP-r, EnergyPlus and
 #' hydrological programs.
 #'
 #' # Placeholders
 #'
-#' In templates, in the arguments of the command and in the inputs of its steps, `{{name}}` stands
-#' for the value of a parameter. `{{2 * k + C / 1000}}` is arithmetic of parameters: `+ - * / ^`,
-#' parentheses, `sqrt`, `exp`, `log`, `log10`, `abs`, `round`, `min` and `max`; nothing else is
-#' evaluated.
+#' `{{name}}` stands for the value of a parameter. Placeholders may be in templates, in the
+#' arguments of the command and in the inputs of its steps. `{{2 * k + C / 1000}}` is arithmetic of
+#' parameters: `+ - * / ^`, parentheses, `sqrt`, `exp`, `log`, `log10`, `abs`, `round`, `min` and
+#' `max`. Nothing else is evaluated.
 #'
 #' A number is written with 15 significant digits at most, and no more than it needs. A program that
-#' reads columns of a fixed width, or cuts words, needs a limit: `{{k:12}}` takes 12 characters at
-#' most, `{{k:%.4f}}` and `{{k:%10.3e}}` are formats of [sprintf()], and `width` is the limit for
-#' all others. A number that does not fit is an error before anything is executed. A file without a
-#' placeholder is copied byte for byte.
+#' reads columns of a fixed width, or cuts words, needs a limit:
+#'
+#' * `{{k:12}}` takes 12 characters at most.
+#' * `{{k:%.4f}}` and `{{k:%10.3e}}` are formats of [sprintf()].
+#' * `width` is the limit for all others.
+#'
+#' A number that does not fit is an error before anything is executed. A file without a placeholder
+#' is copied byte for byte.
 #'
 #' # Output
 #'
 #' `c(file = "out.csv", column = "Ti")` is a CSV with one line of names and a line of numbers for
-#' each row of the drivers, a point before decimals. Exponents as Fortran writes them (`1.5D-03`,
-#' `1.5-103`) are numbers, too. Anything else (`****`, a decimal comma, a row of units, a line with
-#' one field more or less than there are names) makes the run fail: the warning says line and value.
-#' Other tables are described by [program_output()], which also matches rows by time.
+#' each row of the drivers, with a point before decimals. Exponents as Fortran writes them
+#' (`1.5D-03`, `1.5-103`) are numbers, too. Anything else makes the run fail, and the warning names
+#' line and value. Examples are `****`, a decimal comma, a row of units, and a line with one field
+#' more or less than there are names. [program_output()] describes other tables and also matches
+#' rows by time.
 #'
 #' # A run and its end
 #'
-#' A run ends with the process that was started: what it leaves behind in the background is stopped,
-#' as is everything of a run that takes longer than `time_limit`, reading its output included, or
-#' writes more than `size_limit`. If R itself is killed, the program is stopped, and the next call
-#' removes what was left of its run.
+#' A run ends with the process that was started. What the process leaves behind in the background is
+#' stopped. A run is also stopped, with all its processes, if it takes longer than `time_limit`
+#' (with the reading of its output) or writes more than `size_limit`. If R itself is killed, the
+#' program is stopped, and the next call removes what was left of its run.
 #'
-#' A run that fails (exit status, a step that did not make or say what it must, time limit,
-#' unreadable output, too few rows, values that are not finite) is `NaN`. A warning names its
-#' directory, which is kept, and shows the end of what it wrote. It is tried again at the next call.
+#' A run that fails is `NaN`. Reasons are the exit status, a step that did not make or say what it
+#' must, the time limit, unreadable output, too few rows, or values that are not finite. A warning
+#' names the directory of the run, which is kept, and shows the end of what it wrote. The run is
+#' tried again at the next call.
+#'
 #' Runs are made in parallel as [future::plan()] says.
 #'
 #' # Drivers
 #'
 #' The drivers' CSV has the columns `time` (the record's: ISO 8601 in UTC, or its hours), `hours`
-#' since the start of the segment, both at the end of each interval, and the columns named in
-#' `boundary`.
+#' since the start of the segment, and the columns named in `boundary`. `time` and `hours` are those
+#' at the end of each interval.
 #'
-#' Of a record with gaps the program is started once for each unbroken segment, from its first row,
-#' warm-up included, to the last that is used, at the step of the data (before averages): let it
-#' take its period and step from the drivers' file, and write one row for each of its rows.
+#' If a record has gaps, the program is started once for each unbroken segment. The run goes from
+#' the segment's first row, warm-up included, to the last that is used, at the step of the data
+#' (before averages). Let the program take its period and step from the drivers' file, and write one
+#' row for each of its rows.
 #'
 #' A building or a catchment remembers the weather of days or months before the record. If the
 #' record has rows without a target ahead of its first measured value, their drivers are there.
@@ -55,20 +63,21 @@
 #'
 #' # What is kept
 #'
-#' A run that succeeds is kept in `cache` at once and never made twice: its key is what it reads
+#' A run that succeeds is kept in `cache` at once and never made twice. Its key is what it reads
 #' (files, templates, command, drivers, contents of the files that the command names, `version`) and
-#' how its output is read. Runs that were found there do not count in a budget. What was kept is
-#' checked when it is read, and made again if it is not whole. What else the program reads, such as
-#' a library of its own, does not count: give another `version` when it changes.
+#' how its output is read. Runs that were found in the cache do not count in a budget. What was kept
+#' is checked when it is read, and made again if it is not whole. What else the program reads, such
+#' as a library of its own, is not part of the key: give another `version` when it changes.
 #'
 #' @param command The program and its arguments, as a character vector, or a list of several
 #'   [program_step()], which run one after the other. Words that name an existing file become
 #'   absolute paths, but for the names of files of the run.
 #' @param ... The parameters, each made by [free()].
-#' @param output Where the output is: `c(file = "out.csv", column = "Ti")` of a CSV in the run's
-#'   directory (`stdout.txt` for what the last program prints), a table described by
-#'   [program_output()], or a function of that directory that returns one number per row of the
-#'   drivers.
+#' @param output Where the output is:
+#'   * `c(file = "out.csv", column = "Ti")` of a CSV in the run's directory (`stdout.txt` for what
+#'     the last program prints);
+#'   * a table described by [program_output()];
+#'   * a function of that directory that returns one number per row of the drivers.
 #' @param templates Named list: file in the run's directory = path of its template, or its text in
 #'   [I()]. A name may hold folders (`"inputs/model.txt"`), and does not lead out of the run's
 #'   directory. A file of `files` may be named by its path there alone: `templates =
@@ -78,20 +87,22 @@
 #'   `time`, `hours` and the columns) and `folder` that writes files into the folder; or a list of
 #'   several of these.
 #' @param time_limit Seconds for one run.
-#' @param size_limit Megabytes that one run may write. Of a run that fails, files over one megabyte
+#' @param size_limit Megabytes that one run may write. If a run fails, its files over one megabyte
 #'   are kept without their middle.
 #' @param retries How often a failed run is tried again at once.
 #' @param cache Directory of the finished runs, and of the directories of failed ones.
 #' @param version Anything that tells versions of the program apart.
 #' @param name A name for people.
 #' @param files The files of the model: a folder, all of which is copied into each run's directory
-#'   byte for byte, or paths of files (with names, if they are to have others there).
+#'   byte for byte, or paths of files. Give the paths names if the files are to have others there.
 #' @param width The most characters of a number for a placeholder that states none.
-#' @param lead_in Hours of drivers ahead of the first measured value of each segment; the output has
+#' @param lead_in Hours of drivers ahead of the first measured value of each segment. The output has
 #'   rows for them, too, which are then left out.
-#' @param before How the lead-in is filled: `"record"`, by the rows that the record has there and
-#'   else by the first day of the segment, repeated, which is said; `"first_day"`, by that day
-#'   alone; `"record_only"`, only as far as the record goes.
+#' @param before How the lead-in is filled:
+#'   * `"record"`: by the rows that the record has there, and otherwise by the first day of the
+#'     segment, repeated, which is reported;
+#'   * `"first_day"`: by that day alone;
+#'   * `"record_only"`: only as far as the record goes.
 #' @param keep How many directories of runs that succeeded are kept in `cache`, to look at; `TRUE`:
 #'   all. See also [render_run()].
 #' @return An object of class `amiss_program_simulator`.
@@ -223,12 +234,13 @@ check_program <- function(simulator, call = rlang::caller_env()) {
 
 #' Edit the templates of a program
 #'
-#' A mechanism of a [program_simulator()] is an edit of its templates, with parameters of its own.
+#' Edits the templates of a [program_simulator()] and adds parameters. A mechanism of a program is
+#' such an edit.
 #'
 #' @param simulator A [program_simulator()].
-#' @param templates Named list of templates, new ones or in place of those of the same name: a path,
-#'   text in [I()], or a function of the lines that are there, also of a file of the model's folder.
-#'   Functions stack: they keep what other mechanisms have put in.
+#' @param templates Named list of templates, new ones or in place of those of the same name. Each is
+#'   a path, text in [I()], or a function of the lines that are there. A function may also be given
+#'   for a file of the model's folder. Functions stack: they keep what other mechanisms have put in.
 #' @param ... Parameters to add, each made by [free()].
 #' @param boundary Driver columns to add.
 #' @return The edited simulator.

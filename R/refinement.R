@@ -1,37 +1,40 @@
 #' Calibrate with few runs, checked by the simulator
 #'
-#' Searches for the mode by runs of the simulator, trains an emulator in the region of the mode,
-#' samples the posterior, and lets the simulator check the emulator where the posterior lies. The
-#' runs of a check also train: the next round has them. It ends when a check passes with enough to
-#' spare, or after `rounds`.
+#' Searches for the mode by runs of the simulator and trains an emulator in the region of the mode.
+#' The posterior is sampled, and the simulator checks the emulator where the posterior lies. The
+#' runs of a check also train the emulator of the next round. The rounds end when a check passes
+#' with enough to spare, or after `rounds`.
 #'
-#' *Search.* From the run that is nearest to the record, and from others far from it, steps lead to
-#' the posterior under the line that touches the simulator; each run corrects the slopes of that
-#' line. The search ends when two starts lead to one mode. If no two do, the result is not trusted
-#' and says so.
+#' # Search
 #'
-#' *Region.* About thirty runs in the ellipsoid that holds the posterior train an emulator whose
-#' mean is the simulator's tangent. The discrepancy keeps out of what the parameters do there, as
-#' far as its reach says ([calibrate()]), so that it does not depend on the runs with which the
-#' search began.
+#' Steps start from the run that is nearest to the record, and from others far from it. Each step
+#' leads to the posterior under the line that touches the simulator. Each run corrects the slopes of
+#' that line. The search ends when two starts lead to one mode. If no two do, the result is not
+#' trusted and says so.
+#'
+#' # Region
+#'
+#' About thirty runs in the ellipsoid that holds the posterior train an emulator. Its mean is the
+#' simulator's tangent. The discrepancy keeps out of what the parameters do there, as far as its
+#' reach says ([calibrate()]). It therefore does not depend on the runs with which the search began.
 #'
 #' @param ensemble An ensemble: [simulate_design()] (twice as many runs as parameters, and two, are
-#'   enough), [refine_ensemble()], or [ensemble()], which can be checked, but not refined.
+#'   enough), [refine_ensemble()] or [ensemble()]. The last can be checked, but not refined.
 #' @param rounds Most checks before the result is left as not trusted; 0 calibrates the ensemble as
 #'   it is.
-#' @param runs Runs in the region of the mode, by default 25 or, if more, two for each
-#'   parameter.
+#' @param runs Runs in the region of the mode, by default 25 or, if more, two for each parameter.
 #' @param control List of two lists, `emulator` and `calibration`, as [train_emulator()] and
 #'   [calibrate()] take them.
 #' @inheritParams calibrate
 #' @inheritParams simulate_design
-#' @return A calibration as [calibrate()] gives; its `rounds` says how many checks were made,
-#'   `runs_made` how many runs of the simulator were made here, `modes` how many searches there were
-#'   (`searches`) and whether two of them agreed (`agree`).
-#' @source `vignette("algorithm", "amiss")`, *The simulator first*. Powell (2004), Least Frobenius
-#'   norm updating of quadratic models that satisfy interpolation conditions, Mathematical
-#'   Programming 100, 183-215, and Moré (1978), The Levenberg-Marquardt algorithm, Lecture Notes in
-#'   Mathematics 630, 105-116, for the search.
+#' @return A calibration as from [calibrate()], with
+#'   * `rounds`: how many checks were made.
+#'   * `runs_made`: how many runs of the simulator were made here.
+#'   * `modes`: how many searches there were (`searches`) and whether two of them agreed (`agree`).
+#' @source `vignette("algorithm", "amiss")`, *The simulator first*. The search follows Powell
+#'   (2004), Least Frobenius norm updating of quadratic models that satisfy interpolation
+#'   conditions, Mathematical Programming 100, 183-215. It also follows Moré (1978), The
+#'   Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630, 105-116.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -109,18 +112,25 @@ with_known_runs <- function(model, ensembles) {
 
 #' More runs where they matter
 #'
-#' A design spread over the priors has few runs where the posterior lies, the fewer the more the
-#' data say, and an emulator of it can be off there by more than it knows. This makes an ensemble of
-#' the region where a first posterior lies: the ellipsoid that holds it, in the coordinates in which
-#' the priors are standard normal, half as wide again where the posterior came near the end of the
-#' region before or the check by runs found the emulator surer than it was right. Its runs follow
-#' the axes of the ellipsoid, at all distances from its centre alike; runs of `ensemble` that lie
-#' inside join them, the last 40. An emulator of them holds in the region alone, and there a few
-#' dozen runs do what hundreds spread over the priors cannot. Parameters outside count as
-#' impossible; if the posterior comes near the end of the region, the check of [calibrate()] says
-#' so.
+#' Makes an ensemble of the region where a first posterior lies. A design spread over the priors has
+#' few runs there, and fewer the more informative the data are. Its emulator can be wrong there by
+#' more than it knows. In the region, a few dozen runs do what hundreds spread over the priors
+#' cannot.
 #'
-#' @param ensemble An ensemble made by [simulate_design()], or by this.
+#' # Region
+#'
+#' The region is the ellipsoid that holds the posterior, in the coordinates in which the priors are
+#' standard normal. It is half as wide again if the posterior came near the end of the region
+#' before. It is also wider if the check by runs showed that the emulator was surer than it was
+#' right.
+#'
+#' The runs follow the axes of the ellipsoid and are spread evenly over the distances from its
+#' centre. Runs of `ensemble` that lie inside join them, the last 40 at most.
+#'
+#' An emulator of these runs holds in the region alone. Parameters outside count as impossible. If
+#' the posterior comes near the end of the region, the check of [calibrate()] says so.
+#'
+#' @param ensemble An ensemble made by [simulate_design()] or by this function.
 #' @param fit A calibration with the emulator trained on it ([calibrate()]).
 #' @param runs Number of runs to add.
 #' @inheritParams simulate_design

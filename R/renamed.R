@@ -2,16 +2,16 @@
 
 #' Give parameters of a simulator other names
 #'
-#' Records that are calibrated together share the parameters of the same name
-#' ([calibrate_jointly()]): of two houses with the same walls and each its own doors, the doors'
-#' parameter takes another name in one of them.
+#' Renames parameters, so that records that are calibrated together ([calibrate_jointly()]) do not
+#' share them. Parameters of the same name are shared. If two houses have the same walls and each
+#' its own doors, rename the doors' parameter in one of them.
 #'
 #' @param simulator Any simulator.
 #' @param ... New names by the old ones: `door = "door of O5"`.
-#' @return An object of class `amiss_renamed`: a simulator that is the same but for the names. The
+#' @return An object of class `amiss_renamed`: a simulator that differs only in the names. The
 #'   `edit` of a [mechanism()] gets the simulator with its own names.
-#' @section Errors: `amiss_error_input` if the simulator has no such parameter, or a new name is
-#'   there already.
+#' @section Errors: `amiss_error_input` if the simulator has no such parameter, or already has one
+#'   of the new name.
 #' @examples
 #' linear <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 2)), boundary = "Te")

@@ -1,8 +1,8 @@
 #' One run's directory, to look at
 #'
-#' Writes what a run of a [program_simulator()] would read into a folder, and runs nothing: the
-#' files of the model, the templates with their numbers, and the drivers if measurements are given.
-#' Start the commands there by hand until they do what they should.
+#' Writes what a run of a [program_simulator()] would read into a folder, and runs nothing. The
+#' folder has the files of the model, the templates with their numbers, and the drivers if
+#' measurements are given. Start the commands there by hand until they do what they should.
 #'
 #' @param simulator A [program_simulator()].
 #' @param values Named numeric vector of the parameters; by default the medians of their priors.

@@ -1,14 +1,15 @@
 #' Write a report
 #'
-#' First what was found in plain words, then what to inspect next, then the figures and tables
-#' behind it. `report()` writes a file of its own; `report_fragment()` is for a chunk of a document
-#' of yours, of any format that R Markdown knows. RStudio offers the R Markdown template of the
-#' report under *New File, From Template: Report of amiss*.
+#' Writes what was found in plain words, what to inspect next, and the figures and tables behind it.
+#' `report()` writes a file of its own. `report_fragment()` is for a chunk of a document of yours,
+#' of any format that R Markdown knows. RStudio offers the R Markdown template of the report under
+#' *New File, From Template: Report of amiss*.
 #'
-#' @section Formats: The end of the file's name chooses: `.html`, one file that needs nothing from
-#' outside; `.pdf`, the same page printed by Chromium, Chrome or Edge (Debian: `apt-get install
-#' chromium`; the environment variable `CHROMOTE_CHROME` may name the program); `.docx`, a Word
-#' document with the same text, tables and figures.
+#' @section Formats: The end of the file's name chooses the format:
+#'   * `.html`: one file that needs nothing from outside.
+#'   * `.pdf`: the same page printed by Chromium, Chrome or Edge (Debian: `apt-get install
+#'     chromium`). The environment variable `CHROMOTE_CHROME` may name the program.
+#'   * `.docx`: a Word document with the same text, tables and figures.
 #'
 #' @param x An upgrade ([upgrade_model()]), a comparison ([compare_models()]) or a calibration
 #'   ([calibrate()], [calibrate_paper()]). The simulator of a calibration is run again to predict
@@ -16,11 +17,12 @@
 #' @param file Name of the file, ending in `.html`, `.pdf` or `.docx`; its folder must exist. The
 #'   file appears only when it is complete.
 #' @param quiet No messages of R Markdown.
-#' @param parts Which parts, in their order; `NULL` for all. Of an upgrade: `"summary"`,
-#'   `"mechanisms"`, `"fit"`, `"drivers"`, `"trials"`, `"parameters"`, `"lack"`, `"trust"`,
-#'   `"method"` and `"words"`. Of a comparison: `"summary"`, `"evidence"`, `"drivers"`, `"fit"`,
-#'   `"parameters"`, `"practice"` and `"method"`. Of a calibration: `"summary"`, `"fit"`,
-#'   `"parameters"`, `"lack"` and `"trust"`.
+#' @param parts Which parts, in their order; `NULL` for all:
+#'   * an upgrade: `"summary"`, `"mechanisms"`, `"fit"`, `"drivers"`, `"trials"`, `"parameters"`,
+#'     `"lack"`, `"trust"`, `"method"` and `"words"`;
+#'   * a comparison: `"summary"`, `"evidence"`, `"drivers"`, `"fit"`, `"parameters"`, `"practice"`
+#'     and `"method"`;
+#'   * a calibration: `"summary"`, `"fit"`, `"parameters"`, `"lack"` and `"trust"`.
 #' @param level Level of the headings of the parts, 1 to 4.
 #' @return `report()`: `file`, invisibly. `report_fragment()`: text for knitr, which a chunk shows
 #'   as it is.

@@ -1,16 +1,21 @@
 #' Comparison in words
 #'
-#' Which model the evidence chooses and how clearly, what its discrepancy answers to, where criteria
-#' of practice would choose otherwise, and what cannot be trusted, as plain sentences and tables;
-#' [report()] sets it out.
+#' Says in plain sentences and tables which model the evidence chooses and how clearly. They also
+#' say what its discrepancy responds to, where criteria of practice would choose otherwise, and what
+#' cannot be trusted. [report()] lays it out.
 #'
 #' @param object A comparison ([compare_models()]).
 #' @param x The summary.
 #' @param ... Not used.
-#' @return A list: `title`, `headline`, the sentences `evidence`, `remains`, `practice`, `doubts`
-#'   and `inspect` (what to inspect next), and the tables `models` and `attribution` (the paper's
-#'   table 3a), `parameters` (3b), `criteria`, `errors` (4 and 5), `heat_loss` (of zones) and
-#'   `method`.
+#' @return A list:
+#'   * `title`, `headline`.
+#'   * `evidence`, `remains`, `practice`, `doubts`: sentences.
+#'   * `inspect`: sentences that say what to inspect next.
+#'   * `models`, `attribution`: the paper's table 3a.
+#'   * `parameters`: table 3b.
+#'   * `criteria`, `errors`: tables 4 and 5.
+#'   * `heat_loss`: a table for zones.
+#'   * `method`: a table.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

@@ -4,40 +4,50 @@
 
 #' Responses: a description of what is missing
 #'
-#' Where the simulator cannot be edited, because its runs are given ([ensemble()]) or its code is
-#' closed, the loop can still extend the model by the response to a boundary condition:
+#' Extends a model by the response to a boundary condition. Use it if the simulator cannot be
+#' edited, because its runs are given ([ensemble()]) or its code is closed. The extended output is
 #'
 #' output + gain (x - reference), smoothed by a first-order low-pass with a time constant.
 #'
-#' Gain and time constant are calibrated with the model's own parameters. Given runs take the
-#' response as they are: each gets values of the new parameters from a Latin hypercube. To a
-#' simulator it is added after each run.
+#' Gain and time constant are calibrated with the model's own parameters. If runs are given, the
+#' response is added to them as they are: each run gets values of the new parameters from a Latin
+#' hypercube. If there is a simulator, the response is added after each run.
 #'
-#' *A description, no mechanism.* It says what the target answers to, how strongly and how fast, not
-#' why. It is never named as a cause. A single store between the condition and the target has this
-#' shape: something that the condition fills and that empties at a steady rate, such as heat in a
-#' mass, water in a soil or charge in a capacitor. With a time constant of less than a step it acts
-#' at once, as a direct gain or loss does. It does not bend, wear off or depend on anything else.
+#' # A description, no mechanism
 #'
-#' *Priors.* The gain is uniform about zero. Its largest value is twice the standard deviation of
-#' the target over that of the condition, in the rows that calibrate: unsmoothed, such a response
-#' would vary twice as much as the target itself. The time constant is log-uniform from a quarter of
-#' a step of the record, which is at once, to a sixth of its calibration rows. The low-pass starts
-#' at the first value of each segment, whose history it does not know: give a `warmup`.
+#' A response says what the target responds to, how strongly and how fast, but not why. It is never
+#' named as a cause.
 #'
-#' *Reference.* Where nothing is added: zero, if the condition rests there for a tenth of the time
-#' as sun, rain or a heater do, and otherwise its mean over the rows that calibrate.
+#' A single store between the condition and the target has this shape. The condition fills the
+#' store, which empties at a steady rate: heat in a mass, water in a soil, charge in a capacitor. If
+#' the time constant is less than a step, the store acts at once, as a direct gain or loss does. It
+#' does not bend, wear off or depend on anything else.
+#'
+#' # Priors
+#'
+#' The gain is uniform about zero. Its largest value is twice the standard deviation of the target
+#' divided by that of the condition, in the rows that calibrate. Unsmoothed, such a response would
+#' vary twice as much as the target itself.
+#'
+#' The time constant is log-uniform. It goes from a quarter of a step of the record, which is at
+#' once, to a sixth of its calibration rows. The low-pass starts at the first value of each segment,
+#' whose history it does not know: give a `warmup`.
+#'
+#' # Reference
+#'
+#' Nothing is added at the reference. It is zero if the condition is zero for a tenth of the time,
+#' as sun, rain or a heater are. Otherwise it is the condition's mean over the rows that calibrate.
 #'
 #' @param boundary Name of the condition, a driver column of the `measurements`. One that
-#'   [circular()] marks answers by its sine and its cosine, each with a gain.
+#'   [circular()] marks acts by its sine and its cosine, each with a gain.
 #' @param measurements The [measurements()].
 #' @param unit Unit of the condition, for people.
-#' @param units Units of the conditions, as far as they are to be told: `c(Gv = "W/m2")`.
+#' @param units Units of the conditions, if they are to be shown: `c(Gv = "W/m2")`.
 #' @param gain,time_constant [Priors][prior] in place of those above; the time constant is in hours.
-#' @param reference Value of the condition where nothing is added; `NULL` as above.
+#' @param reference Value of the condition at which nothing is added; `NULL` as above.
 #' @param name Short name.
 #' @return `response_mechanism()`: a [mechanism()] that edits an [ensemble()] of given runs or any
-#'   simulator; `responses()`: a [catalogue()] of one for each boundary condition that is analysed.
+#'   simulator. `responses()`: a [catalogue()] of one for each boundary condition that is analysed.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

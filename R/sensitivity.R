@@ -1,34 +1,47 @@
 #' Sobol indices of the parameters
 #'
-#' Which parameters move the simulation, measured or not: its variance over the priors, which are
-#' independent, shared out among the parameters. The first-order index of a parameter is the part
-#' that goes when its value is known; the total index is the part that stays when all others are
-#' known, and so counts its interactions too. Indices of a whole series are those of its steps
-#' weighted by the steps' variances (generalised indices of Lamboni et al. and of Gamboa et al.):
+#' @description
+#' Says which parameters move the simulation, measured or not. The variance of the simulation over
+#' the priors, which are independent, is shared out among the parameters:
+#'
+#' * The first-order index of a parameter is the part that goes when its value is known.
+#' * The total index is the part that stays when all others are known. It counts interactions too.
+#'
+#' @details
+#' Indices of a whole series are those of its steps, weighted by the steps' variances (generalised
+#' indices of Lamboni et al. and of Gamboa et al.):
 #'
 #'     S = sum_t V_t(parameter) / sum_t V_t
 #'
-#' *Estimate.* By the emulator's mean on pairs of Latin hypercubes that exchange a column: the
-#' estimators of Saltelli (2010) for the first order and of Jansen (1999) for the total, exchanged
-#' both ways as Azzini et al. (2021) have them, which err little where an index is near 0 or 1.
+#' # Estimate
+#'
+#' The indices come from the emulator's mean on pairs of Latin hypercubes that exchange a column.
+#' The estimators are those of Saltelli (2010) for the first order and of Jansen (1999) for the
+#' total. They are exchanged both ways as in Azzini et al. (2021), so that they err little if an
+#' index is near 0 or 1.
+#'
 #' Designs are replicated, and the scatter of the replicates gives the standard error of sampling.
-#' The emulator itself is known only as far as its runs tell: on each design a function is drawn
-#' that these runs leave possible, and the root mean square difference of its indices is the error
-#' of the emulator (Le Gratiet et al. 2014). `unexplained` is the share of a run's variance that the
+#' The emulator itself is known only as far as its runs show. On each design a function is drawn
+#' that these runs leave possible. The root mean square difference of its indices is the error of
+#' the emulator (Le Gratiet et al. 2014). `unexplained` is the share of a run's variance that the
 #' emulator does not predict.
 #'
-#' @param x An emulator ([train_emulator()]), a calibration ([calibrate()], [calibrate_paper()]), of
-#'   which it is the emulator over the priors; of the methods, the indices.
+#' @param x An emulator ([train_emulator()]), or a calibration ([calibrate()], [calibrate_paper()]),
+#'   whose emulator over the priors is taken. For the methods, the indices.
 #' @param points Points of one hypercube; the emulator is asked at `2 * points * (parameters + 1)`
 #'   for each replicate.
 #' @param replicates Number of designs.
 #' @param by_time Also the indices of each step.
 #' @param seed Seed of the designs and drawn functions; if `NULL`, R's generator gives one.
-#' @return An object of class `amiss_sobol`. Its `table` has a row for each parameter: `first` and
-#'   `total`, and of each the errors `_sampling` (standard error) and `_emulator`; `by_time`, if
-#'   asked for, has columns `time`, `parameter`, `first` and `total`, missing where no run moves.
-#'   `as.data.frame()` gives `table`; `tidy()` one row for each parameter and `order`, `std.error`
-#'   of both errors, and 95 % limits.
+#' @return An object of class `amiss_sobol`:
+#'   * `table`: a row for each parameter, with `first` and `total` and the errors of each,
+#'     `_sampling` (standard error) and `_emulator`.
+#'   * `by_time`, if asked for: columns `time`, `parameter`, `first` and `total`, missing where no
+#'     run moves.
+#'   * `unexplained`: see *Estimate*.
+#'
+#'   `as.data.frame()` gives `table`. `tidy()` gives one row for each parameter and `order`, with
+#'   `std.error` of both errors and 95 % limits.
 #' @source Azzini, Mara and Rosati (2021), Environmental Modelling and Software 144, 105167.
 #'   Saltelli, Annoni, Azzini, Campolongo, Ratto and Tarantola (2010), Computer Physics
 #'   Communications 181, 259-270. Jansen (1999), Computer Physics Communications 117, 35-43.

@@ -1,32 +1,47 @@
 #' A simulator that is an R function
 #'
-#' Any function of parameters and boundary conditions can be calibrated. The built-in [zone()] is
-#' another simulator; runs that were made elsewhere enter by [ensemble()].
+#' Makes a simulator of a function of parameters and boundary conditions, so that it can be
+#' calibrated. The built-in [zone()] is another simulator; runs that were made elsewhere enter by
+#' [ensemble()].
 #'
-#' `with_parameters()` extends such a simulator by parameters of a mechanism: its function has the
-#' simulator before the edit as `base`, so that edits stack in any order. Make every [mechanism()]
-#' of a function in this way: an edit that writes the model anew would lose what was adopted before
-#' it.
+#' `with_parameters()` extends such a simulator by the parameters of a mechanism.
 #'
-#' A simulator that integrates in steps should take their length from `info$step_h`:
-#' [upgrade_model()] then runs it with rows a half and a quarter as long. Where its own steps err by
-#' a third of what a mechanism mends, or finer ones would take that back by a third, it is not
-#' named; parameters that they would move are told. One with steps of its own, or an output that
-#' does not settle so, is taken at its word: see that half the step changes its output by little
-#' beside the noise.
+#' # Edits that stack
 #'
-#' @param f Function of `values` (named numeric vector) and `drivers` (numeric matrix with the
-#'   columns of `boundary`, one row per interval of one unbroken segment), returning one number per
-#'   row. If it has an argument `info`, it is given a list of `step_h` (length of an interval in
-#'   hours), `time` (of each row: `POSIXct`, or hours), `segment` (its number) and `hold` (the
-#'   target as measured in the rows that warm up, `NA` in the others). `with_parameters()`: if it
-#'   has an argument `base`, it is given the simulator before the edit, as a function of `values`
-#'   and, if they are to differ, `drivers` and `info`; to change what the simulator does not read is
-#'   an error. `NULL` leaves the function as it is: the parameters are for the one that was there
-#'   first, which uses them where it is given them.
+#' The function given to `with_parameters()` has the simulator before the edit as `base`, so edits
+#' stack in any order. Make every [mechanism()] of a function in this way. An edit that writes the
+#' model anew would lose what was adopted before it.
+#'
+#' # Steps
+#'
+#' A simulator that integrates in steps should take their length from `info$step_h`.
+#' [upgrade_model()] then runs it with rows a half and a quarter as long. A mechanism is not named
+#'
+#' * if the simulator's own steps err by a third or more of what the mechanism mends, or
+#' * if finer steps would take a third or more of that back.
+#'
+#' Parameters that finer steps would move are reported.
+#'
+#' Two kinds of simulator cannot be tested so: one with steps of its own, and one whose output does
+#' not settle as rows get shorter. Check yourself that half the step changes its output by little
+#' compared with the noise.
+#'
+#' @param f Function of `values` (named numeric vector) and `drivers`, returning one number per row
+#'   of `drivers`. `drivers` is a numeric matrix with the columns of `boundary`, one row per
+#'   interval of one unbroken segment. `f` may have further arguments:
+#'
+#'   * `info`: a list of `step_h` (length of an interval in hours), `time` (of each row: `POSIXct`,
+#'     or hours), `segment` (its number) and `hold` (the target as measured in the rows that warm
+#'     up, `NA` in the others).
+#'   * `base` (`with_parameters()` only): the simulator before the edit, as a function of `values`
+#'     and, if they are to differ, `drivers` and `info`. To change what that simulator does not read
+#'     is an error.
+#'
+#'   `NULL` (`with_parameters()` only) leaves the function as it is. The parameters are then for the
+#'   first function, which uses them if it is given them.
 #' @param ... The parameters, each made by [free()]. Those of `model` stay.
-#' @param boundary Names of the driver columns that the function needs; `with_parameters()`: beside
-#'   those of `model`.
+#' @param boundary Names of the driver columns that the function needs; in `with_parameters()` those
+#'   needed besides the columns of `model`.
 #' @param name A name for people.
 #' @return An object of class `amiss_function_simulator`.
 #' @examples

@@ -1,14 +1,14 @@
 #' Slopes that a simulator can give itself
 #'
-#' A search needs the slopes of the output with respect to the parameters. By differences they cost
-#' a run for each parameter. A simulator that knows them (by its adjoint, by forward
-#' differentiation) gives them by a method of this generic, and its searches need no runs for them.
-#' The default gives none.
+#' Gives the slopes of the output with respect to the parameters, which a search needs. By
+#' differences they cost a run for each parameter. A simulator that knows them (by its adjoint, by
+#' forward differentiation) gives them by a method of this generic. Its searches then need no runs
+#' for them. The default gives none.
 #'
 #' @inheritParams simulate_runs
 #' @param values A matrix of one row, its columns the free parameters.
-#' @return A matrix with a row for each row of the drivers and a column for each free parameter, in
-#'   units of the output for a unit of the parameter; or `NULL`.
+#' @return A matrix with a row for each row of the drivers and a column for each free parameter, or
+#'   `NULL`. Slopes are in units of the output for a unit of the parameter.
 #' @examples
 #' slopes.my_linear <- function(simulator, values, drivers, step_h, hold = NULL, ...) {
 #'   cbind(gain = drivers[, "Te"])

@@ -16,78 +16,101 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 
 #' Run a study from its file
 #'
-#' A study is a YAML file: what was measured, which rows calibrate and validate, what is to be done
-#' with which models (R files that return them), and the control. `read_study()` checks it and
-#' prepares the pieces; `run_study()` does the work and writes the results. Paths in the file are
+#' `read_study()` checks a study and prepares the pieces. `run_study()` does the work and writes the
+#' results.
+#'
+#' A study is a YAML file. It says what was measured, which rows calibrate and validate, what is to
+#' be done with which models (R files that return them), and the control. Paths in the file are
 #' relative to the file.
 #'
-#' A study that names a `model` and a `catalogue` runs the loop of [upgrade_model()]; one that names
-#' `models` (an R file whose value is a named list of simulators) compares them by
-#' [compare_models()], with `method` (`paper` or `history`) and, where the record is synthetic,
-#' `truth` (an R file whose value is a list of a `simulator` and its `values`).
+#' * A study that names a `model` and a `catalogue` runs the loop of [upgrade_model()].
+#' * A study that names `models` compares them by [compare_models()].
 #'
-#' The value of `model` and of `catalogue` may also be a function of the [measurements()] that
-#' returns the piece: so a study can have given runs ([ensemble()]) as its model, and [responses()]
-#' as its catalogue.
+#' # Fields
 #'
-#' Needed are `study` (a name), `data`, `time`, `target` and `boundary`, and `model` with
+#' Every study needs `study`, `data`, `time`, `target` and `boundary`. It also needs `model` with
 #' `catalogue`, or `models`. R files are evaluated in their own folder.
+#'
+#' * `study`: a name.
 #' * `data`: a table (see *Tables*) or an R file whose value is a data frame; `separator` and
 #'   `decimal` of the table.
-#' * `time`, `target`, `boundary`: columns of it; `boundary` is a list, with `circular(Wd)` for
+#' * `time`, `target`, `boundary`: columns of `data`. `boundary` is a list, with `circular(Wd)` for
 #'   degrees.
 #' * `calibrate` and `validate`: conditions in the columns of the data.
-#' * `noise_sd`, `unit`, `time_format`, `time_zone`, as in [measurements()]; `average_h` (the step
-#'   of the data if it is not given), `warmup_h` and `fill_gaps_h` (0) in hours.
-#' * `missing`: codes for a missing value, as `[-9999, 85]`, or `none`. `range`: ends of the
-#'   target's sensor, as `[-.inf, 27]`.
-#' * `title` (that of `study`), `seed`, `control` and `runs`, as in [upgrade_model()] or
-#'   [compare_models()] (150 runs); `method` (`paper`) of a comparison.
+#' * `noise_sd`, `unit`, `time_format`, `time_zone`: as in [measurements()].
+#' * `average_h` (the step of the data if it is not given), `warmup_h` and `fill_gaps_h` (0): in
+#'   hours.
+#' * `missing`: codes for a missing value, as `[-9999, 85]`, or `none`.
+#' * `range`: ends of the target's sensor, as `[-.inf, 27]`.
+#' * `title` (that of `study`), `seed`, `control` and `runs`: as in [upgrade_model()] or
+#'   [compare_models()] (150 runs).
+#' * `model`, `catalogue`: R files. Their value may also be a function of the [measurements()] that
+#'   returns the piece. A study can thus have given runs ([ensemble()]) as its model, and
+#'   [responses()] as its catalogue.
+#' * `models`: an R file whose value is a named list of simulators.
+#' * `method` (`paper`) of a comparison: `paper` or `history`.
+#' * `truth` of a comparison, if the record is synthetic: an R file whose value is a list of a
+#'   `simulator` and its `values`.
 #'
-#' *Several records.* `records` maps the name of each record to the fields that it has of its own.
-#' Fields outside are for all records that do not say otherwise. Of its own a record may have its
-#' model, and all that says what was measured. The value of a `model` may also be a list of
-#' simulators by the names of the records ([outputs_of()]). A catalogue that is a function gets the
-#' list of measurements. The loop is then that of [upgrade_model()] over several records.
+#' # Several records
 #'
-#' The file is UTF-8 and holds one YAML document without tags; of its words only `true` and `false`
-#' are logical, and numbers are those of YAML 1.2 (`1e-3` is one, `017` is 17, `1:30` is text).
-#' Conditions are no R code: they may hold columns, numbers, texts in quotes, comparisons, `&`, `|`,
+#' `records` maps the name of each record to the fields that it has of its own. A record may have
+#' its own model and all fields that say what was measured. Fields outside `records` are for all
+#' records that do not say otherwise.
+#'
+#' The value of a `model` may also be a list of simulators by the names of the records
+#' ([outputs_of()]). A catalogue that is a function gets the list of measurements. The loop is then
+#' that of [upgrade_model()] over several records.
+#'
+#' # Syntax
+#'
+#' The file is UTF-8 and holds one YAML document without tags. Only the words `true` and `false` are
+#' logical. Numbers are those of YAML 1.2: `1e-3` is a number, `017` is 17, `1:30` is text.
+#'
+#' Conditions are no R code. They may hold columns, numbers, texts in quotes, comparisons, `&`, `|`,
 #' `!`, brackets, the four operations of arithmetic and `%in% c(...)`. Texts are compared as in
-#' [measurements()]. One that begins with `!` needs quotes around it: `validate: '!(hour > 72)'`.
+#' [measurements()]. A condition that begins with `!` needs quotes around it: `validate: '!(hour >
+#' 72)'`.
 #'
-#' *result.json* of a loop holds `schema`, `study`, `seed`, `wall_s` (seconds), `runs_total`,
-#' `diagnosis` (`verdict`: `"named"`, `"likely"`, `"unexplained"` or `"nothing"`; `tag`,
-#' `headline`), `named_cause` (`null` if there is none; a likely cause stands here too), `gain`
-#' (`log10_bf`, `interval` and the scores of the first and the last model), `stopped_because`,
-#' `candidates` (as in [upgrade_model()]) and `models`: of each `name`, `parent`, `mechanism`, `N`
-#' rows, `M` runs, `Q` basis vectors, its evidence, `trusted` and why (`trust`), `verdict`,
-#' `doubts`, `confounded_with`, `held_out_gain`, `step_error` (what shorter steps of the simulator
-#' change, as in [upgrade_model()]), what the check by runs said (`emulator_error`,
-#' `emulator_ratio`, `emulator_checked`), `refinements`, `reach`, scores, `parameters` and
-#' `attribution`. What is not there is `null`. An exit status of 0, of the command `amiss`, says
-#' that the work was done, not that a cause was found or that numbers are trusted.
+#' @section Results: *result.json* of a loop has these fields; what is not there is `null`:
+#'   * `schema`, `study`, `seed`, `wall_s` (seconds), `runs_total`, `stopped_because`.
+#'   * `diagnosis`: `verdict` (`"named"`, `"likely"`, `"unexplained"` or `"nothing"`), `tag`,
+#'     `headline`.
+#'   * `named_cause`: also a likely cause; `null` if there is none.
+#'   * `gain`: `log10_bf`, `interval` and the scores of the first and the last model.
+#'   * `candidates`: as in [upgrade_model()].
+#'   * `models`: see below.
+#'
+#'   Each of the `models` has
+#'   * `name`, `parent`, `mechanism`.
+#'   * `N` rows, `M` runs, `Q` basis vectors.
+#'   * its evidence, `trusted` and why (`trust`).
+#'   * `verdict`, `doubts`, `confounded_with`, `held_out_gain`.
+#'   * `step_error`: what shorter steps of the simulator change, as in [upgrade_model()].
+#'   * `emulator_error`, `emulator_ratio`, `emulator_checked`: what the check by runs said.
+#'   * `refinements`, `reach`, scores, `parameters` and `attribution`.
+#'
+#'   If the command `amiss` ends with status 0, the work was done. It does not mean that a cause was
+#'   found or that numbers are trusted.
 #'
 #' @section Tables: The table in `data` is a text file. Its header is the line that holds `time`,
-#' `target` and `boundary`; what stands above it is left out, as are lines that begin with `#` and
-#' rows of units below the header. Fields are separated by commas, semicolons, tabs, bars or spaces,
-#' whichever separates the names in the header; `separator` says it if that fails (`comma`,
-#' `semicolon`, `tab`, `bar`, `space`, or the sign itself). Decimals may have a comma; if columns
-#' disagree, `decimal` says `","` or `"."`, and the other sign then separates thousands. Exponents
-#' may be `E` or `D`. Empty fields and words such as `NA`, `NaN` and `null` are missing values. A
-#' column without a name gets that of its place, such as `column_1`. A row with more or fewer fields
-#' than the header has names is an error. Text that is not UTF-8 is read as UTF-16 or Windows-1252,
-#' with a message.
+#'   `target` and `boundary`. What stands above it is left out, and so are lines that begin with `#`
+#'   and rows of units below the header.
+#'
+#'   Fields are separated by commas, semicolons, tabs, bars or spaces, whichever separates the names
+#'   in the header. If that fails, give `separator`: `comma`, `semicolon`, `tab`, `bar`, `space`, or
+#'   the sign itself. Decimals may have a comma. If columns disagree, `decimal` says `","` or `"."`,
+#'   and the other sign then separates thousands. Exponents may be `E` or `D`.
+#'
+#'   Empty fields and words such as `NA`, `NaN` and `null` are missing values. A column without a
+#'   name gets that of its place, such as `column_1`. A row with more or fewer fields than the
+#'   header has names is an error. Text that is not UTF-8 is read as UTF-16 or Windows-1252, with a
+#'   message.
 #'
 #' @param path The YAML file.
-#' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json`. `NULL`
-#'   writes nothing. It is filled only when all is computed; until then its folder `stages` holds
-#'   the finished models, and the same call goes on from there if it was interrupted, as long as the
-#'   code of the study's R files is the same. What has these names before, such as earlier results,
-#'   is moved into a folder `earlier-` with the time. One run at a time can use the folder. If the
-#'   report or a figure cannot be made, a warning (`amiss_warning_missing`) says which and why; the
-#'   others are written, and the same call makes what is missing.
-#' @param seed Overrides the seed of the file; with neither R's generator draws one, which is kept
+#' @param out Folder for the results: `report.html`, `figures/`, `result.rds`, `result.json` (see
+#'   *The folder of results*). `NULL` writes nothing.
+#' @param seed Overrides the seed of the file. With neither, R's generator draws one, which is kept
 #'   with the stages.
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
@@ -95,9 +118,19 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   read: both can do whatever you can. If not, such a study is refused, or you are asked at a
 #'   terminal. Studies that ship with the package need no trust.
 #' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], with `study`,
-#'   `title` and `wall_s`, invisibly. `read_study()`: a list of `study`, `title`, `seed`, `runs`,
-#'   `control`, `measurements` (of several records a named list), `model` and `catalogue`, or
-#'   `models`, `method` and `truth`.
+#'   `title` and `wall_s`, invisibly. `read_study()`: a list of
+#'   * `study`, `title`, `seed`, `runs`, `control`;
+#'   * `measurements`: for several records a named list;
+#'   * `model` and `catalogue`, or `models`, `method` and `truth`.
+#' @section The folder of results: The folder is filled only when all is computed. Until then its
+#'   folder `stages` holds the finished models. If the study was interrupted, the same call goes on
+#'   from there, as long as the code of the study's R files is the same. One run at a time can use
+#'   the folder.
+#'
+#'   What has the names of the results before, such as earlier results, is moved into a folder
+#'   `earlier-` with the time. If the report or a figure cannot be made, a warning
+#'   (`amiss_warning_missing`) says which and why. The others are written, and the same call makes
+#'   what is missing.
 #' @seealso `help("amiss-package")` for options that a batch job may set, and for the classes of
 #'   conditions.
 #' @examples

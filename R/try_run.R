@@ -6,15 +6,15 @@
 #'
 #' # What to look at
 #'
-#' * *A run*: how long it takes, whether it has a number for every row. If it fails, nothing else is
-#'   done, and the reason is shown.
+#' * *A run*: how long it takes, and whether it has a number for every row. If it fails, nothing
+#'   else is done, and the reason is shown.
 #' * *Parameters*: how much the output changes (RMS over the rows used) if the parameter goes from
-#'   its 10 % to its 90 % quantile while the others stay at their medians. One that changes it by
-#'   less than a twentieth of the noise does not act: its placeholder stands in the wrong place, the
-#'   program rounds it away, or it has no effect here.
-#' * *The start*: a run that starts later in the record, so that it knows less of the past. How many
-#'   rows it takes until both agree within the noise is what `warmup` of [measurements()] should at
-#'   least be.
+#'   its 10 % to its 90 % quantile while the others stay at their medians. A parameter that changes
+#'   it by less than a twentieth of the noise does not act. Its placeholder stands in the wrong
+#'   place, the program rounds it away, or it has no effect here.
+#' * *The start*: a run that starts later in the record, so that it knows less of the past. It
+#'   counts the rows until both runs agree within the noise. `warmup` of [measurements()] should be
+#'   at least that long.
 #' * *The study*: how long its runs would take one after the other.
 #'
 #' @param simulator A simulator.
@@ -23,10 +23,16 @@
 #'   (`vignette("program", "amiss")`).
 #' @param threads Number of threads, for a simulator that uses them.
 #' @param quiet Show no progress.
-#' @return An object of class `amiss_first_look`, a list: `seconds` a run, `rows`, `failed` (why the
-#'   first run failed, or `NULL`), `parameters` (a data frame: `name`, `low`, `high`, `change` in
-#'   the target's unit, `over_noise`, `acts`), `start` (`rows` until a later start is forgotten,
-#'   `NA` if it is not, `hours`, `warmup` in hours, `settled`), `runs_made`, `study_s`.
+#' @return An object of class `amiss_first_look`, a list:
+#'   * `seconds`: of a run.
+#'   * `rows`: number of rows.
+#'   * `failed`: why the first run failed, or `NULL`.
+#'   * `parameters`: a data frame of `name`, `low`, `high`, `change` in the target's unit,
+#'     `over_noise` and `acts`.
+#'   * `start`: `rows` until a later start is forgotten (`NA` if it is not), `hours`, `warmup` in
+#'     hours, `settled`.
+#'   * `runs_made`: the runs that this took.
+#'   * `study_s`: seconds of the study.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4))
 #' table$Ti <- 20 + 0.4 * table$Te + 0.1 * cos(1:96 * 1.7)

@@ -4,69 +4,106 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 
 #' The loop: show, name the cause, extend, measure
 #'
-#' The model is calibrated and its discrepancy attributed. Every mechanism of the catalogue is tried
-#' as a real extension of the model. The mechanism with the highest evidence is adopted if its log10
-#' Bayes factor is at least `decisive`, and the loop begins again with the extended model. A
-#' mechanism that raises the simulation's own error in calibration by more than 2 % is not adopted,
-#' whatever its evidence. Held-out rows do not decide what is adopted; they take part in the
-#' verdict: named, likely or a stand-in.
+#' @description
+#' Finds what a model lacks and extends it:
 #'
-#' *Runs.* The simulator is asked first. A few runs over the priors show where to begin; searches
-#' lead to the mode, with one run a step; about thirty runs in the region of the mode train an
-#' emulator, and runs at draws of its posterior check it ([calibrate_refined()]). A trial of a
-#' mechanism begins at the mode of the present model, takes the runs of that model for its own where
-#' the mechanism is switched off, and is checked by four runs. Trials that can still win are
-#' verified like the base model, the best first, until nobody can reach the leader. Two steps with
-#' eight mechanisms take about 400 runs. `candidates$judged_by` is `"runs"` for mechanisms that were
-#' verified, `"trial"` for the others, `"none"` for those that could not be tried.
+#' 1. The model is calibrated and its discrepancy attributed.
+#' 2. Every mechanism of the catalogue is tried as a real extension of the model.
+#' 3. The mechanism with the highest evidence is adopted if its log10 Bayes factor is at least
+#'   `decisive`. The loop begins again with the extended model.
+#'
+#' A mechanism that raises the simulation's own error in calibration by more than 2 % is not
+#' adopted, whatever its evidence. Held-out rows do not decide what is adopted. They do take part in
+#' the verdict: named, likely or a stand-in.
+#'
+#' # Runs
+#'
+#' The simulator is asked first. A few runs over the priors show where to begin. Searches lead to
+#' the mode, with one run a step. About thirty runs in the region of the mode train an emulator.
+#' Runs at draws of its posterior check the emulator ([calibrate_refined()]).
+#'
+#' A trial of a mechanism begins at the mode of the present model. It takes the runs of that model
+#' for its own with the mechanism switched off. Four runs check the trial. Trials that can still win
+#' are verified like the base model, the best first, until no other can reach the leader. Two steps
+#' with eight mechanisms take about 400 runs.
+#'
 #' [decision_rules()] lists every number that decides.
 #'
-#' *Given runs.* The base model may be an [ensemble()] of runs that were made elsewhere, and
-#' mechanisms others: see [mechanism()]. Then nothing is run, the emulators are checked by runs left
-#' out, and held-out rows are predicted by emulators of the runs given there.
+#' # Given runs
 #'
-#' *Several records.* Two or more series that share parameters ([calibrate_jointly()]) go through
-#' the same loop: give named lists of simulators and measurements. The `edit` of a mechanism is
-#' applied to the simulator of each record in turn; if it has two arguments, the second is the
-#' record's name ([mechanism()]). Models are compared by the evidence of all records. Scores are in
-#' units of each record's noise. Runs count for each record.
+#' The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms may be
+#' others (see [mechanism()]). Then nothing is run. The emulators are checked by runs left out, and
+#' held-out rows are predicted by emulators of the runs given there.
 #'
-#' @param simulator The base model: a simulator, or an [ensemble()] of given runs; of several
+#' # Several records
+#'
+#' Two or more series that share parameters ([calibrate_jointly()]) go through the same loop. Give
+#' named lists of simulators and measurements. The `edit` of a mechanism is applied to the simulator
+#' of each record in turn. If `edit` has two arguments, the second is the record's name
+#' ([mechanism()]). Models are compared by the evidence of all records. Scores are in units of each
+#' record's noise. Runs count for each record.
+#'
+#' @param simulator The base model: a simulator, or an [ensemble()] of given runs; for several
 #'   records a named list.
-#' @param measurements The [measurements()]; of several records a list with the same names.
+#' @param measurements The [measurements()]; for several records a list with the same names.
 #' @param catalogue A [catalogue()] of mechanisms.
 #' @param runs Runs over the priors of the base model before the search; `NULL`: two, and two for
 #'   each parameter. More are seldom needed. The budget of all runs is `control$runs_total`.
-#' @param control List of options: `max_steps` (3), `decisive` (log10 Bayes factor that a mechanism
-#'   must earn; 2), `runs_total` (budget of runs of the simulator; a verdict asks for about 100;
-#'   `NULL`: none), `rounds` (checks of a model before it is left as not trusted; 8), and lists
-#'   `emulator`, `calibration` (without its `check` and `exact`, which the loop sets itself) and
-#'   `attribution` for the stages.
+#' @param control List of options, with their defaults:
+#'   * `max_steps`: most mechanisms adopted (3).
+#'   * `decisive`: log10 Bayes factor that a mechanism must earn (2).
+#'   * `runs_total`: budget of runs of the simulator (`NULL`: none). A verdict needs about 100.
+#'   * `rounds`: checks of a model before it is left as not trusted (8).
+#'   * `emulator`, `calibration`, `attribution`: lists of options for the stages. The loop itself
+#'     sets `check` and `exact` of `calibration`.
 #' @param quiet No progress messages.
-#' @param checkpoint A folder in which all runs are kept (and the seed, if none is given), so that
-#'   an interrupted loop, called again with the same arguments, goes on where it stopped; `NULL`
-#'   keeps nothing. Delete it when the loop is done.
+#' @param checkpoint A folder in which all runs are kept (and the seed, if none is given). An
+#'   interrupted loop that is called again with the same arguments goes on where it stopped. `NULL`
+#'   keeps nothing. Delete the folder when the loop is done.
 #' @inheritParams calibrate
-#' @return An object of class `amiss_upgrade`: the `models` adopted (first the base model), all
-#'   `candidates` tried (a row each: the model that it extends, `from`, the `mechanism`, `log10_bf`
-#'   with `lower95` and `upper95` and its `word`, its `probability`, the simulation's error in
-#'   calibration over that before, `error_ratio`, `trusted`, `judged_by`, its `runs`, and the
-#'   estimates of its `parameters`). `log10_bf` is the log10 Bayes factor if neither model has an
-#'   unknown response to the conditions of the mechanism; `beside_unknown` is that with the response
-#'   in both, which imitates the mechanism. If a trial is not trusted, both hold the second factor.
-#'   The result also has the `named_cause`, the `gain`, why the loop stopped (`stopped_because`, in
-#'   a word `stopped_id`) how many runs of the simulator it took (`runs_total`), and how many more a
-#'   program's cache had (`runs_found`). Each model that adopted a mechanism has a `verdict`:
-#'   `"named"`; `"likely"`, if something in its `doubts` (sentences, each with a short name) speaks
-#'   against it; or `"stand-in"`, if held-out data do not improve (`held_out_gain`, with its
-#'   standard error). `inert` names parameters of the base model that the last model no longer uses.
-#'   `steps` has, for each record, what shorter steps of the simulator change: the RMS (`error`, in
-#'   the target's unit) of what the parameters cannot take up, and by how many of its standard
-#'   deviations each would move (`moved`); `NULL` if that is not known ([function_simulator()]).
-#'   `confounded_with` names parameters that are correlated beyond 0.4 with those that it brought.
-#'   For several records `fit` is what [calibrate_jointly()] gives, and `records` of a model has
-#'   `prediction`, `scores` and `held_out_gain` of each in its own unit.
-#' @source Monari (2022) for the loop; how a mechanism is judged is the package's own:
+#' @return An object of class `amiss_upgrade`:
+#'   * `models`: the models adopted, first the base model (see *Models*).
+#'   * `candidates`: all mechanisms tried, one a row (see *Candidates*).
+#'   * `named_cause`: the cause that was named or, if there is none, the first that is likely:
+#'     `mechanism`, `boundary`, `log10_bf` and `sentence`. `NULL` if there is none of either.
+#'   * `gain`: `log10_bf` of the last model against the first with its `interval`, and the scores of
+#'     both.
+#'   * `stopped_because`: why the loop stopped; `stopped_id` is the same in a word.
+#'   * `runs_total`: the runs of the simulator that the loop took.
+#'   * `runs_found`: further runs that a program's cache had.
+#'   * `inert`: parameters of the base model that the last model no longer uses.
+#'
+#' @section Candidates: The columns of `candidates` are
+#'   * `from`, `mechanism`: the model that the mechanism extends, and the mechanism.
+#'   * `log10_bf`, `lower95`, `upper95`, `word`: the log10 Bayes factor if neither model has an
+#'     unknown response to the conditions of the mechanism, its interval, and the same in words.
+#'   * `beside_unknown`: the factor with that response in both models. The response imitates the
+#'     mechanism. If a trial is not trusted, `log10_bf` holds this factor as well.
+#'   * `probability`: posterior probability.
+#'   * `error_ratio`: the simulation's error in calibration, divided by that before.
+#'   * `trusted`: whether the numbers can be believed.
+#'   * `judged_by`: `"runs"` for mechanisms that were verified, `"trial"` for the others, `"none"`
+#'     for those that could not be tried.
+#'   * `runs`: the runs of the simulator that the mechanism took.
+#'   * `parameters`: the estimates of its parameters.
+#'
+#' @section Models: Each model that adopted a mechanism has a `verdict`:
+#'   * `"named"`;
+#'   * `"likely"`, if one of its `doubts` (sentences, each with a short name) speaks against it;
+#'   * `"stand-in"`, if held-out data do not improve. `held_out_gain` is that gain, with its
+#'     standard error.
+#'
+#'   Each model also has
+#'   * `confounded_with`: parameters that are correlated beyond 0.4 with those that the mechanism
+#'     brought.
+#'   * `steps`: what shorter steps of the simulator change, for each record. `error` is the RMS, in
+#'     the target's unit, of what the parameters cannot take up. `moved` says by how many of its
+#'     standard deviations each parameter would move. `steps` is `NULL` if this is not known
+#'     ([function_simulator()]).
+#'
+#'   For several records `fit` is what [calibrate_jointly()] gives. `records` of a model then has
+#'   `prediction`, `scores` and `held_out_gain` of each record in its own unit.
+#' @source Monari (2022) for the loop. How a mechanism is judged is the package's own:
 #'   `vignette("algorithm", "amiss")`, *Naming*.
 #' @examples
 #' \donttest{

@@ -1,10 +1,15 @@
 #' Synthetic weather and heating sequences
 #'
-#' `synthetic_weather()` makes weather with the features that matter to a building: the sun's path
-#' with passing clouds, outdoor temperature that follows sun and slow changes of the air mass, gusty
-#' wind with a preferred direction, and the sky's long-wave radiation. The default is like the coast
-#' of Almeria (Spain) in spring. `rolbs()` makes a randomly ordered logarithmic binary sequence of
-#' heating, uncorrelated with the weather.
+#' @description
+#' `synthetic_weather()` makes weather with the features that matter to a building:
+#'
+#' * the sun's path with passing clouds,
+#' * outdoor temperature that follows sun and slow changes of the air mass,
+#' * gusty wind with a preferred direction,
+#' * the sky's long-wave radiation.
+#'
+#' The default is like the coast of Almeria (Spain) in spring. `rolbs()` makes a randomly ordered
+#' logarithmic binary sequence of heating, uncorrelated with the weather.
 #'
 #' @param days Length in days.
 #' @param step_h Step in hours.
@@ -19,8 +24,14 @@
 #'   clockwise.
 #' @param seed Seed; if `NULL`, R's generator gives one.
 #' @return `synthetic_weather()`: a data frame, one row a step (means over the step that ends at
-#'   `hour`), with `hour`, `Te` (degC), `Gh`, `Gv` (W/m2: horizontal, vertical surface), `Ws` (m/s),
-#'   `Wd` (degrees from north, clockwise), `Lw` (W/m2). `rolbs()`: a vector of heating powers.
+#'   `hour`), with
+#'   * `hour`.
+#'   * `Te`: outdoor temperature, degC.
+#'   * `Gh`, `Gv`: sun on a horizontal and on the vertical surface, W/m2.
+#'   * `Ws`, `Wd`: wind speed, m/s, and direction, degrees from north, clockwise.
+#'   * `Lw`: long-wave radiation of the sky, W/m2.
+#'
+#'   `rolbs()`: a vector of heating powers.
 #' @source Declination by Cooper (1969), The absorption of radiation in solar stills, Solar Energy
 #'   12, 333-346; the clear sky's beam by Meinel and Meinel (1976), Applied solar energy,
 #'   Addison-Wesley.

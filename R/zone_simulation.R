@@ -11,18 +11,20 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #'   warning names what seems to be no measurement: codes for a missing value, values far outside
 #'   all others, stuck readings, counters.
 #' @param step_s Length of an interval, s.
-#' @param hold Air temperature (degC) to be prescribed in each interval, `NA` where it is free;
-#'   `NULL` for none. Holding the first intervals at the measurement lets the walls forget their
-#'   unknown past.
+#' @param hold Air temperature (degC) to be prescribed in each interval, `NA` in intervals in which
+#'   it is free; `NULL` for none. Holding the first intervals at the measurement lets the walls
+#'   forget their unknown past.
 #' @param threads Number of threads; the result does not depend on it.
-#' @param control List of `max_substep_s` (300 s), `cells` (refinement of the walls; 1), `spinup`
-#'   (times that the leading held rows are repeated first; 0), `initial_hours` (of data that give
-#'   the walls their first outside temperature; 24). Calibrations take these defaults: a
+#' @param control List of options, with their defaults. Calibrations take the defaults; a
 #'   [function_simulator()] may call `simulate_zone()` with others.
+#'   * `max_substep_s`: longest step in s (300).
+#'   * `cells`: refinement of the walls (1).
+#'   * `spinup`: times that the leading held rows are repeated first (0).
+#'   * `initial_hours`: hours of data that give the walls their first outside temperature (24).
 #' @param flux Name of a wall whose heat flux is wanted instead of the air temperature.
 #' @return Matrix of mean air temperatures, degC, or of mean heat fluxes at the inner surface of the
-#'   wall, W/m2, positive into the room: one row per interval, one column per run; `NaN` in a run
-#'   that fails.
+#'   wall, W/m2, positive into the room. It has one row per interval and one column per run; a run
+#'   that fails is `NaN`.
 #' @examples
 #' weather <- synthetic_weather(1, seed = 1)
 #' weather$RHP <- rolbs(nrow(weather), power = 100, seed = 1)
@@ -142,12 +144,13 @@ simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = 
 
 #' Heat flux into a wall of a zone
 #'
-#' The zone as a simulator of what a heat flux sensor on the inner surface of a wall measures,
-#' beside that of the air temperature: for a second record in [calibrate_jointly()].
+#' Makes a simulator of what a heat flux sensor on the inner surface of a wall measures. Use it with
+#' the zone itself, the simulator of the air temperature, as a second record in
+#' [calibrate_jointly()].
 #'
 #' @param zone A [zone()].
 #' @param wall Name of the wall.
-#' @param air Column of the measured air temperature, degC: in rows that warm up the air is held at
+#' @param air Column of the measured air temperature, degC. In rows that warm up the air is held at
 #'   it, as the zone itself is held at its target there.
 #' @return An object of class `amiss_zone_flux`: a simulator of the mean heat flux at the inner
 #'   surface, W/m2, positive into the room.
