@@ -220,7 +220,9 @@ sure_sentences <- function(upgrade) {
   }))
   first <- trials[1, ]
   c(each, probability_sentence(trials),
-    if (first$mechanism != best$mechanism && keeps_error(first)) raised_sentence(first, " first"),
+    if (first$mechanism != best$mechanism) {
+      if (keeps_error(first)) raised_sentence(first, " first") else outranked_sentence(first, best)
+    },
     trust_sentence(upgrade, best))
 }
 
@@ -228,6 +230,14 @@ raised_sentence <- function(row, when = "") {
   sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration",
                 "does not fall (%s times as large): what is gained, the discrepancy gains."),
           when, row$mechanism, short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
+}
+
+# Of two that may be adopted, the one with the larger factor need not rank higher.
+outranked_sentence <- function(row, best) {
+  if (row$judged_by != "runs" || is_refuted(row) || row$log10_bf <= best$log10_bf) return(NULL)
+  sprintf(paste("%s has larger odds over no change. With no unknown response to any condition,",
+                "%s explains the record better: odds of %s."),
+          row$mechanism, best$mechanism, odds(best$standing - row$standing))
 }
 
 refuted_sentence <- function(row) {
@@ -375,8 +385,8 @@ doubt_sentence <- function(model) {
 
 confounded_sentence <- function(model) {
   if (length(model$confounded_with)) {
-    sprintf("The estimate of %s is correlated with %s (by more than 0.4).", model$mechanism,
-            listed(parameter_labels(model$fit, model$confounded_with)))
+    sprintf("The estimate of %s is correlated with %s (by more than %s).", model$mechanism,
+            listed(parameter_labels(model$fit, model$confounded_with)), short(rules$confounded))
   }
 }
 

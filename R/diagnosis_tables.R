@@ -60,6 +60,7 @@ candidates_words <- function(upgrade) {
              "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)),
              evidence = table$word,
              "beside an unknown response" = signed(table$beside_unknown),
+             "with no unknown response" = signed(table$standing),
              probability = percent(table$probability),
              "error in calibration" = error_words(table$error_ratio),
              estimate = ifelse(table$judged_by == "runs", "verified",

@@ -218,7 +218,7 @@ correlation_words <- function(measurements, a, b) {
   used <- measurements$use == "calibrate"
   r <- stats::cor(condition_values(measurements, pairs$a)[used],
                   condition_values(measurements, pairs$b)[used], use = "pairwise.complete.obs")
-  if (is.na(r) || abs(r) < 0.4) ""
+  if (is.na(r) || abs(r) < rules$confounded) ""
   else sprintf(" (in this record the correlation of %s and %s is %.2f)", pairs$a, pairs$b, r)
 }
 

@@ -167,17 +167,17 @@ still_answers <- function(parent, model, boundary) {
     if (any(driven)) max(table$log10_bf_dropped[driven]) else 0
   }
   before <- strength(parent)
-  before > 0 && strength(model) > 0.5 * before
+  before > 0 && strength(model) > rules$still_responds * before
 }
 
-# Parameters of the model that are correlated beyond 0.4 with those that the mechanism brought:
+# Parameters of the model that are strongly correlated with those that the mechanism brought:
 # another part of the model that could do the same.
 confounded_parameters <- function(fit, new) {
   others <- setdiff(colnames(fit$values), new)
   if (!length(new) || !length(others)) return(character())
   r <- stats::cov.wt(posterior_unit(fit), fit$weights, cor = TRUE)$cor
   dimnames(r) <- list(colnames(fit$values), colnames(fit$values))
-  others[apply(abs(r[others, new, drop = FALSE]), 1, max) > 0.4]
+  others[apply(abs(r[others, new, drop = FALSE]), 1, max) > rules$confounded]
 }
 
 # In words, if the last of `models` has no evidence on the base model and is correlated with what
@@ -198,10 +198,10 @@ only_beside <- function(models, confounded, candidates) {
             listed(vapply(beside, `[[`, "", "mechanism")))
 }
 
-# TRUE where the last model's error is still large and of what exceeded the noise more than a tenth
-# is left. The mechanism that made the error leaves nothing; one that imitates it does.
+# Whether the last model's error is still large, and a good part of what exceeded the noise is left.
+# The mechanism that made the error leaves nothing; one that imitates it does.
 much_remains <- function(models, measurements) {
   ends <- lapply(models[c(1, length(models))], remaining_error, measurements)
   excess <- vapply(ends, function(e) e$ratio^2 - 1, 0)
-  ends[[2]]$large && excess[2] > 0.1 * excess[1]
+  ends[[2]]$large && excess[2] > rules$remains * excess[1]
 }

@@ -35,7 +35,7 @@ remainder_pattern <- function(r, rows, measurements, answers) {
   unit <- measurements$unit
   shares <- c(drift = drift_share(r, hours), daily = daily_share(r, hours, clock))
   best <- which.max(shares)
-  if (!shares[best] > 0.5) return(NULL)
+  if (!shares[best] > rules$pattern_share) return(NULL)
   if (names(shares)[best] == "drift") {
     ends <- stats::fitted(stats::lm(r ~ stats::poly(hours, 2)))[c(1, length(r))]
     return(list(
@@ -103,7 +103,7 @@ acts_as_drift <- function(parent, fit, threads) {
     }
     change <- run(after) - run(before)
     all(is.finite(change)) && any(change != 0) &&
-      drift_share(change, after$measurements$hours[after$rows]) > 0.99
+      drift_share(change, after$measurements$hours[after$rows]) > rules$drift_alike
   }, record_fits(parent), record_fits(fit))
   all(slow)
 }

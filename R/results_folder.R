@@ -178,7 +178,7 @@ result_list.amiss_upgrade <- function(x) {
     list(from = row$from, mechanism = row$mechanism, log10_bf = row$log10_bf,
          interval = c(row$lower95, row$upper95), probability = row$probability,
          error_ratio = row$error_ratio, trusted = row$trusted, judged_by = row$judged_by,
-         runs = row$runs, beside_unknown = row$beside_unknown,
+         runs = row$runs, beside_unknown = row$beside_unknown, standing = row$standing,
          parameters = table_rows(row$parameters[[1]]))
   }
   cause <- x$named_cause

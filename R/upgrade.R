@@ -77,6 +77,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   * `from`, `mechanism`: the model that the mechanism extends, and the mechanism.
 #'   * `log10_bf`, `lower95`, `upper95`, `word`: the log10 Bayes factor if neither model has an
 #'     unknown response to the conditions of the mechanism, its interval, and the same in words.
+#'   * `standing`: the factor if neither model has an unknown response to any condition of the
+#'     catalogue. The mechanism with the highest standing of those that are decisive is adopted.
 #'   * `beside_unknown`: the factor with that response in both models. The response imitates the
 #'     mechanism. If a trial is not trusted, `log10_bf` holds this factor as well.
 #'   * `probability`: posterior probability.
