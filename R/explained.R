@@ -48,3 +48,23 @@ lost_without <- function(model, conditions, context) {
   call_engine(drop_conditions_(engine_records(fits), engine_draws(fits), dropped, ais,
                                engine_context(context$seed, context$threads)))$lost / log(10)
 }
+
+# ---- what each mechanism leaves of the responses
+
+# Decades of evidence that the error responds to boundary conditions: of the present model ("no
+# change") to each, by its attribution; of each trial to those that drive its mechanism, together.
+response_table <- function(trials, present, attribution) {
+  before <- attribution$table[c("boundary", "log10_bf_dropped")]
+  rows <- lapply(Filter(function(trial) !is.null(trial$taken), trials), function(trial) {
+    conditions <- present$conditions[[trial$mechanism]]
+    if (!length(conditions)) return(NULL)
+    lost <- present$lost[[toString(conditions)]]
+    data.frame(mechanism = trial$mechanism, condition = conditions, before = lost,
+               left = lost - trial$taken)
+  })
+  unchanged <- data.frame(mechanism = "no change", condition = before$boundary,
+                          before = before$log10_bf_dropped, left = before$log10_bf_dropped)
+  table <- cbind(from = present$name, do.call(rbind, c(list(unchanged), unname(rows))))
+  rownames(table) <- NULL
+  table
+}

@@ -1,6 +1,6 @@
-figure_names <- c("fit", "attribution", "candidates", "parameters", "discrepancy", "response",
-                  "gain", "mean_day", "priors",
-                  "moved", "steps", "missing", "emulator", "sampler")
+figure_names <- c("fit", "attribution", "candidates", "explained", "parameters", "discrepancy",
+                  "response", "gain", "mean_day", "priors", "moved", "steps", "missing", "emulator",
+                  "sampler")
 
 # Of several records each has its own.
 record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_day", "missing",
@@ -21,6 +21,7 @@ record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_
 #'   * `"fit"`: measured and simulated.
 #'   * `"attribution"`: what the error responds to.
 #'   * `"candidates"`: mechanisms tried.
+#'   * `"explained"`: what each mechanism leaves of the responses to the boundary conditions.
 #'   * `"parameters"`: their estimates.
 #'   * `"discrepancy"`: the discrepancy over time.
 #'   * `"response"`: the error against the leading boundary condition.
@@ -168,6 +169,7 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
          fit = figure_fit(upgrade),
          attribution = figure_attribution(lapply(stages, `[[`, "attribution")),
          candidates = figure_candidates(upgrade),
+    explained = figure_explained(upgrade),
          parameters = figure_parameters(lapply(stages, `[[`, "fit")),
          discrepancy = figure_discrepancy(lapply(stages, function(s) discrepancy(s$fit)),
                                           leading_condition(upgrade)),

@@ -7,7 +7,7 @@ first_state <- function(started, catalogue, runs, context) {
   measured <- staged("base", measured_model(base, context))
   report_model(measured, context)
   list(present = base, models = list(measured), started = started, catalogue = catalogue,
-       candidates = NULL, off = list(), base = names(base$parameters))
+       candidates = NULL, responses = NULL, off = list(), base = names(base$parameters))
 }
 
 next_step <- function(state, context) {
@@ -28,6 +28,8 @@ next_step <- function(state, context) {
     table <- trial_table(trials, state$present, left, decisive)
   }
   state$candidates <- rbind(state$candidates, table)
+  state$responses <- rbind(state$responses, response_table(trials, state$present,
+                                                           last_model(state$models)$attribution))
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
   best <- best_trial(table, decisive)
   if (!may_be_adopted(best, decisive)) {

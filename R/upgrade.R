@@ -64,6 +64,9 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' @return An object of class `amiss_upgrade`:
 #'   * `models`: the models adopted, first the base model (see *Models*).
 #'   * `candidates`: all mechanisms tried, one a row (see *Candidates*).
+#'   * `responses`: evidence for a response of the error to boundary conditions, in decades: without
+#'     each mechanism (`before`) and with it (`left`). The conditions of a mechanism count together.
+#'     The rows of `"no change"` have the evidence for each condition by itself.
 #'   * `named_cause`: the cause that was named or, if there is none, the first that is likely:
 #'     `mechanism`, `boundary`, `log10_bf` and `sentence`. `NULL` if there is none of either.
 #'   * `gain`: `log10_bf` of the last model against the first with its `interval`, and the scores of
@@ -160,7 +163,7 @@ finish_upgrade <- function(state, context) {
   models <- judge_models(state$models, state$candidates, state$catalogue, measurements,
                          context$control, context$threads, runs_left(context))
   structure(list(format_version = format_version, models = models, candidates = state$candidates,
-                 catalogue = state$catalogue,
+                 responses = state$responses, catalogue = state$catalogue,
                  named_cause = named_cause(models, state$candidates, state$catalogue),
                  gain = upgrade_gain(models), stopped_because = state$stopped$words,
                  stopped_id = state$stopped$id,

@@ -33,3 +33,26 @@ test_that("what numbers that are not trusted take away is not told", {
   row <- amiss:::trial_row(trial, present)
   expect_equal(row$log10_bf, row$beside_unknown)
 })
+
+test_that("what each mechanism leaves is of its own conditions, and before it of each by itself", {
+  attribution <- list(table = data.frame(boundary = c("Gv", "Te"), log10_bf_dropped = c(6, 1)))
+  present <- list(name = "base", conditions = list(sun = "Gv", mass = c("Gv", "Te"), drift = NULL),
+                  lost = list(Gv = 5.9, "Gv, Te" = 8))
+  trials <- list(list(mechanism = "sun", taken = 5.5), list(mechanism = "mass", taken = 2),
+                 list(mechanism = "drift", taken = 0), list(mechanism = "silent"))
+  table <- amiss:::response_table(trials, present, attribution)
+  expect_equal(table$mechanism, c("no change", "no change", "sun", "mass", "mass"))
+  expect_equal(table$condition, c("Gv", "Te", "Gv", "Gv", "Te"))
+  expect_equal(table$before, c(6, 1, 5.9, 8, 8))
+  expect_equal(table$left, c(6, 1, 0.4, 6, 6))
+  expect_true(all(table$from == "base"))
+})
+
+test_that("a loop keeps them for each step, and the figure says how much the cause explains", {
+  upgrade <- small_upgrade()
+  sun <- upgrade$responses[upgrade$responses$mechanism == "sun", ]
+  row <- upgrade$candidates[upgrade$candidates$mechanism == "sun", ]
+  expect_equal(sun$before - sun$left, (row$log10_bf - row$beside_unknown)[1])
+  expect_match(ggplot2::autoplot(upgrade, "explained")$labels$title,
+               "With sun, the evidence for a response to Gv falls")
+})
