@@ -291,8 +291,8 @@ reach_words <- function(fit) {
 reach_sentence <- function(fit) {
   hides <- function(fit) length(fit$reach) > 1 && free_probability(fit) > 0.9
   if (any(vapply(record_fits(fit), hides, NA)))
-    paste("What remains reaches into what the parameters can do: they may hide a part of it, so do",
-          "not read their values as physical.")
+    paste("What remains resembles what the parameters can do: they may hide a part of it, and",
+          "their values may be biased.")
 }
 
 #' @export

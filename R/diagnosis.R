@@ -465,11 +465,10 @@ remaining_sentences <- function(upgrade) {
                if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
       else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
     reach_sentence(model$fit) %||%
-      if (last$large) paste("The parameters may have taken the place of what is missing: do not",
-                            "read their values as physical."),
+      if (last$large) "The parameters may make up for what is missing: their values may be biased.",
     if (!is.null(moved))
-      sprintf("With finer steps of the simulator %s: do not read %s as physical.", moved,
-              if (length(step_moved(model)) > 1) "these values" else "this value"),
+      sprintf("With finer steps of the simulator %s: %s biased by its steps.", moved,
+              if (length(step_moved(model)) > 1) "these values are" else "this value is"),
     vapply(group_words(model$attribution), paste0, "", "."),
     if (length(edge)) sprintf(paste("At the edge of what was thought possible: %s. Widen these",
                                     "ranges, or suspect that these parameters make up for",

@@ -61,11 +61,25 @@ candidates_words <- function(upgrade) {
              evidence = table$word,
              "beside an unknown response" = signed(table$beside_unknown),
              "with no unknown response" = signed(table$standing),
-             probability = percent(table$probability),
+             probability = ifelse(is_refused_row(table), "", percent(table$probability)),
              "error in calibration" = error_words(table$error_ratio),
              estimate = ifelse(table$judged_by == "runs", "verified",
                                ifelse(table$trusted, "trial", "rough")),
-             decision = ifelse(table$adopted, "adopted", ""), check.names = FALSE, row.names = NULL)
+             decision = decision_words(table, upgrade$control$decisive), check.names = FALSE,
+             row.names = NULL)
+}
+
+is_refused_row <- function(table) !table$adopted & (keeps_error(table) | is_refuted(table))
+
+# Why each mechanism was adopted or not.
+decision_words <- function(table, decisive) {
+  words <- ifelse(table$judged_by == "trial", "not verified", "too uncertain")
+  words[table$step %in% table$step[table$adopted]] <- "another one is better"
+  words[is_refuted(table)] <- "refused: an unknown response does better"
+  words[keeps_error(table)] <- "refused: the error does not fall"
+  words[table$log10_bf < decisive] <- "too weak"
+  words[table$adopted] <- "adopted"
+  words
 }
 
 # Over that of the model before.

@@ -51,10 +51,12 @@ figure_candidates <- function(upgrade) {
                         labeller = wrap_strips()) +
     axis +
     figure_titles(candidates_title(table, decisive),
-                  sprintf(paste0("Right of the dashed line (odds of %s to 1) a mechanism may be ",
-                                 "adopted, the best one first. Scale in powers of ten: 2 is 100 ",
-                                 "to 1. Lines: 95 %% intervals; numbers: estimates."),
-                          format(10^decisive, big.mark = ",")),
+                  paste0(sprintf(paste("Right of the dashed line (odds of %s to 1) a mechanism may",
+                                       "be adopted. The axis is compressed: 2 is 100 to 1, 10 is",
+                                       "10^10 to 1. Lines: 95 %% intervals."),
+                                 format(10^decisive, big.mark = ",")),
+                         if (any(refused)) " Refused: the error does not fall, or an unknown ",
+                         if (any(refused)) "response does better."),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"),

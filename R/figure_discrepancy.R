@@ -93,7 +93,7 @@ figure_response <- function(upgrade, classes = 10) {
 # The response that the model lacks, of each of the leading conditions, in the unit of the target:
 # first of those that are significant in the `attribution`, if there is one. What is below a
 # hundredth of the largest is a flat line, and left out.
-figure_missing <- function(discrepancy, attribution = NULL, most = 4) {
+figure_missing <- function(discrepancy, attribution = NULL, stage = "the model", most = 4) {
   responses <- discrepancy$responses
   size <- sqrt(colMeans(responses^2))
   first <- names(size) %in% if (!is.null(attribution)) significant_conditions(attribution$table)
@@ -105,10 +105,12 @@ figure_missing <- function(discrepancy, attribution = NULL, most = 4) {
                       part = rep(discrepancy$segment, length(shown)))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, .data$value, group = .data$part)) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
-    ggplot2::geom_line(colour = stage_colours[["the model"]], linewidth = 0.9) +
+    ggplot2::geom_line(colour = stage_colours[[stage]], linewidth = 0.9) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, labeller = wrap_strips()) +
     figure_titles(
-      sprintf("What the model lacks is mostly a response to %s, typically %s", shown[1],
+      sprintf("%s is mostly a response to %s, typically %s",
+              if (stage == "before") "What the model lacks before the change"
+              else "What the model lacks", shown[1],
               with_unit(short(size[[shown[1]]]), discrepancy$unit)),
       paste("How the target responds to each boundary condition, present and past, beyond what",
             "the model says. Above zero the model is too low, below it too high."),

@@ -25,8 +25,10 @@ figure_steps <- function(upgrade) {
   drop <- -diff(shown$rmse)
   best <- which.max(drop)
   title <- if (drop[best] <= 0) sprintf("No step lowers the typical error (%s)", use[length(use)])
-           else sprintf("%s brings most: the typical error (%s) %s",
-                        sub("^\\+ ", "", as.character(shown$step[best + 1])), use[length(use)],
+           else sprintf("%s %s: the typical error (%s) %s",
+                        sub("^\\+ ", "", as.character(shown$step[best + 1])),
+                        if (length(drop) > 1) "brings most" else "lowers the error",
+                        use[length(use)],
                         change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
   figure <- ggplot2::ggplot(
     table, ggplot2::aes(.data$rmse, .data$step, colour = .data$use, shape = .data$use)) +
@@ -38,7 +40,7 @@ figure_steps <- function(upgrade) {
     ggplot2::scale_x_continuous(limits = c(0, NA), guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.3)) +
     figure_titles(title, paste("Each row adds one mechanism to the row above. Dashed: the stated",
-                               "noise, below which there is nothing left to gain."),
+                               "noise; an error near it is as small as can be expected."),
                   x = axis_label("typical error, RMSE", m$unit)) +
     figure_theme()
   with_height(figure, 2.6 + 0.6 * nlevels(table$step))

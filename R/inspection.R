@@ -255,8 +255,9 @@ site_inspection <- function(upgrade, model) {
   if (!NROW(brought)) return(NULL)
   between <- sub(" to ", " and ", brought[["95 % interval"]], fixed = TRUE)
   last <- upgrade$models[[length(upgrade$models)]]
-  hidden <- if (!is.null(reach_sentence(last$fit)))
-    " What remains of the error may be hidden in these values."
+  hidden <- if (!is.null(reach_sentence(last$fit)) ||
+                remaining_error(last, upgrade$measurements)$large)
+    " What is still missing may bias these values."
   if (any(brought$parameter %in% step_moved(last)))
     hidden <- paste(hidden, "Finer steps would move these values.")
   values <- listed(sprintf("%s lies between %s", brought$parameter,

@@ -179,7 +179,8 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
          priors = figure_priors(lapply(stages, `[[`, "fit")),
          moved = figure_moved(upgrade),
          steps = figure_steps(upgrade),
-         missing = figure_missing(discrepancy(stages[[1]]$fit), stages[[1]]$attribution),
+         missing = figure_missing(discrepancy(stages[[1]]$fit), stages[[1]]$attribution,
+                             names(stages)[1]),
          emulator = figure_emulator(lapply(stages, `[[`, "fit")),
          sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)))
 }

@@ -408,7 +408,7 @@ race <- function(present, trials, context) {
 report_trial <- function(trial, present, context) {
   what <- switch(trial$level, silent = "changes nothing", failed = "could not be computed",
                  untried = "could not be tried: its runs failed", missed = "the budget ended",
-                 sprintf("log10 Bayes factor %.1f%s", log10_factor(trial, present),
+                 sprintf("log10 Bayes factor %s%s", signed(log10_factor(trial, present)),
                          if (trial$level == "verified") ", verified by runs" else ""))
   context$say("  {trial$mechanism}: {what}")
   if (trial$level == "silent") warn_no_response(trial$mechanism)

@@ -73,12 +73,12 @@ test_that("a large error that responds to nothing makes the verdict unexplained"
 
 test_that("a discrepancy that reaches into what the parameters can do is told", {
   upgrade <- small_upgrade()
-  expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "do not read their values")
+  expect_no_match(paste(summary(upgrade)$remains, collapse = " "), "values may be biased")
   # a grid of which the record prefers the free one
   upgrade$models[[2]]$fit$control$reach <- c(13, Inf)
   upgrade$models[[2]]$fit$reach <- c("13" = 0.02, "Inf" = 0.98)
   expect_match(summary(upgrade)$remains,
-               "they may hide a part of it, so do not read their values as physical", all = FALSE)
+               "they may hide a part of it, and their values may be biased", all = FALSE)
 })
 
 test_that("a cause that leaves a good part of the error is only likely", {

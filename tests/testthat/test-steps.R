@@ -194,11 +194,11 @@ test_that("parameters that finer steps would move are told", {
   told <- summary(upgrade)
   expect_match(
     told$remains,
-    "With finer steps of the simulator bypass moves by more than .*: do not read this value",
+    "With finer steps of the simulator bypass moves by more than .*: this value is biased",
     all = FALSE)
   expect_match(told$inspect, "check that on site. Finer steps would move these values.",
                all = FALSE)
   upgrade$models[[2]]$steps[[1]]$moved[] <- 1.4
-  expect_match(summary(upgrade)$remains, "k and bypass move by .*: do not read these values",
+  expect_match(summary(upgrade)$remains, "k and bypass move by .*: these values are biased",
                all = FALSE)
 })
