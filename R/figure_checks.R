@@ -26,9 +26,11 @@ figure_emulator <- function(fits) {
     ggplot2::scale_shape_manual(values = c("before" = 4, "after" = 19, "the model" = 19)) +
     stage_scales() +
     figure_titles(check_words(fits), paste("Errors on runs left out, each over its stated standard",
-                                           "deviation. Points on the line: the emulator is as sure",
-                                           "as it should be. Steeper than the line: it is too",
-                                           "sure."), x = "expected of a normal error", y = "seen") +
+                                           "deviation. On the line, the emulator knows its errors.",
+                                           "Ends steeper than the line: a few runs, mostly far",
+                                           "from the posterior, are worse than it says. The title",
+                                           "has the check that decides."),
+                  x = "expected of a normal error", y = "seen") +
     figure_theme()
   with_height(figure, 5.4)
 }

@@ -35,8 +35,9 @@ figure_discrepancy <- function(discrepancies, leading = NULL) {
     ggplot2::facet_grid(panel ~ ., scales = "free_y", switch = "y",
                         labeller = wrap_turned(length(panels))) + stage_scales() +
     figure_titles(discrepancy_title(table),
-                  paste0("Grey: measured - simulated. Coloured: the discrepancy, which responds ",
-                         "to boundary conditions, with 95 % band.",
+                  paste0("Grey: measured - simulated, at the posterior mean of the parameters. ",
+                         "Coloured: the discrepancy, which responds to boundary conditions, with ",
+                         "95 % band.",
                          if (!is.null(leading))
                            paste0(" Below: ", leading$name, ", which leads.")),
                   x = time_label(table$time)) +

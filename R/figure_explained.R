@@ -33,7 +33,7 @@ figure_explained <- function(upgrade) {
     ggplot2::scale_fill_gradient(low = "grey92", high = stage_colours[["after"]], limits = c(0, 1),
                                  guide = "none") +
     ggplot2::scale_x_discrete(position = "top", limits = unique(table$condition),
-                              labels = wrap_labels(0.95 / length(unique(table$condition)))) +
+                              labels = wrap_labels(1.1 / length(unique(table$condition)))) +
     ggplot2::scale_y_discrete(labels = function(x) wrap_labels(0.3)(sub("^[0-9]+ ", "", x))) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y",
                         labeller = wrap_strips()) +
