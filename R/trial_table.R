@@ -1,5 +1,4 @@
-# What trials are worth against the present model: Bayes factors, how far they may be off, and which
-# may be adopted.
+# What the trials of a step are worth, as a table, and which mechanism is adopted.
 
 # A row for each mechanism that was tried or left out by the budget.
 trial_table <- function(trials, present, left, decisive) {
@@ -65,29 +64,9 @@ as_tried <- function(row, trial) {
   row
 }
 
-# How far the evidence may be off beyond its standard error.
-trial_margin <- function(model) {
-  if (is_verified(model)) 0
-  else if (has_passed(model)) rules$trial_margin
-  else rules$trial_doubt * (1 + min(rules$worst_ratio, model$fit$check$ratio %||% 1))
-}
-
-has_passed <- function(model) isTRUE(model$fit$check$passed)
-
-# Whether its check says what its evidence is, too.
-is_confirmed <- function(model)
-  has_passed(model) && isTRUE(model$fit$check$effective >= rules$effective_trial)
-
-# The simulation's own error in calibration over that of the fit `current`.
-error_ratio <- function(fit, current) {
-  sqrt(mean(left_by_simulation(fit)^2) / mean(left_by_simulation(current)^2))
-}
-
 # Beside an unknown response to its conditions a mechanism that is the cause may gain little, as the
 # response imitates it; it must not lose decisively.
 is_refuted <- function(table) !is.na(table$beside_unknown) & speaks_against(table$beside_unknown)
-
-speaks_against <- function(factor) factor < rules$against
 
 keeps_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > rules$fallen_error
 

@@ -1,0 +1,239 @@
+# Mechanisms as extensions of the present model: a trial of each from the present mode, as long as
+# it can still win.
+
+# The present model as its trials see it: at its run of least squares.
+as_present <- function(model, catalogue, context) {
+  model <- with_losses(model, catalogue, context)
+  if (model$level == "given") return(model)
+  least <- model$least
+  model$present <- list(at = least$at, slopes = least$slopes,
+                        history = tangent_at(model, least$at, least$slopes, moves_of(model, least),
+                                             context)$history)
+  model
+}
+
+# A mechanism tried on the present model: a model at level "tried", or "silent" if it changes
+# nothing. `off`: the values of its parameters at which it is switched off, if they are known.
+try_mechanism <- function(present, name, simulators, off, bar, context) {
+  model <- new_model(simulators, present$records, paste(present$name, "+", name),
+                     present$name, name)
+  before <- runs_spent(context)
+  looked <- look_at_mechanism(model, present, off, context)
+  model <- looked$model
+  model$own_runs <- runs_spent(context) - before
+  if (looked$silent) return(utils::modifyList(model, list(level = "silent")))
+  if (!length(looked$starts)) {
+    return(utils::modifyList(model, list(level = if (is_spent(context)) "missed" else "untried")))
+  }
+  search <- search_trial(looked, context)
+  model$starts <- search$starts
+  model <- with_least(with_modes(search$model, list(search), context$seed), context)
+  model$off <- looked$off
+  model$status <- search$status
+  model <- tried_model(model, present, bar, context)
+  model$own_runs <- runs_spent(context) - before
+  model
+}
+
+# A search from the most promising start of the first look. An extension holds the present model,
+# with its mechanism switched off, and cannot be worse: if the search ends below that, or no nearer
+# to the record, it goes on from the next start with the mechanism on. `starts`: those that are
+# left.
+search_trial <- function(looked, context) {
+  model <- looked$model
+  is_on <- vapply(looked$starts, function(start) !start$at %in% looked$off_at, NA)
+  starts <- looked$starts[is_on | seq_along(is_on) == 1]
+  best <- NULL
+  for (tried in seq_len(min(length(starts), rules$trial_starts))) {
+    start <- starts[[tried]]
+    search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps,
+                           looked$off_at)
+    search <- run_search(search, context)
+    model <- search$model
+    others <- c(best$at, looked$off_at)
+    value <- values_at(model, c(search$at, others), search$history, search$moves, context)
+    if (is.null(best) || value[1] > value[2]) best <- search
+    is_done <- all(value[1] >= value[-1]) && search$status %in% c("converged", "futile")
+    if (is_spent(context) || is_done && comes_nearer(model, search$least$at, looked$off_at)) break
+  }
+  best[c("model", "starts")] <- list(model, starts[-seq_len(tried)])
+  best
+}
+
+# Whether a run is decisively nearer to the record than the one without the mechanism.
+comes_nearer <- function(model, at, off_at) {
+  if (is.null(off_at)) return(TRUE)
+  misfit <- squared_misfit(model)[c(at, off_at)]
+  misfit[1] < misfit[2] - rules$decisive * log(10) * squared_nats(model, misfit[2])
+}
+
+# A first look: what is new at its ends and between, all else as in the present model. It shows
+# where the mechanism is switched off, and where searches may begin, the most promising first:
+# list(model, silent, off, off_at, starts).
+look_at_mechanism <- function(model, present, off, context) {
+  old <- names(present$parameters)
+  new <- setdiff(names(model$parameters), old)
+  kept <- intersect(old, names(model$parameters))
+  z <- model$runs$z[integer(0), , drop = FALSE]
+  from <- present$runs$z[present$present$at, ]
+  place <- function(values) {
+    z <- matrix(0, nrow(values), length(model$parameters),
+                dimnames = list(NULL, names(model$parameters)))
+    z[, kept] <- rep(from[kept], each = nrow(z))
+    z[, new] <- values
+    z
+  }
+  values <- first_values(model$space[match(new, names(model$parameters)), ])
+  # known already
+  if (!is.null(off)) values <- values[colSums(t(values) != off) > 0, , drop = FALSE]
+  made <- with_runs(model, place(values), context)
+  model <- made$model
+  fine <- made$at[succeeded(model)[made$at]]
+  if (!length(fine)) return(list(model = model, silent = FALSE))
+  base <- present$runs$outputs[, present$present$at]
+  change <- over_noise(model, model$runs$outputs[, fine, drop = FALSE] - base)
+  if (setequal(kept, old) && all(change == 0)) return(list(model = model, silent = TRUE))
+  off <- off %||% switched_off(model, fine, new, change)
+  slopes <- matrix(0, nrow(model$runs$outputs), length(model$parameters),
+                   dimnames = list(NULL, names(model$parameters)))
+  slopes[, kept] <- present$present$slopes[, match(kept, old)]
+  off_at <- NULL
+  if (!is.null(off) && setequal(kept, old)) {
+    model <- inherit_runs(model, present, off)
+    off_at <- present$present$at
+    fine <- c(off_at, fine + ncol(present$runs$outputs))
+    change <- c(Inf, change)
+  }
+  # switched off it is one start
+  apart <- if (is.null(off_at)) fine else fine[change >= rules$off_change]
+  starts <- lapply(apart,
+                   function(at) list(at = at, slopes = slopes_in(model, at, fine, new, slopes)))
+  value <- vapply(starts, profile_value, 0, model, present, context)
+  list(model = model, silent = FALSE, off = off, off_at = off_at, starts = starts[order(-value)])
+}
+
+# Values of new parameters for the first look: all at their lower ends, all at their upper ends, and
+# between.
+first_values <- function(space) {
+  n <- nrow(space)
+  if (n == 0) return(matrix(0, 1, 0))
+  between <- if (n == 1) matrix(0.5) else with_seed(n, lhs::randomLHS(2 * n - 1, n))
+  rbind(space$lower, space$upper, from_unit(between, space))
+}
+
+# Where the first look shows the output of the present model: a value of each new parameter, or
+# NULL.
+switched_off <- function(model, looked, new, change) {
+  least <- which.min(change)
+  if (length(new) && change[least] < rules$off_change) model$runs$z[looked[least], new]
+}
+
+# Slopes of what is new about a run of the first look, by regression on its other runs.
+slopes_in <- function(model, at, looked, new, slopes) {
+  if (!length(new)) return(slopes)
+  ways <- sweep(model$runs$z[looked, new, drop = FALSE], 2, model$runs$z[at, new])
+  weights <- ifelse(rowSums(ways^2) > 0, 1 / pmax(rowSums(ways^2), 1e-6)^2, 0)
+  change <- model$runs$outputs[, looked, drop = FALSE] - model$runs$outputs[, at]
+  gram <- crossprod(ways * sqrt(weights))
+  slopes[, new] <- change %*% (weights * ways) %*%
+    solve(gram + diag(1e-3 * max(diag(gram)), length(new)))
+  slopes
+}
+
+# What a search from here may reach: the value at the optimum of the tangent.
+profile_value <- function(start, model, present, context) {
+  at <- start$at
+  slopes <- start$slopes
+  history <- present$present$history
+  moves <- moves_of(model, start)
+  tangent <- tangent_given(model, model$runs$z[at, ], model$runs$outputs[, at], slopes, history,
+                           moves, context)
+  z <- within_limits(tangent$mean, solve(tangent$covariance), model$space)
+  output <- model$runs$outputs[, at] + slopes %*% (z - model$runs$z[at, ])
+  values_of(model, output, rbind(z), history, moves, context)
+}
+
+# The posterior of a trial, checked by a few runs that then train, until they confirm it or it
+# cannot win.
+tried_model <- function(model, present, bar, context) {
+  for (round in seq_len(rules$trial_rounds)) {
+    found <- posterior_of(model, context, trial_ais, border = rules$border)
+    found <- check_by_runs(found$model, found$fits, rules$trial_check, context)
+    model <- with_least(found$model, context)
+    if (round < rules$trial_rounds && misses_least(model, found$fits) && !is_spent(context)) {
+      model <- moved_to_least(model, context)
+      next
+    }
+    model <- with_fit(model, found$fits, "tried", round, context)
+    model <- with_taken(model, present, context)
+    if (is_spent(context) || is_clear(model, present, bar)) break
+  }
+  model
+}
+
+trial_ais <- list(pilot_chains = 128, groups = 4, max_groups = 8, max_sweeps = 12, precision = 0.3,
+                  gradient = FALSE, importance_draws = 0)
+
+settled_trial <- function(model, present, bar, context) {
+  if (!asks_for_checks(model, present, bar)) return(verify_trial(model, present, context))
+  model$rechecked <- TRUE
+  tried_model(model, present, bar, context)
+}
+
+# A trial that its runs confirm has had its first round.
+verify_trial <- function(model, present, context) {
+  before <- if (is_confirmed(model)) model$fit$log_evidence
+  model <- verify_model(model, context, before, rules$trial_rounds)
+  with_taken(model, present, context)
+}
+
+# A trial searched again, far from where it ended: an extension may have a better mode there, with
+# another part of the model in the place that its mechanism takes. First from what is left of its
+# first look, then from runs over all priors. As it was if none is found.
+widened_trial <- function(trial, present, bar, context) {
+  searched <- search_again(trial, trial$starts, rules$trial_stale, context)
+  if (!comes_nearer(searched$model, which.min(squared_misfit(searched$model)), trial$least$at)) {
+    model <- over_priors(searched$model, context)
+    starts <- lapply(start_runs(model, trial$mode)[-1],
+                     function(at) list(at = at, slopes = regression_slopes(model, at)))
+    further <- search_again(model, starts, rules$scout_stale, context)
+    searched <- list(model = further$model, modes = c(searched$modes, further$modes))
+  }
+  trial$starts <- NULL
+  trial$runs <- searched$model$runs
+  if (!length(searched$modes)) return(trial)
+  found <- ranked_modes(searched$model, c(list(own_mode(trial, context)), searched$modes), context)
+  best <- found$modes[[1]]
+  trial$runs <- found$model$runs
+  if (best$at == trial$mode) return(trial)
+  again <- tried_model(with_modes(trial, list(best), context$seed), present, bar, context)
+  if (standing_of(again, present) > standing_of(trial, present)) return(again)
+  trial$runs <- again$runs
+  trial
+}
+
+search_again <- function(model, starts, stale, context) {
+  modes <- list()
+  for (start in starts) {
+    if (is_spent(context)) break
+    search <- run_search(begin_search(model, start$at, start$slopes, stale), context)
+    model <- search$model
+    modes <- c(modes, list(search))
+  }
+  list(model = model, modes = modes)
+}
+
+# Where a trial ended, as its searches are.
+own_mode <- function(trial, context) {
+  own <- list(at = trial$mode, slopes = secant_slopes(trial, trial$mode, least_reference(trial)),
+              least = trial$least)
+  own[c("mean", "covariance", "history", "moves")] <-
+    tangent_at(trial, own$at, own$slopes, moves_of(trial, own$least), context)
+  own
+}
+
+over_priors <- function(model, context) {
+  p <- length(model$parameters)
+  unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
+  with_runs(model, from_unit(unit, model$space), context)$model
+}
