@@ -90,8 +90,15 @@ within_limits <- function(mean, precision, space) {
 
 # n draws of the same distribution, from its most probable point.
 draws_within <- function(mean, covariance, space, n, seed) {
-  start <- within_limits(mean, solve(covariance), space)
+  start <- within_limits(mean, solve(conditioned(covariance)), space)
   draws_within_(mean, covariance, space$lower, space$upper, start, n, seed)
+}
+
+# A covariance that double precision can invert. A record of little noise may know one direction ten
+# million times better than another.
+conditioned <- function(covariance) {
+  if (rcond(covariance) >= 1e-14) return(covariance)
+  covariance + diag(1e-13 * max(diag(covariance)), nrow(covariance))
 }
 
 log_mean_exp <- function(x) {

@@ -55,21 +55,19 @@ candidates_words <- function(upgrade) {
   table <- table[order(table$step, -table$log10_bf), ]
   drives <- vapply(table$mechanism,
                    function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
+  decision <- decision_words(table, upgrade$control$decisive)
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
              "log10 Bayes factor" = signed(table$log10_bf),
              "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)),
              evidence = table$word,
              "beside an unknown response" = signed(table$beside_unknown),
              "with no unknown response" = signed(table$standing),
-             probability = ifelse(is_refused_row(table), "", percent(table$probability)),
+             probability = ifelse(startsWith(decision, "refused"), "", percent(table$probability)),
              "error in calibration" = error_words(table$error_ratio),
              estimate = ifelse(table$judged_by == "runs", "verified",
                                ifelse(table$trusted, "trial", "rough")),
-             decision = decision_words(table, upgrade$control$decisive), check.names = FALSE,
-             row.names = NULL)
+             decision = decision, check.names = FALSE, row.names = NULL)
 }
-
-is_refused_row <- function(table) !table$adopted & (keeps_error(table) | is_refuted(table))
 
 # Why each mechanism was adopted or not.
 decision_words <- function(table, decisive) {

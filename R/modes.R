@@ -95,7 +95,7 @@ ranked_modes <- function(model, modes, context) {
 is_same_mode <- function(model, one, other, context) {
   if (one$value - other$value < rules$same_height) return(list(model = model, yes = TRUE))
   apart <- model$runs$z[other$at, ] - model$runs$z[one$at, ]
-  distance <- function(covariance) sum(apart * solve(covariance, apart))
+  distance <- function(covariance) sum(apart * solve(conditioned(covariance), apart))
   if (max(distance(one$covariance), distance(other$covariance)) < 2 * length(apart)) {
     return(list(model = model, yes = TRUE))
   }

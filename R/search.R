@@ -90,12 +90,12 @@ normal_units <- function(model, least) {
 left_open <- function(model, least) {
   line <- list(output = model$runs$outputs[, least$at], slopes = least$slopes)
   found <- squares_of_line(list(model = model, weighted = FALSE), model$runs$z[least$at, ], line)
-  list(mean = found$mean, covariance = solve(found$precision))
+  list(mean = found$mean, covariance = solve(conditioned(found$precision)))
 }
 
 # What its optimum would gain.
 promised_by <- function(search) {
-  precision <- solve(search$covariance)
+  precision <- solve(conditioned(search$covariance))
   way <- within_limits(search$mean, precision, search$model$space) -
     search$model$runs$z[search$at, ]
   sum(way * (precision %*% way)) / 2
@@ -163,11 +163,12 @@ squares_of_line <- function(search, z, line, context) {
   if (search$weighted) {
     found <- tangent_given(model, z, line$output, line$slopes, search$history, search$moves,
                            context)
-    precision <- solve(found$covariance)
+    precision <- solve(conditioned(found$covariance))
     mean <- found$mean
   } else {
     slopes <- line$slopes / model$noise
-    prior <- ifelse(model$space$flat, rules$flat_precision, 1)
+    # Beside slopes of any size the sum stays one that can be solved.
+    prior <- pmax(ifelse(model$space$flat, rules$flat_precision, 1), 1e-13 * sum(slopes^2))
     precision <- crossprod(slopes) + diag(prior, length(z))
     pull <- crossprod(slopes, (model$target - line$output) / model$noise)[, 1] - prior * z
     mean <- z + solve(precision, pull)
@@ -433,7 +434,7 @@ joint_tangent <- function(tangents, own, p) {
   precision <- diag(p)
   pulled <- numeric(p)
   for (k in seq_along(tangents)) {
-    of_record <- solve(tangents[[k]]$covariance)
+    of_record <- solve(conditioned(tangents[[k]]$covariance))
     at <- own[[k]]
     precision[at, at] <- precision[at, at] + of_record - diag(length(at))
     pulled[at] <- pulled[at] + of_record %*% tangents[[k]]$mean

@@ -148,7 +148,7 @@ profile_value <- function(start, model, present, context) {
   moves <- moves_of(model, start)
   tangent <- tangent_given(model, model$runs$z[at, ], model$runs$outputs[, at], slopes, history,
                            moves, context)
-  z <- within_limits(tangent$mean, solve(tangent$covariance), model$space)
+  z <- within_limits(tangent$mean, solve(conditioned(tangent$covariance)), model$space)
   output <- model$runs$outputs[, at] + slopes %*% (z - model$runs$z[at, ])
   values_of(model, output, rbind(z), history, moves, context)
 }

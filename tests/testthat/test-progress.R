@@ -133,7 +133,7 @@ test_that("the loop says where it is, and is silent if asked", {
                  "^base: sampling the posterior", "^base: attributing the discrepancy",
                  "^step 1: mechanism 1 of 1 \\(sun\\): runs of the simulator, 1 of [0-9]+",
                  "^step 1: mechanism 1 of 1 \\(sun\\): training the emulator of [0-9]+ runs",
-                 "^ *sun: log10 Bayes factor -?[0-9.]+$", "^Stopped: ")) {
+                 "^ *sun: log10 Bayes factor [-+]?[0-9.]+$", "^Stopped: ")) {
     expect_match(lines, part, all = FALSE)
   }
   expect_silent(run(TRUE))

@@ -256,16 +256,16 @@ test_that("a report says what result.json says", {
   trials <- table_with(tables, c("step", "mechanism"))
   for (trial in told$candidates) {
     row <- trials[trials[, 2] == trial$mechanism, ]
-    expect_identical(row[c(4, 5, 7, 8, 9, 10)],
+    expect_identical(row[c(4, 5, 7, 8, 9, 10, 11)],
                      c(signed(trial$log10_bf),
                        paste(signed(unlist(trial$interval)), collapse = " to "),
-                       signed(trial$beside_unknown),
-                       percent(trial$probability),
+                       signed(trial$beside_unknown), signed(trial$standing),
+                       if (startsWith(row[12], "refused")) "" else percent(trial$probability),
                        if (is.null(trial$error_ratio)) ""
                        else paste(short(trial$error_ratio), "times"),
                        if (trial$judged_by == "runs") "verified"
                        else if (trial$trusted) "trial" else "rough"))
-    expect_identical(row[11] == "adopted",
+    expect_identical(row[12] == "adopted",
                      trial$mechanism %in% vapply(adopted, `[[`, "", "mechanism"))
   }
 

@@ -597,3 +597,18 @@ test_that("the second start of a trial has the mechanism on, and what is left is
                        search_context())
   expect_equal(begun, c(1, 2))
 })
+
+test_that("directions that are known ten million times better than others can be solved", {
+  fine <- diag(c(1, 1e-6))
+  expect_identical(amiss:::conditioned(fine), fine)
+  flat <- diag(c(1, 1e-20))
+  expect_error(solve(flat), "singular")
+  expect_equal(solve(amiss:::conditioned(flat))[1, 1], 1)
+  # Least squares of a simulator that moves the output by 1e9 noises, and by almost none.
+  model <- list(target = c(1, 0), noise = c(1e-9, 1e-9),
+                space = space_of(uniform(0, 1), uniform(0, 1)))
+  line <- list(output = c(0, 0), slopes = diag(c(1, 1e-10)))
+  found <- amiss:::squares_of_line(list(model = model, weighted = FALSE), c(0, 0), line)
+  expect_equal(found$mean[1], 1, tolerance = 1e-6)
+  expect_true(all(is.finite(solve(amiss:::conditioned(found$precision)))))
+})
