@@ -18,12 +18,16 @@ Balance sums(const Network& network, const Eigen::VectorXd& element, const Eigen
   };
   const auto input = [&](const Term& term) { return term.of.driver < 0 ? network.drivers : term.of.driver; };
   for (const Term& term : network.balance) {
-    if (term.of.node >= 0) sum.states(term.into, term.of.node) += size(term);
-    else sum.inputs(term.into, input(term)) += size(term);
+    if (term.of.node >= 0)
+      sum.states(term.into, term.of.node) += size(term);
+    else
+      sum.inputs(term.into, input(term)) += size(term);
   }
   for (const Term& term : network.output) {
-    if (term.of.node >= 0) sum.output_states[term.of.node] += size(term);
-    else sum.output_inputs[input(term)] += size(term);
+    if (term.of.node >= 0)
+      sum.output_states[term.of.node] += size(term);
+    else
+      sum.output_inputs[input(term)] += size(term);
   }
   return sum;
 }

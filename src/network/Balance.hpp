@@ -7,8 +7,8 @@ namespace amiss::network {
 /// The equations of a network at one moment: dx/dt = A x + B u + b, y = c x + e u + f. Inputs are the drivers
 /// and, last, the constant one, so that B is n x (m + 1) and e has m + 1 numbers.
 struct Balance {
-  Eigen::MatrixXd states;          ///< A, n x n, 1/h
-  Eigen::MatrixXd inputs;          ///< [B, b], n x (m + 1)
+  Eigen::MatrixXd states;            ///< A, n x n, 1/h
+  Eigen::MatrixXd inputs;            ///< [B, b], n x (m + 1)
   Eigen::RowVectorXd output_states;  ///< c
   Eigen::RowVectorXd output_inputs;  ///< [e, f]
 };

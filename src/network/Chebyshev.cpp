@@ -20,8 +20,9 @@ Eigen::MatrixXd polynomials(const Eigen::VectorXd& at, Eigen::Index degree) {
 Eigen::MatrixXd interpolate(Eigen::Index degree, const std::function<Eigen::VectorXd(double)>& f) {
   const Eigen::Index count = degree + 1;
   const double pi = std::acos(-1.0);
-  const Eigen::VectorXd points =
-      ((Eigen::ArrayXd::LinSpaced(count, 0, static_cast<double>(degree)) + 0.5) * pi / static_cast<double>(count)).cos();
+  const Eigen::VectorXd points = ((Eigen::ArrayXd::LinSpaced(count, 0, static_cast<double>(degree)) + 0.5) *
+                                  pi / static_cast<double>(count))
+                                     .cos();
   Eigen::MatrixXd values;
   for (Eigen::Index i = 0; i < count; ++i) {
     const Eigen::VectorXd value = f(points[i]);

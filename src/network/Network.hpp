@@ -15,8 +15,8 @@ struct Place {
 /// One summand of a balance: `sign x element x driver 'by' x quantity at 'of'` per hour. A link between two
 /// nodes is four terms, two into each; a flow two; a gain one.
 struct Term {
-  int into = -1;     ///< node whose balance it enters; -1 in Network::output
-  Place of;          ///< what is carried
+  int into = -1;  ///< node whose balance it enters; -1 in Network::output
+  Place of;       ///< what is carried
   double sign = 1.0;
   int element = -1;  ///< number of the coefficient, -1 for one
   int by = -1;       ///< driver that multiplies it, -1 for none

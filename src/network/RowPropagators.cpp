@@ -8,7 +8,9 @@ namespace {
 
 constexpr Eigen::Index kRows = 256;
 
-Eigen::VectorXd flat(const Eigen::MatrixXd& m) { return Eigen::Map<const Eigen::VectorXd>(m.data(), m.size()); }
+Eigen::VectorXd flat(const Eigen::MatrixXd& m) {
+  return Eigen::Map<const Eigen::VectorXd>(m.data(), m.size());
+}
 
 }  // namespace
 
@@ -49,7 +51,8 @@ void RowPropagators::fill(Eigen::Index from) {
     return;
   }
   for (Eigen::Index i = 0; i < count; ++i) {
-    const Eigen::VectorXd one = flat(propagator(network_, coefficients_, directions_, drivers_.row(from + i), row_));
+    const Eigen::VectorXd one =
+        flat(propagator(network_, coefficients_, directions_, drivers_.row(from + i), row_));
     if (i == 0) block_.resize(count, one.size());
     block_.row(i) = one;
   }

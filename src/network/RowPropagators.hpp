@@ -12,8 +12,8 @@ namespace amiss::network {
 class RowPropagators {
  public:
   RowPropagators(const Network& network, const Coefficients& coefficients,
-                 const std::vector<Coefficients>& directions, const Eigen::Ref<const Eigen::MatrixXd>& drivers,
-                 const Row& row);
+                 const std::vector<Coefficients>& directions,
+                 const Eigen::Ref<const Eigen::MatrixXd>& drivers, const Row& row);
 
   /// Whether they are the same in all rows.
   bool same() const { return modulators_.empty(); }
@@ -30,8 +30,8 @@ class RowPropagators {
   Eigen::Ref<const Eigen::MatrixXd> drivers_;
   Row row_;
   std::vector<int> modulators_;
-  Eigen::MatrixXd fixed_;                // if nothing modulates
-  std::unique_ptr<Chebyshev> series_;    // if one driver does
+  Eigen::MatrixXd fixed_;                                                         // if nothing modulates
+  std::unique_ptr<Chebyshev> series_;                                             // if one driver does
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block_;  // a row each
   Eigen::Index first_ = 0, height_;
 };

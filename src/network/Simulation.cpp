@@ -40,7 +40,8 @@ VectorXd drivers_before(const Coefficients& coefficients, const Eigen::Ref<const
 // Steady state of the nodes without a start: 0 = A x + B u in their rows, the others given.
 class SteadyStart {
  public:
-  SteadyStart(const Network& network, const Coefficients& coefficients, VectorXd before, VectorXd given, double fastest)
+  SteadyStart(const Network& network, const Coefficients& coefficients, VectorXd before, VectorXd given,
+              double fastest)
       : network_(network),
         coefficients_(coefficients),
         before_(std::move(before)),
@@ -69,7 +70,8 @@ class SteadyStart {
 
   State state(const std::vector<Coefficients>& directions) const {
     State out{x_, MatrixXd(x_.size(), static_cast<Index>(directions.size()))};
-    for (std::size_t p = 0; p < directions.size(); ++p) out.slopes.col(static_cast<Index>(p)) = slope(directions[p]);
+    for (std::size_t p = 0; p < directions.size(); ++p)
+      out.slopes.col(static_cast<Index>(p)) = slope(directions[p]);
     return out;
   }
 
@@ -111,7 +113,8 @@ class SteadyStart {
   Eigen::ColPivHouseholderQR<MatrixXd> solver_;
 };
 
-// Inputs of all rows, one a row: drivers and the constant one at the start of the row, and what they gain over it.
+// Inputs of all rows, one a row: drivers and the constant one at the start of the row, and what they gain
+// over it.
 MatrixXd inputs_of(const Eigen::Ref<const MatrixXd>& drivers, bool linear) {
   const Index m = drivers.cols(), rows = drivers.rows();
   MatrixXd out = MatrixXd::Zero(rows, (linear ? 2 : 1) * (m + 1));
@@ -142,7 +145,8 @@ void recur(const Eigen::Ref<const MatrixXd>& p, const MatrixXd& forcing, VectorX
 using Recursion = void (*)(const Eigen::Ref<const MatrixXd>&, const MatrixXd&, VectorXd&, double*);
 
 Recursion recursion_of(Index nodes) {
-  static const Recursion known[] = {recur<1>, recur<2>, recur<3>, recur<4>, recur<5>, recur<6>, recur<7>, recur<8>};
+  static const Recursion known[] = {recur<1>, recur<2>, recur<3>, recur<4>,
+                                    recur<5>, recur<6>, recur<7>, recur<8>};
   return nodes <= 8 ? known[nodes - 1] : recur<Eigen::Dynamic>;
 }
 
@@ -218,12 +222,14 @@ void check_sizes(const Network& network, const Coefficients& c, const Eigen::Ref
 }  // namespace
 
 void Options::check() const {
-  if (!(step_h > 0.0) || !std::isfinite(step_h)) throw std::invalid_argument("network: step_h must be above 0");
+  if (!(step_h > 0.0) || !std::isfinite(step_h))
+    throw std::invalid_argument("network: step_h must be above 0");
   if (!(start_hours >= 0.0)) throw std::invalid_argument("network: start_hours must be 0 or more");
 }
 
-Run simulate(const Network& network, const Coefficients& coefficients, const std::vector<Coefficients>& directions,
-             const Eigen::Ref<const MatrixXd>& drivers, const Eigen::Ref<const VectorXd>& hold, const Options& options) {
+Run simulate(const Network& network, const Coefficients& coefficients,
+             const std::vector<Coefficients>& directions, const Eigen::Ref<const MatrixXd>& drivers,
+             const Eigen::Ref<const VectorXd>& hold, const Options& options) {
   network.check();
   options.check();
   check_sizes(network, coefficients, drivers, hold);
