@@ -52,10 +52,12 @@ lost_without <- function(model, conditions, context) {
 # ---- what each mechanism leaves of the responses
 
 # Decades of evidence that the error responds to boundary conditions: of the present model ("no
-# change") to each, by its attribution; of each trial to those that drive its mechanism, together.
+# change") to each, by its attribution; of each trial whose numbers are trusted to those that drive
+# its mechanism, together.
 response_table <- function(trials, present, attribution) {
   before <- attribution$table[c("boundary", "log10_bf_dropped")]
-  rows <- lapply(Filter(function(trial) !is.null(trial$taken), trials), function(trial) {
+  trusted <- Filter(function(trial) isTRUE(trial$fit$trust$trusted), trials)
+  rows <- lapply(trusted, function(trial) {
     conditions <- present$conditions[[trial$mechanism]]
     if (!length(conditions)) return(NULL)
     lost <- present$lost[[toString(conditions)]]

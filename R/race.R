@@ -73,7 +73,7 @@ left_over_noise <- function(model) {
   left * sqrt(n / max(1, n - length(model$parameters)))
 }
 
-# All trials on the present model and those in front verified: list(trials, present).
+# All trials on the present model, those in front verified.
 race <- function(present, trials, context) {
   repeat {
     name <- next_to_verify(trials, present, context)

@@ -26,7 +26,6 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
     return(utils::modifyList(model, list(level = if (is_spent(context)) "missed" else "untried")))
   }
   search <- search_trial(looked, context)
-  model$starts <- search$starts
   model <- with_least(with_modes(search$model, list(search), context$seed), context)
   model$off <- looked$off
   model$status <- search$status
@@ -37,15 +36,13 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
 
 # A search from the most promising start of the first look. An extension holds the present model,
 # with its mechanism switched off, and cannot be worse: if the search ends below that, or no nearer
-# to the record, it goes on from the next start with the mechanism on. `starts`: those that are
-# left.
+# to the record, it goes on from the next start with the mechanism on.
 search_trial <- function(looked, context) {
   model <- looked$model
   is_on <- vapply(looked$starts, function(start) !start$at %in% looked$off_at, NA)
   starts <- looked$starts[is_on | seq_along(is_on) == 1]
   best <- NULL
-  for (tried in seq_len(min(length(starts), rules$trial_starts))) {
-    start <- starts[[tried]]
+  for (start in utils::head(starts, rules$trial_starts)) {
     search <- begin_search(model, start$at, start$slopes, rules$trial_stale, rules$trial_steps,
                            looked$off_at)
     search <- run_search(search, context)
@@ -56,7 +53,7 @@ search_trial <- function(looked, context) {
     is_done <- all(value[1] >= value[-1]) && search$status %in% c("converged", "futile")
     if (is_spent(context) || is_done && comes_nearer(model, search$least$at, looked$off_at)) break
   }
-  best[c("model", "starts")] <- list(model, starts[-seq_len(tried)])
+  best$model <- model
   best
 }
 
@@ -187,22 +184,20 @@ verify_trial <- function(model, present, context) {
   with_taken(model, present, context)
 }
 
-# A trial searched again, far from where it ended: an extension may have a better mode there, with
-# another part of the model in the place that its mechanism takes. First from what is left of its
-# first look, then from runs over all priors. As it was if none is found.
+# A trial searched again from runs over all priors, far from where it ended: an extension may have a
+# better mode there, with another part of the model in the place that its mechanism takes. As it was
+# if none is found.
 widened_trial <- function(trial, present, bar, context) {
-  searched <- search_again(trial, trial$starts, rules$trial_stale, context)
-  if (!comes_nearer(searched$model, which.min(squared_misfit(searched$model)), trial$least$at)) {
-    model <- over_priors(searched$model, context)
-    starts <- lapply(start_runs(model, trial$mode)[-1],
-                     function(at) list(at = at, slopes = regression_slopes(model, at)))
-    further <- search_again(model, starts, rules$scout_stale, context)
-    searched <- list(model = further$model, modes = c(searched$modes, further$modes))
+  model <- over_priors(trial, context)
+  modes <- list(own_mode(trial, context))
+  for (start in start_runs(model, trial$mode)[-1]) {
+    if (is_spent(context)) break
+    search <- begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
+    search <- run_search(search, context)
+    model <- search$model
+    modes <- c(modes, list(search))
   }
-  trial$starts <- NULL
-  trial$runs <- searched$model$runs
-  if (!length(searched$modes)) return(trial)
-  found <- ranked_modes(searched$model, c(list(own_mode(trial, context)), searched$modes), context)
+  found <- ranked_modes(model, modes, context)
   best <- found$modes[[1]]
   trial$runs <- found$model$runs
   if (best$at == trial$mode) return(trial)
@@ -210,17 +205,6 @@ widened_trial <- function(trial, present, bar, context) {
   if (standing_of(again, present) > standing_of(trial, present)) return(again)
   trial$runs <- again$runs
   trial
-}
-
-search_again <- function(model, starts, stale, context) {
-  modes <- list()
-  for (start in starts) {
-    if (is_spent(context)) break
-    search <- run_search(begin_search(model, start$at, start$slopes, stale), context)
-    model <- search$model
-    modes <- c(modes, list(search))
-  }
-  list(model = model, modes = modes)
 }
 
 # Where a trial ended, as its searches are.

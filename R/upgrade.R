@@ -65,7 +65,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   * `models`: the models adopted, first the base model (see *Models*).
 #'   * `candidates`: all mechanisms tried, one a row (see *Candidates*).
 #'   * `responses`: evidence for a response of the error to boundary conditions, in decades: without
-#'     each mechanism (`before`) and with it (`left`). The conditions of a mechanism count together.
+#'     each trusted mechanism (`before`) and with it (`left`). Its conditions count together.
 #'     The rows of `"no change"` have the evidence for each condition by itself.
 #'   * `named_cause`: the cause that was named or, if there is none, the first that is likely:
 #'     `mechanism`, `boundary`, `log10_bf` and `sentence`. `NULL` if there is none of either.

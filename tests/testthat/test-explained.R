@@ -38,8 +38,10 @@ test_that("what each mechanism leaves is of its own conditions, and before it of
   attribution <- list(table = data.frame(boundary = c("Gv", "Te"), log10_bf_dropped = c(6, 1)))
   present <- list(name = "base", conditions = list(sun = "Gv", mass = c("Gv", "Te"), drift = NULL),
                   lost = list(Gv = 5.9, "Gv, Te" = 8))
-  trials <- list(list(mechanism = "sun", taken = 5.5), list(mechanism = "mass", taken = 2),
-                 list(mechanism = "drift", taken = 0), list(mechanism = "silent"))
+  trial <- function(mechanism, taken, trusted = TRUE)
+    list(mechanism = mechanism, taken = taken, fit = list(trust = list(trusted = trusted)))
+  trials <- list(trial("sun", 5.5), trial("mass", 2), trial("drift", 0),
+                 trial("mass", 1, trusted = FALSE), list(mechanism = "silent"))
   table <- amiss:::response_table(trials, present, attribution)
   expect_equal(table$mechanism, c("no change", "no change", "sun", "mass", "mass"))
   expect_equal(table$condition, c("Gv", "Te", "Gv", "Gv", "Te"))

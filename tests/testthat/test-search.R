@@ -577,7 +577,7 @@ test_that("a trial whose first search leads no nearer to the record goes on from
   expect_true(amiss:::comes_nearer(model, 1, NULL))
 })
 
-test_that("the second start of a trial has the mechanism on, and what is left is kept", {
+test_that("the second start of a trial has the mechanism on", {
   # Searches that end where they begin: only the third run is nearer to the record.
   begun <- integer()
   stand_in(run_search = function(search, context) {
@@ -590,7 +590,6 @@ test_that("the second start of a trial has the mechanism on, and what is left is
   found <- amiss:::search_trial(list(model = model, off_at = 1, starts = starts), search_context())
   expect_equal(begun, c(2, 3))
   expect_equal(found$at, 3)
-  expect_equal(vapply(found$starts, `[[`, 0, "at"), 4)
   # If the mechanism is switched off where the search is most promising, it begins there.
   begun <- integer()
   amiss:::search_trial(list(model = model, off_at = 1, starts = starts[c(2, 1, 3)]),
