@@ -395,8 +395,6 @@ values_under <- function(model, fits, at) {
 calibrate_model <- function(model, context) {
   found <- find_modes(model, context)
   model <- with_modes(found$model, found$modes, context$seed)
-  model$modes <- list(agree = found$agree, searches = length(found$modes),
-                      ends = vapply(found$modes, `[[`, 0, "at"),
-                      covariances = lapply(found$modes, `[[`, "covariance"))
+  model$modes <- told_modes(found)
   verify_model(model, context)
 }

@@ -94,5 +94,6 @@ inherit_runs <- function(model, present, off) {
   z[, old] <- runs$z
   z[, names(off)] <- rep(off, each = nrow(z))
   model$runs <- bind_runs(list(z = z, outputs = runs$outputs, held = runs$held), model$runs)
+  model$over_priors <- present$over_priors
   model
 }

@@ -4,27 +4,40 @@
 # list(model, modes, agree): the base model after scouts and searches, the best mode first.
 find_modes <- function(model, context) {
   model <- with_scouts(model, context)
-  modes <- list()
-  for (start in start_runs(model)) {
+  more_modes(model, list(), start_runs(model), context)
+}
+
+# Searches beside those that are known, until a second one ends at the best mode: list(model, modes,
+# agree). `begin`: how a search begins from a start, beside the modes that are known.
+more_modes <- function(model, modes, starts, context, begin = begun_from) {
+  agree <- FALSE
+  for (start in starts) {
     if (is_spent(context) && length(modes)) break
-    search <- run_search(begun_from(model, start, length(modes) > 0, context), context)
+    search <- run_search(begin(model, start, modes, context), context)
     model <- search$model
     modes <- c(modes, list(search))
-    if (length(modes) > 1) {
-      ranked <- ranked_modes(model, modes, context)
-      model <- ranked$model
-      modes <- ranked$modes
-      if (ranked$agree) break
-    }
+    if (length(modes) < 2) next
+    ranked <- ranked_modes(model, modes, context)
+    model <- ranked$model
+    modes <- ranked$modes
+    agree <- ranked$agree
+    if (agree) break
   }
-  list(model = model, modes = modes, agree = length(modes) > 1 && ranked$agree)
+  list(model = model, modes = modes, agree = agree)
+}
+
+# What is remembered of searches: whether they agree, how many there were, and where they ended.
+told_modes <- function(found) {
+  list(agree = found$agree, searches = length(found$modes),
+       ends = vapply(found$modes, `[[`, 0, "at"),
+       covariances = lapply(found$modes, `[[`, "covariance"))
 }
 
 # The first search begins with slopes by regression on the runs over the priors. The next ones are
-# there to find other modes: slopes over the priors would lead them back, so that theirs are taken
-# where they begin.
-begun_from <- function(model, start, locally, context) {
-  if (locally) {
+# there to find other modes than the `known` ones: slopes over the priors would lead them back, so
+# that theirs are taken where they begin.
+begun_from <- function(model, start, modes, context) {
+  if (length(modes)) {
     found <- difference_slopes(model, start, context)
     model <- found$model
     if (!is.null(found$slopes)) return(begin_search(model, start, found$slopes, 0))
@@ -39,7 +52,9 @@ with_scouts <- function(model, context) {
                 nrow(model$runs$z))
   if (n == 0) return(model)
   unit <- with_seed(context$seed, lhs::randomLHS(n, p))
-  model <- with_runs(model, from_unit(unit, model$space), context)$model
+  made <- with_runs(model, from_unit(unit, model$space), context)
+  model <- made$model
+  model$over_priors <- c(model$over_priors, made$at)
   check_some_succeeded(model)
   for (rows in model$rows)
     check_runs_change(model$runs$outputs[rows, succeeded(model), drop = FALSE])
@@ -60,11 +75,11 @@ check_some_succeeded <- function(model, call = rlang::caller_env()) {
 
 # Where searches begin: the run nearest to the record; the nearest of the half that lies farther
 # from it; and so on, each time of the half that lies farther from all before.
-start_runs <- function(model, starts = NULL) {
+start_runs <- function(model, starts = NULL, among = seq_len(nrow(model$runs$z))) {
   misfit <- colMeans(((model$runs$outputs - model$target) / model$noise)^2)
-  misfit[!succeeded(model)] <- Inf
+  misfit[!succeeded(model) | !seq_along(misfit) %in% among] <- Inf
   starts <- starts %||% which.min(misfit)
-  for (k in seq_len(min(rules$most_starts, sum(is.finite(misfit))) - 1)) {
+  for (k in seq_len(max(0, min(rules$most_starts, sum(is.finite(misfit))) - 1))) {
     apart <- apply(model$runs$z, 1,
                    function(z) min(colSums((t(model$runs$z[starts, , drop = FALSE]) - z)^2)))
     far <- is.finite(misfit) & apart >= stats::median(apart[is.finite(misfit)]) & apart > 0
@@ -110,11 +125,15 @@ is_same_mode <- function(model, one, other, context) {
 
 region_draws <- 600
 
-# Of modes that count beside the best, equally many draws of each.
-region_of_modes <- function(model, modes, seed) {
+# Those that count beside the best.
+counting_modes <- function(modes) {
   value <- vapply(modes, function(mode) mode$value %||% 0, 0)
-  modes <- modes[value > max(value) - rules$mode_depth]
-  draws <- lapply(modes, function(mode) {
+  modes[value > max(value) - rules$mode_depth]
+}
+
+# Equally many draws of each of them.
+region_of_modes <- function(model, modes, seed) {
+  draws <- lapply(counting_modes(modes), function(mode) {
     draws_within(mode$mean, mode$covariance, model$space, region_draws, seed)
   })
   unit <- to_unit(do.call(rbind, draws), model$space)

@@ -73,6 +73,20 @@ left_over_noise <- function(model) {
   left * sqrt(n / max(1, n - length(model$parameters)))
 }
 
+# What is to be adopted, searched again; if that changes which it is, the next one too.
+confirm_best <- function(trials, present, context) {
+  decisive <- context$control$decisive
+  repeat {
+    best <- best_trial(trial_table(trials, present, names(trials), decisive), decisive)
+    if (!may_be_adopted(best, decisive)) return(trials)
+    trial <- trials[[best$mechanism]]
+    if (!is.null(trial$modes) || trial$level == "given") return(trials)
+    trials[[best$mechanism]] <- staged(paste("searching", best$mechanism, "again"),
+                                       searched_again(trial, present, context))
+    trials <- race(present, trials, context)
+  }
+}
+
 # All trials on the present model, those in front verified.
 race <- function(present, trials, context) {
   repeat {

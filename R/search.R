@@ -7,10 +7,14 @@
 # A search from run `at` of a model. `slopes` are right at that run to within what they change over
 # `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is
 # switched off; the search ends if all that it promises beyond that could not make evidence.
-begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL) {
+# `alone`: whether it knows no runs but its own, so that those of others do not lead it to their
+# mode.
+begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL,
+                         alone = FALSE) {
   list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0,
        poor = 0, since = 0, weighted = FALSE,
-       reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale), slopes = slopes,
+       reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale,
+                        others = if (alone) nrow(model$runs$z) else 0), slopes = slopes,
        status = "going")
 }
 
@@ -54,7 +58,7 @@ with_given_slopes <- function(search) {
   z <- search$model$runs$z[search$at, ]
   if (search$reference$stale == 0 && all(search$reference$z == z)) return(search)
   known <- given_slopes(search$model, z)
-  if (!is.null(known)) search$reference <- list(z = z, slopes = known, stale = 0)
+  if (!is.null(known)) search$reference <- exact_reference(search, known)
   search
 }
 
@@ -245,18 +249,24 @@ renew_slopes <- function(search, context) {
   search$model <- found$model
   search[c("poor", "since")] <- 0
   if (is.null(found$slopes)) return(search)
-  search$reference <- list(z = search$model$runs$z[search$at, ], slopes = found$slopes, stale = 0)
+  search$reference <- exact_reference(search, found$slopes)
   search["gains"] <- list(NULL)
   search$trusted <- search$trusted * rules$trust_changes
   search
 }
 
+# Slopes that are exact where the search is.
+exact_reference <- function(search, slopes) {
+  utils::modifyList(search$reference,
+                    list(z = search$model$runs$z[search$at, ], slopes = slopes, stale = 0))
+}
+
 # Slopes by differences, on the same side wherever the priors allow it; where a small one shows
 # nothing, by larger ones on both sides: list(model, slopes), no slopes if the budget ends.
-difference_slopes <- function(model, at, context) {
+difference_slopes <- function(model, at, context, asked = names(model$parameters)) {
   z <- model$runs$z[at, ]
   known <- given_slopes(model, z)
-  if (!is.null(known)) return(list(model = model, slopes = known))
+  if (!is.null(known)) return(list(model = model, slopes = known[, asked, drop = FALSE]))
   seen <- function(model, step) {
     points <- matrix(z, length(step), length(z), byrow = TRUE)
     points[cbind(seq_along(step), match(names(step), names(z)))] <- z[names(step)] + step
@@ -267,8 +277,7 @@ difference_slopes <- function(model, at, context) {
     slopes[, colSums(!is.finite(slopes)) > 0] <- 0
     list(model = made$model, slopes = slopes)
   }
-  asked <- names(z)
-  side <- difference_side(z, model$space)
+  side <- difference_side(z, model$space)[asked]
   found <- seen(model, rules$search_difference * side)
   if (is.null(found$slopes)) return(found)
   flat <- asked[colSums(found$slopes^2) == 0]
@@ -305,18 +314,20 @@ difference_side <- function(z, space) {
   ifelse(z > pmax(pmin(1, space$upper - room), space$lower + room), -1, 1)
 }
 
-# The simulator about a run, from slopes known elsewhere and from the runs near it. With s the way
-# from the run, J0 the reference slopes and A fitted to the runs, f(z + s) = f(z) + J0 s + sum_i A_i
-# k(s, s_i), k(s, s') = 4 d^2 s's' + (s's')^2. A simulator bends by c |s|^2 over a way s. So its
-# slopes turn by 2 c d over the way d from where the reference held; the bend itself has the second
-# term for a prior, as in minimum-norm quadratic models (Powell 2004); and as the bend turns over a
-# way L, run i fits to within c |s_i|^3 / L. c cancels.
+# The simulator about a run, from slopes known elsewhere and from the runs near it, but for the
+# first `others` of the model. With s the way from the run, J0 the reference slopes and A fitted to
+# the runs, f(z + s) = f(z) + J0 s + sum_i A_i k(s, s_i), k(s, s') = 4 d^2 s's' + (s's')^2. A
+# simulator bends by c |s|^2 over a way s. So its slopes turn by 2 c d over the way d from where the
+# reference held; the bend itself has the second term for a prior, as in minimum-norm quadratic
+# models (Powell 2004); and as the bend turns over a way L, run i fits to within c |s_i|^3 / L. c
+# cancels.
 bent_line <- function(model, at, reference) {
   z <- model$runs$z[at, ]
   scale <- way_scale(reference)
   ways <- sweep(sweep(model$runs$z, 2, z), 2, scale, "*")
   squared <- rowSums(ways^2)
-  near <- which(succeeded(model) & squared > 1e-8)
+  near <- which(succeeded(model) & squared > 1e-8 &
+                  seq_along(squared) > (reference$others %||% 0))
   near <- utils::head(near[order(squared[near])], rules$bent_runs * length(z))
   bent <- list(output = model$runs$outputs[, at], slopes = sweep(reference$slopes, 2, scale, "/"),
                scale = scale, d2 = 4 * (sum((scale * (z - reference$z))^2) + reference$stale^2),

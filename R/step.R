@@ -21,12 +21,11 @@ next_step <- function(state, context) {
   state$present <- as_present(state$present, state$catalogue[left], context)
   trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
   trials <- race(state$present, trials, context)
+  if (asks_again(state) && !has_cause(trials, state$present, context))
+    trials <- second_look(state$present, trials, context)
+  trials <- confirm_best(trials, state$present, context)
   decisive <- context$control$decisive
   table <- trial_table(trials, state$present, left, decisive)
-  if (asks_again(state) && !has_cause(trials, state$present, context)) {
-    trials <- second_look(state$present, trials, context)
-    table <- trial_table(trials, state$present, left, decisive)
-  }
   state$candidates <- rbind(state$candidates, table)
   state$responses <- rbind(state$responses, response_table(trials, state$present,
                                                            last_model(state$models)$attribution))

@@ -221,3 +221,65 @@ over_priors <- function(model, context) {
   unit <- with_seed(context$seed + p, lhs::randomLHS(rules$scouts_base + p, p))
   with_runs(model, from_unit(unit, model$space), context)$model
 }
+
+# The trial that is to be adopted, searched from other starts as a base model is, until a second
+# search ends at its best mode. It is verified anew if a search ended outside its region.
+searched_again <- function(trial, present, context) {
+  if (trial$level == "given") return(trial)
+  before <- runs_spent(context)
+  found <- list(model = trial, modes = list(own_mode(trial, context)), agree = FALSE)
+  for (z in far_points(trial, context)) {
+    made <- with_runs(found$model, rbind(z), context)
+    found$model <- made$model
+    if (!length(made$at)) break
+    if (!succeeded(made$model)[made$at]) next
+    found <- more_modes(made$model, found$modes, made$at, context, begun_alone)
+    if (found$agree) break
+  }
+  trial$runs <- found$model$runs
+  trial$modes <- told_modes(found)
+  counting <- counting_modes(found$modes)
+  ends <- vapply(counting, `[[`, 0, "at")
+  if (any(straight_distance(trial)[ends] > 1)) {
+    trial <- verify_trial(with_modes(trial, counting, context$seed), present, context)
+  } else {
+    fits <- record_fits(trial$fit)
+    trial$modes <- confirmed_modes(trial, trial$modes, fits)
+    trial <- with_fit(trial, fits, trial$level, fits[[1]]$rounds, context)
+  }
+  trial$own_runs <- trial$own_runs + runs_spent(context) - before
+  trial
+}
+
+# The present model was searched from several starts; what its mechanism brought is new: its slopes
+# are taken where the search begins.
+begun_alone <- function(model, start, modes, context) {
+  slopes <- regression_slopes(model, start)
+  new <- intersect(names(model$off), names(model$parameters))
+  if (length(new)) {
+    found <- difference_slopes(model, start, context, new)
+    model <- found$model
+    if (!is.null(found$slopes)) slopes[, match(new, names(model$parameters))] <- found$slopes
+  }
+  begin_search(model, start, slopes, rules$scout_stale, alone = TRUE)
+}
+
+# Points far from its mode: where the present model was run over the priors, with what the mechanism
+# brought anywhere in its own, farthest first.
+far_points <- function(trial, context) {
+  if (is.null(trial$over_priors)) {
+    known <- nrow(trial$runs$z)
+    trial <- over_priors(trial, context)
+    trial$over_priors <- known + seq_len(nrow(trial$runs$z) - known)
+  }
+  at <- start_runs(trial, trial$mode, trial$over_priors)[-1]
+  z <- trial$runs$z[at, , drop = FALSE]
+  new <- match(names(trial$off), colnames(z))
+  if (length(at) && length(new)) {
+    unit <- with_seed(context$seed, lhs::randomLHS(length(at), length(new)))
+    values <- from_unit(unit, trial$space[new, ])
+    apart <- colSums((t(values) - trial$runs$z[trial$mode, new])^2)
+    z[, new] <- values[order(-apart), ]
+  }
+  lapply(seq_along(at), function(k) z[k, ])
+}

@@ -25,7 +25,7 @@ trial_row <- function(trial, present) {
   factor <- bayes_factor(trial$fit, present$fit)
   beside <- factor$log10_bf
   shifted <- c("log10_bf", "lower95", "upper95")
-  if (trial$fit$trust$trusted) factor[shifted] <- factor[shifted] + (trial$taken %||% 0)
+  if (is_emulated(trial)) factor[shifted] <- factor[shifted] + (trial$taken %||% 0)
   factor$word <- evidence_word(factor$lower95, factor$upper95)
   if (!is_verified(trial)) factor <- as_tried(factor, trial)
   factor <- readable(factor)
@@ -36,6 +36,11 @@ trial_row <- function(trial, present) {
     runs = trial$own_runs %||% 0)
   row$parameters <- list(added_parameters(trial$fit, present$fit))
   row
+}
+
+# Whether its evidence is that of its mode, though there may be another mode.
+is_emulated <- function(trial) {
+  all(vapply(record_fits(trial$fit), function(fit) fit_trust(fit)$trusted, NA))
 }
 
 empty_row <- function(mechanism, present, why, runs = NULL) {

@@ -1,19 +1,4 @@
-# The search for the parameters by the simulator itself: coordinates, slopes, steps, modes.
-
-search_context <- function(budget = NULL, threads = 1, control = list()) {
-  amiss:::new_context(1, threads, control, budget = budget)
-}
-
-searched_model <- function(simulator, m) {
-  amiss:::new_model(list(simulator), list(amiss:::loop_record(m, quick_ais)))
-}
-
-# A model with runs at these coordinates (one a row).
-run_model <- function(simulator, m, z, context = search_context()) {
-  amiss:::with_runs(searched_model(simulator, m), z, context)$model
-}
-
-runs_of <- function(model) ncol(model$runs$outputs)
+# The search for the parameters by the simulator itself: coordinates, slopes, steps.
 
 # ---- coordinates
 
@@ -345,13 +330,6 @@ wide_simulator <- function(...) {
 wide_parameters <- list(free("rate", uniform(-2, 0)), free("gain", uniform(-2, 0)),
                         free("offset", normal(0, 1, -4, 4), "K"))
 
-measured_run <- function(simulator, values) {
-  data <- linear_data()
-  noise <- withr::with_seed(8, rnorm(nrow(data), 0, 0.1))
-  data$Ti <- simulator$f(values, as.matrix(data["Te"])) + noise
-  linear_measurements(data)
-}
-
 test_that("a simulator that bends over two decades is searched by the simulator itself", {
   simulator <- do.call(wide_simulator, wide_parameters)
   truth <- c(rate = -1.2, gain = -0.3, offset = 0.5)
@@ -414,52 +392,6 @@ test_that("searches begin at the run nearest to the record and at near ones far 
   expect_false(starts[1] %in% amiss:::start_runs(model))
 })
 
-# The output knows the square of a parameter alone: a = 0.6 and a = -0.6 are both modes.
-squared_simulator <- function() {
-  function_simulator(function(values, drivers) 20 + values[["a"]]^2 * drivers[, "Te"],
-                     free("a", uniform(-1, 1)), boundary = "Te")
-}
-
-test_that("a record with two modes is not told as one: searches find both, or do not agree", {
-  m <- measured_run(squared_simulator(), c(a = 0.6))
-  for (seed in 1:4) {
-    context <- amiss:::new_context(seed, 1, list())
-    found <- amiss:::find_modes(searched_model(squared_simulator(), m), context)
-    ends <- vapply(found$modes, function(mode) found$model$runs$z[mode$at, "a"], 0)
-    region <- amiss:::region_of_modes(found$model, found$modes, seed)
-    both <- all(amiss:::in_region(region, cbind(c(0.2, 0.8))))
-    expect_true(both || !found$agree,
-                label = paste("both modes, or a word of doubt, of seed", seed))
-  }
-})
-
-test_that("modes of one height are held by one region; one with a valley before it is another", {
-  m <- measured_run(squared_simulator(), c(a = 0.6))
-  z <- 0.6 * sqrt(3)
-  model <- run_model(squared_simulator(), m, cbind(c(z, -z)))
-  context <- search_context()
-  modes <- lapply(1:2, function(at) {
-    found <- amiss:::difference_slopes(model, at, context)
-    amiss:::run_search(amiss:::begin_search(model, at, found$slopes, 0, steps = 0), context)
-  })
-  ranked <- amiss:::ranked_modes(model, modes, context)
-  # They are mirror images: equal but for rounding of the run.
-  expect_lt(abs(ranked$modes[[1]]$value - ranked$modes[[2]]$value), 0.01)
-  held <- function(modes) {
-    sum(amiss:::in_region(amiss:::region_of_modes(model, modes, 1), cbind(c(0.2, 0.8))))
-  }
-  expect_equal(held(ranked$modes), 2)
-  # One that is lower is another mode if what lies between is lower still, at the cost of a run.
-  lower <- ranked$modes[[2]]
-  lower$value <- lower$value - 5
-  apart <- amiss:::is_same_mode(model, ranked$modes[[1]], lower, context)
-  expect_false(apart$yes)
-  expect_equal(runs_of(apart$model), runs_of(model) + 1)
-  # One that is far less probable does not count.
-  lower$value <- lower$value - 15
-  expect_equal(held(list(ranked$modes[[1]], lower)), 1)
-})
-
 test_that("a search whose tangent overshoots is damped until it moves", {
   # At a = -0.05 the tangent points to a = -5, beyond the prior; the mode is at -0.6.
   m <- measured_run(squared_simulator(), c(a = 0.6))
@@ -468,21 +400,6 @@ test_that("a search whose tangent overshoots is damped until it moves", {
   found <- amiss:::difference_slopes(model, 1, context)
   search <- amiss:::run_search(amiss:::begin_search(found$model, 1, found$slopes, 0), context)
   expect_equal(unname(search$model$runs$z[search$at, "a"]), -0.6 * sqrt(3), tolerance = 0.01)
-})
-
-test_that("where a posterior has two modes, draws lie at both or the result says so", {
-  skip_on_cran()  # second tier: tools/test --quick
-  m <- measured_run(squared_simulator(), c(a = 0.6))
-  for (seed in 1:4) {
-    fit <- calibrate_refined(simulate_design(squared_simulator(), m, 6, seed = seed), m,
-                             control = list(calibration = quick_ais), seed = seed)
-    upper <- sum(fit$weights[fit$values[, "a"] > 0])
-    # Each has half; the quick sampler of 200 chains that merge may be off by a third.
-    expect_true(!fit$trust$trusted || isFALSE(fit$modes$agree) || (upper > 0.15 && upper < 0.85),
-                label = paste("both modes, or a word of doubt, of seed", seed))
-    # The record holds |a| to 0.001.
-    expect_equal(sum(fit$weights * abs(fit$values[, "a"])), 0.6, tolerance = 0.01)
-  }
 })
 
 # A ridge along v = 2 u^2, four hundred times as steep across as along.
@@ -509,17 +426,6 @@ test_that("a curved ridge is followed to its mode", {
   expect_lt(nats, 1)
   expect_lt(abs(search$model$runs$z[search$at, "u"] - 1.2), 4 * 0.018)
   expect_lte(runs_of(search$model), 60)
-})
-
-test_that("modes are compared by the same draws, and a ridge is one mode", {
-  m <- linear_measurements()
-  context <- search_context()
-  found <- amiss:::find_modes(searched_model(linear_simulator(), m), context)
-  ranked <- amiss:::ranked_modes(found$model, rev(found$modes), context)
-  values <- vapply(ranked$modes, `[[`, 0, "value")
-  expect_false(is.unsorted(-values))
-  expect_equal(values, vapply(found$modes, `[[`, 0, "value"), tolerance = 1e-8)
-  expect_true(ranked$agree)
 })
 
 test_that("log means of exponentials are exact where they would overflow", {

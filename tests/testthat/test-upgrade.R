@@ -420,7 +420,10 @@ test_that("the odds are of what was computed; what was not has no part in them",
     data.frame(log10_bf, lower95 = log10_bf - 0.1, upper95 = log10_bf + 0.1, word = "undecided")
   }
   stand_in(added_parameters = function(...) data.frame(name = character()), bayes_factor = by_hand)
-  for (name in c("a", "b")) trials[[name]]$fit$trust <- list(trusted = TRUE)
+  for (name in c("a", "b")) {
+    trials[[name]]$fit$posterior <- list(trusted = TRUE)
+    trials[[name]]$fit$trust <- list(trusted = TRUE)
+  }
   trials$quiet <- list(mechanism = "quiet", level = "silent")
   table <- amiss:::trial_table(trials, present, c("a", "b", "quiet", "left"), 2)
   expect_equal(table$mechanism, c("a", "b", "quiet", "left"))
