@@ -143,7 +143,8 @@ attribute_record <- function(fits, which, control, seed, threads) {
   structure(list(format_version = format_version, table = table, groups = groups,
                  surrogates = nrow(result$null_statistics),
                  statistic = result$statistic, null_statistics = result$null_statistics,
-                 control = control, seed = seed), class = "amiss_attribution")
+                 control = control, labels = fit$measurements$labels, seed = seed),
+            class = "amiss_attribution")
 }
 
 # Each member of a group is reported with the numbers of the group.
@@ -205,6 +206,7 @@ significant_conditions <- function(table) {
 
 #' @export
 print.amiss_attribution <- function(x, ...) on_stdout(x, {
+  x <- told_attribution(x)
   cli::cli_text("{.strong Attribution} of the discrepancy ({x$surrogates} surrogates)")
   say_table(x$table[c("boundary", "log10_bf_dropped", "share", "p_value", "significant")])
   named <- significant_conditions(x$table)

@@ -188,10 +188,11 @@ mean_drivers <- function(simulator, measurements) {
   raw <- measurements$raw
   rows <- raw$use == "calibrate"
   needed <- driver_names(simulator)
-  turning <- measurements$conditions[tabulate(measurements$condition) == 2]
+  turning <- condition_label(measurements,
+                             measurements$conditions[tabulate(measurements$condition) == 2])
   vapply(needed, function(name) {
     x <- raw$drivers[rows, name]
-    if (!name %in% turning) return(mean(x))
+    if (!condition_label(measurements, name) %in% turning) return(mean(x))
     (atan2(mean(sin(x * pi / 180)), mean(cos(x * pi / 180))) * 180 / pi) %% 360
   }, 0)
 }
@@ -359,6 +360,7 @@ evidence_sentences <- function(comparison) {
 
 #' @export
 print.amiss_comparison <- function(x, ...) on_stdout(x, {
+  x <- labelled(x)
   evidence <- x$tables$evidence
   criteria <- x$tables$criteria
   held_out <- !all(is.na(criteria$rmse_validation))

@@ -11,7 +11,8 @@
 #'   * `verdict`: `"named"`, `"likely"`, `"unexplained"` or `"nothing"`.
 #'   * `record`, `note`, `sure`, `change`, `gain`, `remains`: sentences. `record` has the faults of
 #'     the record.
-#'   * `inspect`: sentences that say what to inspect next, to settle what is open.
+#'   * `inspect`: sentences that say what to inspect next. First is what could overturn the verdict,
+#'     then what decides between causes, then what narrows parameters. `print()` shows three.
 #'   * `mechanisms`: for each mechanism adopted, its `verdict`, what it `brought`, what speaks
 #'     `against` it, what fits `also`, and what to `inspect`.
 #'   * `scores`, `changes`, `candidates`, `parameters`, `attribution`, `method`: tables.
@@ -40,6 +41,7 @@
 #' @export
 summary.amiss_upgrade <- function(object, ...) {
   check_whole(object, "object")
+  object <- labelled(object)
   verdict <- diagnosis_verdict(object)
   last <- object$models[[length(object$models)]]
   structure(c(list(title = object$title %||% object$study %||% object$measurements$name), verdict,
@@ -64,8 +66,9 @@ print.summary.amiss_upgrade <- function(x, ...) on_stdout(x, {
   cli::cli_text("{x$headline}")
   parts <- list("Faults of the record" = x$record, "How sure" = x$sure,
                 "What would change" = x$change, "What it brings" = c(x$gain, x$of_records),
-                "What remains" = x$remains, "What to inspect next" = x$inspect)
+                "What remains" = x$remains)
   say_parts(parts[lengths(parts) > 0])
+  say_inspections(x$inspect)
 })
 
 # The first step's trials that have a number, best first.
@@ -482,6 +485,7 @@ remaining_sentences <- function(upgrade) {
 
 #' @export
 print.amiss_upgrade <- function(x, ...) on_stdout(x, {
+  x <- labelled(x)
   adopted <- adopted_models(x)
   cli::cli_text(
     "{.strong Upgrade} of {.val {x$measurements$name}}: {length(adopted)} mechanism{?s} adopted")

@@ -26,6 +26,7 @@ autoplot.amiss_comparison <- function(object, which = "evidence", ...) {
 
 comparison_figure <- function(comparison, which, call = rlang::caller_env()) {
   check_whole(comparison, "object", call = call)
+  comparison <- labelled(comparison)
   check_input(checkmate::check_choice(which, figures_of(comparison)), "which", call = call)
   switch(which,
          evidence = figure_evidence(comparison),

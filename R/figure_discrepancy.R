@@ -86,7 +86,8 @@ figure_response <- function(upgrade, classes = 10) {
     figure_titles(response_title(binned, leading$name, m$noise_sd),
                   paste0("Small points: every time step. Large points: means over classes ",
                          "of ", leading$name, "."),
-                  x = leading$name, y = axis_label("measured - simulated", m$unit)) +
+                  x = condition_titles(m, leading$name),
+                  y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 5)
 }

@@ -125,7 +125,7 @@ figure_mean_day <- function(upgrade) {
 figure_measurements <- function(measurements) {
   m <- measurements
   series <- c(list(m$y), lapply(m$conditions, function(name) condition_values(m, name)))
-  panels <- c(axis_label(m$target, level_unit(m$unit, m$y)), m$conditions)
+  panels <- c(axis_label(m$target, level_unit(m$unit, m$y)), condition_titles(m))
   uses <- c(warmup = "warm-up", use_names, none = "not used")
   table <- data.frame(time = rep(m$time, length(panels)), value = unlist(series),
                       use = factor(uses[rep(m$use, length(panels))], uses),

@@ -130,7 +130,8 @@ with_exact_least <- function(model, context) {
   found <- difference_slopes(model, model$least$at, context)
   model <- found$model
   if (is.null(found$slopes)) return(model)
-  search <- descend(begin_search(model, model$least$at, found$slopes, 0), context)
+  search <- begin_search(model, model$least$at, found$slopes, found$stale, gain = rules$least_gain)
+  search <- descend(search, context)
   model <- search$model
   model$least <- list(at = search$at, slopes = search$slopes, exact = TRUE)
   model

@@ -17,10 +17,11 @@ doubts <- list(
   }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
   untried = doubt(function(case) {
     twins <- untried_twins(case$parent, case$entry, case$catalogue)
+    told <- function(names) condition_label(case$measurements, names)
     if (length(twins)) {
       sprintf(paste("the error responds to %s as well, which this record cannot distinguish from",
                     "%s and for which no mechanism was given"),
-              listed(twins), listed(case$entry$boundary, "or"))
+              listed(told(twins)), listed(told(case$entry$boundary), "or"))
     }
   }, "a place or driver that nobody thought of is no less likely"),
   untrusted = doubt(function(case) {

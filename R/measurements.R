@@ -74,8 +74,9 @@
 #' @param time Name of the time column; a series that knows its own needs none.
 #' @param target Name of the measured target.
 #' @param boundary The boundary conditions that are analysed: a formula such as `~ Te + Ws +
-#'   circular(Wd)`, or their names. A circular quantity (degrees) enters as sine and cosine. One
-#'   that is `TRUE` or `FALSE` enters as 1 or 0.
+#'   circular(Wd)`, their names, or a list with a label and a unit for each ([condition()]). A
+#'   circular quantity (degrees) enters as sine and cosine. One that is `TRUE` or `FALSE` enters as
+#'   1 or 0.
 #' @param noise_sd Standard deviation of the (averaged) target's measurement error, in the target's
 #'   unit. `"bootstrap"` or [bootstrap_noise()] estimate it from the readings inside each average.
 #'   If not given, the standard error of the averages is taken. Both need `average`.
@@ -209,6 +210,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
     warn_input(c(paste("{.arg warmup} is {warmup} h, shorter than a step of {signif(grid$step, 4)}",
                        "h: no row warms up."), i = "Give it in hours."))
   }
+  told <- terms$label != terms$name | nzchar(terms$unit)
   constant <- constant_conditions(x, coarse$use == "calibrate")
   if (length(constant)) {
     warn_input(c(paste("{cli::qty(constant)}Boundary condition{?s} {.val {constant}} {?does/do}",
@@ -227,7 +229,10 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                  step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
                  segment = coarse$segment, use = coarse$use, y = coarse$y,
                  standard_error = coarse$standard_error, block = coarse$block, boundary = x$values,
-                 condition = x$condition, conditions = x$names, time_format = reading$format,
+                 condition = x$condition, conditions = x$names,
+                 labels = stats::setNames(terms$label, terms$name)[told],
+                 units = stats::setNames(terms$unit, terms$name)[told],
+                 time_format = reading$format,
                  time_zone = time_zone, constant = constant, findings = findings,
                  faulty = faulty_steps(findings, target, coarse$block, grid$row), missing = missing,
                  range = range), class = "amiss_measurements")
@@ -237,42 +242,6 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
 faulty_steps <- function(findings, target, block, row) {
   rows <- unlist(findings$rows[findings$column == target])
   unique(block[match(rows, row)])
-}
-
-#' @rdname measurements
-#' @param x,... Used in a formula only: `circular(Wd)` marks a quantity in degrees.
-#' @export
-circular <- function(x, ...) x
-
-boundary_terms <- function(boundary, call = rlang::caller_env()) {
-  labels <- if (inherits(boundary, "formula")) formula_labels(boundary, call) else boundary
-  check_input(checkmate::check_character(labels, min.len = 1, any.missing = FALSE, unique = TRUE),
-              "boundary", "Give a formula such as {.code ~ Te + circular(Wd)}.", call = call)
-  is_circular <- grepl("^circular\\(.*\\)$", labels)
-  names <- trimws(sub("^circular\\((.*)\\)$", "\\1", labels))
-  if (inherits(boundary, "formula")) {
-    computed <- names[grepl("[^`]", gsub("`[^`]*`", "", names)) & !names == make.names(names)]
-    if (length(computed)) {
-      abort_input(
-        c("{.arg boundary} names columns of the data; {.code {computed[1]}} is computed from them.",
-          i = "Make it a column first. Only {.code circular()} marks a column, of degrees."),
-        call = call)
-    }
-    names <- gsub("^`|`$", "", names)
-  }
-  list(name = names, circular = is_circular)
-}
-
-# The terms of a formula with one side. One that R cannot take apart, as with a dot, names no
-# columns.
-formula_labels <- function(boundary, call) {
-  terms <- tryCatch(stats::terms(boundary), error = function(e) NULL)
-  if (is.null(terms) || attr(terms, "response") || !is.null(attr(terms, "offset"))) {
-    abort_input(c(paste("{.arg boundary} = {.code {deparse1(boundary)}} does not name columns of",
-                        "the data."), i = "Give a formula such as {.code ~ Te + circular(Wd)}."),
-                call = call)
-  }
-  attr(terms, "term.labels")
 }
 
 require_columns <- function(data, columns, call = rlang::caller_env()) {
@@ -418,32 +387,6 @@ average_rows <- function(raw, average, boundary, call = rlang::caller_env()) {
        standard_error = spread, boundary = boundary, block = index)
 }
 
-boundary_columns <- function(drivers, terms) {
-  columns <- lapply(seq_along(terms$name), function(i) {
-    v <- drivers[, terms$name[i]]
-    if (!terms$circular[i]) return(matrix(v, ncol = 1))
-    cbind(sin(v * pi / 180), cos(v * pi / 180))
-  })
-  list(values = do.call(cbind, columns), names = terms$name,
-       condition = rep(seq_along(columns), vapply(columns, ncol, 1L)))
-}
-
-constant_conditions <- function(x, rows) {
-  spread <- apply(x$values[rows, , drop = FALSE], 2, function(v) diff(range(v)))
-  # Beside the rounding of values as large as the condition has anywhere.
-  size <- tapply(apply(abs(x$values), 2, max), x$condition, max)[x$condition]
-  x$names[!tapply(spread > 1e-9 * size, x$condition, any)]
-}
-
-x_keep <- function(x, names, call = rlang::caller_env()) {
-  if (!length(names))
-    abort_input("No boundary condition varies; there is nothing to attribute a discrepancy to.",
-                call = call)
-  columns <- x$names[x$condition] %in% names
-  list(values = x$values[, columns, drop = FALSE], names = names,
-       condition = match(x$names[x$condition][columns], names))
-}
-
 # The noise of the averages and how it came about: given, standard error or bootstrap; RMS over the
 # calibration steps.
 noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
@@ -563,15 +506,9 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
                      "*" = paste("{n[['calibrate']]} calibrate, {n[['validate']]} validate,",
                                  "{n[['warmup']]} warm up"),
                      "*" = if (any(lost)) "{sum(lost)} without a measurement, left out",
-                     "*" = "boundary conditions {.field {x$conditions}}"))
+                     "*" = "boundary conditions {.field {condition_titles(x)}}"))
   said <- findings_read(x)$says
   for (one in utils::head(said, 5)) cli::cli_bullets(c("!" = "{one}"))
   if (length(said) > 5) cli::cli_bullets(c("!" = "{length(said) - 5} more: see {.code $findings}"))
   cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })
-
-condition_values <- function(measurements, name) {
-  columns <- measurements$boundary[, measurements$condition == match(name, measurements$conditions),
-                                   drop = FALSE]
-  if (ncol(columns) == 1) columns[, 1] else (atan2(columns[, 1], columns[, 2]) * 180 / pi) %% 360
-}

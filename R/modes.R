@@ -40,7 +40,7 @@ begun_from <- function(model, start, modes, context) {
   if (length(modes)) {
     found <- difference_slopes(model, start, context)
     model <- found$model
-    if (!is.null(found$slopes)) return(begin_search(model, start, found$slopes, 0))
+    if (!is.null(found$slopes)) return(begin_search(model, start, found$slopes, found$stale))
   }
   begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
 }

@@ -64,7 +64,7 @@ plot.amiss_upgrade <- function(x, which = "fit", ...) {
 plot.amiss_attribution <- function(x, ...) {
   check_whole(x, "x")
   rlang::check_dots_empty()
-  draw(figure_attribution(list("the model" = x)))
+  draw(figure_attribution(list("the model" = told_attribution(x))))
 }
 
 #' @rdname figures
@@ -111,7 +111,7 @@ autoplot.amiss_upgrade <- function(object, which = "fit", ...) {
 autoplot.amiss_attribution <- function(object, ...) {
   check_whole(object, "object")
   rlang::check_dots_empty()
-  figure_attribution(list("the model" = object))
+  figure_attribution(list("the model" = told_attribution(object)))
 }
 
 #' @rdname figures
@@ -153,6 +153,7 @@ draw <- function(figure) {
 
 upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
   check_whole(upgrade, "object", call = call)
+  upgrade <- labelled(upgrade)
   if (is_several(upgrade$measurements)) {
     names <- names(upgrade$measurements$records)
     if (checkmate::test_choice(which, record_figure_names)) which <- paste(which, "of", names[1])

@@ -18,9 +18,8 @@ say_table <- function(table) {
   cli::cli_verbatim(utils::capture.output(print(table, digits = 3, row.names = FALSE)))
 }
 
-# The parts of a summary, a paragraph each, and where to go on.
+# The parts of a summary, a paragraph each.
 say_parts <- function(parts) {
   for (part in names(parts))
     cli::cli_bullets(c(" " = "{.strong {part}}: {paste(parts[[part]], collapse = ' ')}"))
-  cli::cli_bullets(c(">" = "next: {.fun report}"))
 }

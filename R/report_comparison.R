@@ -10,7 +10,8 @@
 #' @return A list:
 #'   * `title`, `headline`.
 #'   * `evidence`, `remains`, `practice`, `doubts`: sentences.
-#'   * `inspect`: sentences that say what to inspect next.
+#'   * `inspect`: sentences that say what to inspect next, what could overturn the verdict first.
+#'     `print()` shows three.
 #'   * `models`, `attribution`: the paper's table 3a.
 #'   * `parameters`: table 3b.
 #'   * `criteria`, `errors`: tables 4 and 5.
@@ -33,6 +34,7 @@
 #' @export
 summary.amiss_comparison <- function(object, ...) {
   check_whole(object, "object")
+  object <- labelled(object)
   no_doubt <- paste("The sampler passed its own checks for every model; bases and emulators are",
                     "fine beside the noise; no parameter is at the edge of its range.")
   structure(list(title = object$title %||% object$study %||% object$measurements$name,
@@ -53,9 +55,9 @@ summary.amiss_comparison <- function(object, ...) {
 print.summary.amiss_comparison <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$title}}: {x$headline}")
   parts <- list("Evidence" = x$evidence, "What remains" = x$remains,
-                "What practice would do" = x$practice, "Doubts" = x$doubts,
-                "What to inspect next" = x$inspect)
+                "What practice would do" = x$practice, "Doubts" = x$doubts)
   say_parts(parts)
+  say_inspections(x$inspect)
 })
 
 comparison_headline <- function(comparison) {
@@ -258,6 +260,7 @@ result_list.amiss_comparison <- function(x) {
 
 #' @export
 report_content.amiss_comparison <- function(x) {
+  x <- labelled(x)
   table <- generics::tidy(x)
   list(comparison = x, told = summary(x), paper = x$method == "paper", table = table,
        best = table[which.min(table$rank), ], figures = figures_of(x))

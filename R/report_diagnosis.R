@@ -1,5 +1,6 @@
 #' @export
 report_content.amiss_upgrade <- function(x) {
+  x <- labelled(x)
   list(upgrade = x, told = summary(x), one = length(x$models) < 2,
        several = is_several(x$measurements))
 }

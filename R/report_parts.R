@@ -40,6 +40,26 @@ markdown_point <- function(head, x) {
   if (length(x)) cat("\n**", head, "** ", paste(markdown_text(x), collapse = " "), "\n\n", sep = "")
 }
 
+# What to inspect next: the first sentences, and the others folded away.
+markdown_inspections <- function(told) {
+  markdown_items(first_inspections(told))
+  markdown_folded(further_inspections(told), "more to inspect")
+}
+
+# Items that a reader of HTML opens; elsewhere, and on paper, they are open.
+markdown_folded <- function(x, what) {
+  if (!length(x)) return(invisible())
+  head <- paste(length(x), what)
+  if (!knitr::is_html_output()) {
+    cat("\n**", markdown_text(head), "**\n\n", sep = "")
+    return(markdown_items(x))
+  }
+  cat("\n```{=html}\n<details class=\"more\"><summary>", html_text(head), "</summary>\n```\n",
+      sep = "")
+  markdown_items(x)
+  cat("\n```{=html}\n</details>\n```\n")
+}
+
 # A table without the columns that say nothing.
 report_table <- function(table, bold = rep(FALSE, nrow(table))) {
   if (!NROW(table)) return(invisible())

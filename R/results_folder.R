@@ -185,7 +185,7 @@ result_list.amiss_upgrade <- function(x) {
   if (!is.null(cause)) cause$boundary <- as.list(cause$boundary)
   list(schema = 1L, study = x$study %||% x$measurements$name, seed = x$seed, wall_s = x$wall_s,
        runs_total = x$runs_total,
-       diagnosis = diagnosis_verdict(x), models = lapply(x$models, model_list),
+       diagnosis = diagnosis_verdict(labelled(x)), models = lapply(x$models, model_list),
        candidates = lapply(seq_len(NROW(x$candidates)), candidate_list),
        named_cause = cause, gain = x$gain, stopped_because = x$stopped_because)
 }

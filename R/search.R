@@ -8,11 +8,11 @@
 # `stale` standard deviations of the prior. `off`: the run at which the mechanism of a trial is
 # switched off; the search ends if all that it promises beyond that could not make evidence.
 # `alone`: whether it knows no runs but its own, so that those of others do not lead it to their
-# mode.
+# mode. `gain`: promised gain in nats below which least squares have converged.
 begin_search <- function(model, at, slopes, stale, steps = rules$search_steps, off = NULL,
-                         alone = FALSE) {
+                         alone = FALSE, gain = rules$search_gain) {
   list(model = model, at = at, steps = steps, off = off, step = 0, trusted = Inf, failed = 0,
-       poor = 0, since = 0, weighted = FALSE,
+       poor = 0, since = 0, weighted = FALSE, gain = gain,
        reference = list(z = model$runs$z[at, ], slopes = slopes, stale = stale,
                         others = if (alone) nrow(model$runs$z) else 0), slopes = slopes,
        status = "going")
@@ -25,7 +25,7 @@ run_search <- function(search, context) {
   search$least <- search[c("at", "slopes")]
   search <- look(search, context)
   for (round in seq_len(rules$weighted_rounds)) {
-    if (search$status == "budget") return(search)
+    if (search$status %in% c("budget", "arrived")) return(search)
     if (is_futile(search, context)) return(replace(search, "status", "futile"))
     if (promised_by(search) < rules$search_gain) return(replace(search, "status", "converged"))
     search <- utils::modifyList(search, list(weighted = TRUE, status = "going", failed = 0,
@@ -58,7 +58,7 @@ with_given_slopes <- function(search) {
   z <- search$model$runs$z[search$at, ]
   if (search$reference$stale == 0 && all(search$reference$z == z)) return(search)
   known <- given_slopes(search$model, z)
-  if (!is.null(known)) search$reference <- exact_reference(search, known)
+  if (!is.null(known)) search$reference <- reference_here(search, known, 0)
   search
 }
 
@@ -134,7 +134,7 @@ propose <- function(search, context) {
   # What the slopes promise, or the bend leaves of it unless the trusted distance does.
   open <- min(search$promised, if (is.infinite(search$trusted)) search$predicted)
   nats <- nats_of(search, misfit[1])
-  if (open < rules$search_gain * nats) search$status <- "converged"
+  if (open < search$gain * nats) search$status <- "converged"
   # A search that cannot come nearer to the record than the run without the mechanism is.
   if (!search$weighted && search$step > 0 && !is.null(search$off) &&
       misfit[1] - search$promised > squared_misfit(model)[search$off] - rules$futile_gain)
@@ -234,7 +234,19 @@ accept <- function(search, made, context) {
   slow <- length(search$gains) >= rules$pace && sum(utils::tail(search$gains, rules$pace)) < nats
   if (slow) search$status <- "slow"
   if (search$failed >= rules$stalled_after) search$status <- "stalled"
+  if (has_arrived(search)) search$status <- "arrived"
   search
+}
+
+# Whether the search has come as near to a mode that is known as draws of it lie: it would end
+# there.
+has_arrived <- function(search) {
+  z <- search$model$runs$z
+  distance <- vapply(search$known, function(mode) {
+    apart <- z[search$at, ] - z[mode$at, ]
+    sum(apart * solve(conditioned(mode$covariance), apart))
+  }, 0)
+  any(distance < ncol(z))
 }
 
 # By how much: to the least value of the parabola that falls as predicted and ends at what the run
@@ -249,24 +261,26 @@ renew_slopes <- function(search, context) {
   search$model <- found$model
   search[c("poor", "since")] <- 0
   if (is.null(found$slopes)) return(search)
-  search$reference <- exact_reference(search, found$slopes)
+  search$reference <- reference_here(search, found$slopes, found$stale)
   search["gains"] <- list(NULL)
   search$trusted <- search$trusted * rules$trust_changes
   search
 }
 
-# Slopes that are exact where the search is.
-exact_reference <- function(search, slopes) {
-  utils::modifyList(search$reference,
-                    list(z = search$model$runs$z[search$at, ], slopes = slopes, stale = 0))
+# Slopes that were taken where the search is.
+reference_here <- function(search, slopes, stale) {
+  utils::modifyList(search$reference, list(z = search$model$runs$z[search$at, ], slopes = slopes,
+                                           stale = stale))
 }
 
 # Slopes by differences, on the same side wherever the priors allow it; where a small one shows
-# nothing, by larger ones on both sides: list(model, slopes), no slopes if the budget ends.
+# nothing, by larger ones on both sides: list(model, slopes, stale), no slopes if the budget ends. A
+# difference is the slope half way along it: what the simulator bends over that, other runs show.
 difference_slopes <- function(model, at, context, asked = names(model$parameters)) {
   z <- model$runs$z[at, ]
   known <- given_slopes(model, z)
-  if (!is.null(known)) return(list(model = model, slopes = known[, asked, drop = FALSE]))
+  if (!is.null(known))
+    return(list(model = model, slopes = known[, asked, drop = FALSE], stale = 0))
   seen <- function(model, step) {
     points <- matrix(z, length(step), length(z), byrow = TRUE)
     points[cbind(seq_along(step), match(names(step), names(z)))] <- z[names(step)] + step
@@ -275,7 +289,7 @@ difference_slopes <- function(model, at, context, asked = names(model$parameters
     change <- made$model$runs$outputs[, made$at, drop = FALSE] - made$model$runs$outputs[, at]
     slopes <- sweep(change, 2, step, "/")
     slopes[, colSums(!is.finite(slopes)) > 0] <- 0
-    list(model = made$model, slopes = slopes)
+    list(model = made$model, slopes = slopes, stale = rules$search_difference / 2)
   }
   side <- difference_side(z, model$space)[asked]
   found <- seen(model, rules$search_difference * side)
@@ -286,7 +300,7 @@ difference_slopes <- function(model, at, context, asked = names(model$parameters
   down <- seen(up$model, -rules$wide_difference * side[flat])
   if (is.null(up$slopes) || is.null(down$slopes)) return(list(model = down$model))
   found$slopes[, match(flat, asked)] <- (up$slopes + down$slopes) / 2
-  list(model = down$model, slopes = found$slopes)
+  list(model = down$model, slopes = found$slopes, stale = found$stale)
 }
 
 # Those that the simulators give themselves, for a unit of z; NULL unless all do.

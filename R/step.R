@@ -151,7 +151,8 @@ report_model <- function(model, context) {
     warn_coarse_basis(fits[[k]]$emulator, "control$emulator$max_vectors",
                       paste(c(model$name, names(fits)[k]), collapse = ", "))
   }
-  first <- utils::head(model$attribution$table[model$attribution$table$significant, ], 1)
+  table <- told_by_model(model)$table
+  first <- utils::head(table[table$significant, ], 1)
   context$say(paste(
     "{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
     "{signif(model$scores$validate[['rmse']], 3)} held out; {runs_spent(context)} runs so far;",
@@ -165,7 +166,7 @@ report_model <- function(model, context) {
 no_winner <- function(table, present, context) {
   decisive <- context$control$decisive
   reason <- why_not(table, decisive, context)
-  significant <- significant_conditions(present$attribution$table)
+  significant <- significant_conditions(told_by_model(present)$table)
   open <- if (!length(significant)) " and no boundary condition is significant"
           else paste0("; what responds to ", paste(significant, collapse = ", "),
                       " remains unexplained")

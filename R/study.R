@@ -35,7 +35,8 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' * `data`: a table (see *Tables*) or an R file whose value is a data frame; `separator` and
 #'   `decimal` of the table.
 #' * `time`, `target`, `boundary`: columns of `data`. `boundary` is a list, with `circular(Wd)` for
-#'   degrees.
+#'   degrees. A condition may have a label and a unit, which people read in its place: `Gv: {label:
+#'   sun from the south, unit: W/m2}`, and `circular: true` for degrees.
 #' * `calibrate` and `validate`: conditions in the columns of the data.
 #' * `noise_sd`, `unit`, `time_format`, `time_zone`: as in [measurements()].
 #' * `average_h` (the step of the data if it is not given), `warmup_h` and `fill_gaps_h` (0): in
@@ -248,7 +249,7 @@ study_measurements <- function(study, files) {
       structure(list(text = study[[field]]), class = "amiss_row_condition")
   }
   measurements(
-    data, time = study$time, target = study$target, boundary = as.character(unlist(study$boundary)),
+    data, time = study$time, target = study$target, boundary = study_boundary(study$boundary),
     noise_sd = study$noise_sd, average = study$average_h,
     calibrate = rows("calibrate"), validate = rows("validate"),
     warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
@@ -331,6 +332,28 @@ require_trust <- function(files, folder, trust, call = rlang::caller_env()) {
     class = c("amiss_error_trust", "amiss_error_input", "amiss_error"), call = short_call(call))
 }
 
+# What `boundary` of a study file holds as measurements() takes it: names, and what is said of
+# each.
+study_boundary <- function(boundary, call = rlang::caller_env()) {
+  each <- unlist(lapply(seq_along(boundary), function(k) {
+    one <- boundary[k]
+    if (is.list(one[[1]]) && !nzchar(rlang::names2(one))) one[[1]] else as.list(one)
+  }), recursive = FALSE)
+  if (is.null(names(each))) return(as.character(unlist(each)))
+  Map(function(one, name) {
+    if (!nzchar(name)) return(as.character(one))
+    known <- names(formals(condition))
+    unknown <- setdiff(rlang::names2(one), known)
+    if (!is.list(one) || length(unknown) || is.null(one$label)) {
+      abort_input(c(paste("{.field boundary}: {.val {name}} needs a {.field label}, and may have",
+                          "{.field {known[-1]}}."),
+                    i = "For example {.code {name}: {{label: outdoor air, unit: degC}}}."),
+                  call = call)
+    }
+    do.call(condition, as.list(one))
+  }, each, names(each))
+}
+
 study_data <- function(study, path, call = rlang::caller_env()) {
   if (is_code(c(data = path))) {
     data <- source_value(path, "data", call)
@@ -338,7 +361,7 @@ study_data <- function(study, path, call = rlang::caller_env()) {
                 call = call)
     return(data)
   }
-  conditions <- boundary_terms(as.character(unlist(study$boundary)), call)$name
+  conditions <- boundary_terms(study_boundary(study$boundary), call)$name
   read_table_file(path, c(study$time, study$target, conditions), study$separator,
                   study$decimal, call)
 }

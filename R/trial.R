@@ -261,7 +261,9 @@ begun_alone <- function(model, start, modes, context) {
     model <- found$model
     if (!is.null(found$slopes)) slopes[, match(new, names(model$parameters))] <- found$slopes
   }
-  begin_search(model, start, slopes, rules$scout_stale, alone = TRUE)
+  search <- begin_search(model, start, slopes, rules$scout_stale, alone = TRUE)
+  search$known <- modes
+  search
 }
 
 # Points far from its mode: where the present model was run over the priors, with what the mechanism

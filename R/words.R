@@ -73,6 +73,14 @@ interval_words <- function(lower, upper, digits = 2, between = " to ") {
          USE.NAMES = FALSE)
 }
 
+# A length of time, as people round it.
+duration_words <- function(hours) {
+  if (hours >= 48) paste(round(hours / 24), "days")
+  else if (hours >= 2) paste(round(hours), "hours")
+  else if (hours >= 1 / 30) paste(round(60 * hours), "minutes")
+  else paste(signif(3600 * hours, 2), "seconds")
+}
+
 # An hour of the day in decimals, as a clock shows it.
 clock_words <- function(hour) {
   minutes <- round(60 * hour)

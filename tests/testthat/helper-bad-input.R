@@ -63,6 +63,7 @@ valid_calls <- function() {
     autoplot = list(object = o$upgrade, which = "fit"),
     bayes_factor = list(model = o$fit, reference = o$fit),
     beta_prior = list(shape1 = 1, shape2 = 1, lower = 0, upper = 1),
+    condition = list(label = "outdoor air", unit = "degC", circular = FALSE),
     bootstrap_noise = list(replicates = 50, detrend = FALSE, seed = 1),
     box_catalogue = list(columns = "Te", azimuth = 180),
     calibrate = list(emulator = o$emulator, measurements = o$measurements, control = o$calibration,

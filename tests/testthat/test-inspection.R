@@ -29,8 +29,8 @@ test_that("rivals are distinguished by what only one of them responds to, or on 
   r <- cor(m$boundary[used, m$condition == 1], m$boundary[used, m$condition == 2])
   told <- about(inspected(upgrade), "rival")
   expect_match(told,
-               paste("distinguish sun from drift, measure while Gv changes while Te does not,",
-                     "or vice versa"))
+               paste("distinguish sun from drift, measure a period in which Gv changes and Te does",
+                     "not, or vice versa"))
   expect_match(told, sprintf("correlation of Gv and Te is %.2f", r))
   m$boundary[used, m$condition == 2] <- rnorm(sum(used))
   expect_identical(amiss:::correlation_words(m, "Gv", "Te"), "")
@@ -43,9 +43,9 @@ test_that("rivals are distinguished by what only one of them responds to, or on 
                paste("only a look on site distinguishes them: the first asks for a",
                      "sun_gain of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
-  expect_match(about(inspected(upgrade), "rival"),
+  expect_match(about(inspected(upgrade), "tied"),
                paste("The estimate of sun \\(gain of the sun\\) is correlated with gain:",
-                     "measuring that would narrow it"), all = FALSE)
+                     "measuring that would narrow it"))
 })
 
 test_that("a stand-in and a drifting sensor have tests of their own", {
@@ -68,7 +68,7 @@ test_that("a time of about a step asks for finer steps of the simulator", {
   expect_identical(upgrade$candidates$mechanism[1], "sun")
   expect_match(brought(1.5, "h"),
                "The time that sun brings \\(lag\\) is about a step of the record")
-  expect_match(brought(80, "min"), "finer ones before you believe in sun")
+  expect_match(brought(80, "min"), "finer steps before you believe in sun")
   expect_length(brought(3, "h"), 0)
   expect_length(brought(1.5, "K"), 0)
 })
@@ -92,9 +92,9 @@ test_that("conditions that go together, answers without a mechanism and absent d
     about(inspected(upgrade), "answer")
   }
   expect_match(answers(-1, 0.9),
-               paste("responds to Gv\\. Among the mechanisms that it drives, sun was tried but not",
-                     "adopted"),
-               all = FALSE)
+               paste("responds to (Gv and Te|Te and Gv)\\. Among the mechanisms that they drive,",
+                     "(sun and drift|drift and sun) were tried but not adopted"))
+  expect_length(answers(-1, 0.9), 1)
   expect_match(answers(-1, 0.7),
                paste("Gv\\. With sun, which it drives, it falls to 70 %, but .* 10 to 1 against.",
                      "does not distinguish that from an unknown response to Gv: look for a",
@@ -129,7 +129,7 @@ test_that("a candidate that is near is named with what would decide it", {
   upgrade$catalogue$sun$boundary <- character()
   upgrade$candidates$error_ratio <- 0.9
   expect_match(about(inspected(upgrade), "nearest"),
-               "10 to 1 in favour\\): a longer record would decide it")
+               "10 to 1 in favour\\): a longer record \\(about 6 days more at this pace\\) would")
   wide <- upgrade
   wide$candidates$lower95 <- -20
   expect_length(about(inspected(wide), "nearest"), 0)
@@ -220,7 +220,7 @@ test_that("data held out are asked for, and what they hold that calibration did 
     m$boundary[m$use == "validate", m$condition == 1] + 100
   upgrade$measurements <- m
   expect_match(about(inspected(upgrade), "held_out"),
-               "Te lies in .* of the steps outside of what calibration saw")
+               "Te \\(.* of the steps\\) lies outside of what calibration saw")
 })
 
 test_that("edges of the prior are told with the end and its value", {
@@ -272,4 +272,100 @@ test_that("models that are not distinguished are so where their simulations diff
                       quiet = TRUE,
                       envir = list2env(list(compared = compared), parent = globalenv()))
   expect_match(text, "differ most")
+})
+
+test_that("sentences are ranked by what they would settle", {
+  ids <- c("spikes", "tied", "answer", "step", "unknown", "site", "held_out", "clock", "edge",
+           "emulator", "steps", "nearest")
+  told <- stats::setNames(paste("Sentence", seq_along(ids)), ids)
+  expect_named(ranked(told), c("emulator", "clock", "held_out", "step", "site", "nearest", "answer",
+                               "tied", "edge", "steps", "spikes", "unknown"))
+  expect_identical(ranked(told)[["site"]], told[["site"]])
+  # Of the same rank, the order in which they were made.
+  expect_identical(ranked(c(answer = "a", edge = "b", answer = "c")),
+                   c(answer = "a", answer = "c", edge = "b"))
+  upgrade <- small_upgrade()
+  upgrade$models[[2]]$confounded_with <- "gain"
+  expect_named(inspected(upgrade), c("site", "tied", "steps"))
+  upgrade <- without_held_out(upgrade)
+  upgrade$models[[2]]$fit$check[c("passed", "verdict")] <- list(FALSE, "half of the noise")
+  told <- inspected(upgrade)
+  expect_named(told, c("emulator", "held_out", "site", "tied", "steps"))
+  expect_match(told[["held_out"]], "Measure 2 days more of Ti and its conditions and hold them out")
+  stand_in(record_faults = function(...) c(clock = "a", daylight = "b", stuck = "c"))
+  expect_named(inspected(upgrade)[1:3], c("emulator", "record", "held_out"))
+  expect_match(about(inspected(upgrade), "record"),
+               "it has clocks that differ and a sensor that is stuck")
+})
+
+test_that("what asks for the same action is one sentence", {
+  fit <- small_upgrade()$models[[1]]$fit
+  edge <- function(...) {
+    for (name in c(...)) {
+      fit$values[, name] <- c(gain = 1.9999, offset = 10.0001)[[name]]
+      unit <- c(gain = 0.99995, offset = 0.00005)[[name]]
+      fit$posterior$unit[, match(name, colnames(fit$values))] <- unit
+    }
+    edge_inspections(fit)
+  }
+  expect_length(edge("gain", "offset"), 1)
+  expect_match(edge("gain", "offset"), "offset .lower end, 10 K. and gain .upper end, 2.0.")
+
+  upgrade <- small_upgrade()
+  for (k in 1:2) upgrade$models[[k]]$fit$check[c("passed", "verdict")] <- list(FALSE, "too coarse")
+  told <- about(inspected(upgrade), "emulator")
+  expect_length(told, 1)
+  expect_match(told, paste("The emulators of base .too coarse. and base . sun .too coarse. are not",
+                           "trusted: make more runs .* before anything is read from their numbers"))
+
+  # Two mechanisms: one comparison of sensors, also for the noise, one look at the steps.
+  upgrade <- small_upgrade()
+  later <- upgrade$models[[2]]
+  later[c("name", "parent", "mechanism")] <- list("base + sun + moon", "base + sun", "moon")
+  upgrade$catalogue$moon <- upgrade$catalogue$sun
+  upgrade$models[[3]] <- later
+  for (k in 2:3) upgrade$models[[k]]$doubts <- c(drift = "a drift", steps = "the steps")
+  stand_in(remaining_error = function(...) list(ratio = 3, large = TRUE, pattern = NULL))
+  told <- inspected(upgrade)
+  expect_length(grep("second", told), 1)
+  expect_match(about(told, "drift"),
+               paste("explain as much as sun or moon. The remaining error is 3.0 times the stated",
+                     "noise of 0.050 K: check that noise with the same second sensor"))
+  expect_length(grep("finer steps before", told), 1)
+  expect_match(about(told, "step"), "before you believe in sun or moon")
+  for (k in 2:3) upgrade$models[[k]]$verdict <- "stand-in"
+  expect_match(about(inspected(upgrade), "stand_in"), "Take sun and moon as signs")
+  upgrade <- base_only(upgrade)
+  upgrade$catalogue <- upgrade$catalogue["moon"]
+  upgrade$models[[1]]$attribution$table[c("significant", "group")] <- list(TRUE, NA_character_)
+  upgrade$catalogue$moon$boundary <- character()
+  expect_match(about(inspected(upgrade), "answer"),
+               "responds to (Te and Gv|Gv and Te), and no mechanism of the catalogue .* by these")
+})
+
+test_that("rivals that the same period distinguishes share a sentence, and so do looks on site", {
+  pair <- function(a, b, when = NULL)
+    list(names = c(a, b), measure = when, drivers = "Gv",
+         asks = stats::setNames(paste("a value of", c(a, b)), c(a, b)))
+  expect_identical(unname(measured_words(list(pair("sun", "drift", "x"), pair("sun", "leak", "x"),
+                                              pair("sun", "wind", "y")))),
+                   c(paste("To distinguish sun from drift and from leak, measure a period in which",
+                           "x."), "To distinguish sun from wind, measure a period in which y."))
+  expect_match(looked_words(list(pair("sun", "drift"), pair("sun", "leak"))),
+               paste("Because sun, drift and leak respond to the same conditions.*: sun asks for a",
+                     "value of sun; drift asks for a value of drift; leak asks"))
+})
+
+test_that("a printed summary shows three sentences and says how many more there are", {
+  told <- summary(untied())
+  shown <- function(n) {
+    told$inspect <- stats::setNames(sprintf("Sentence {%d}.", seq_len(n)), rep("site", n))
+    paste(capture.output(print(told)), collapse = "\n")
+  }
+  expect_match(shown(5), "Sentence .1.*Sentence .2.*Sentence .3.*2 more to inspect: .*[$]inspect")
+  expect_no_match(shown(5), "Sentence .4")
+  expect_no_match(shown(3), "more to inspect")
+  expect_match(shown(3), "next: .*report")
+  expect_length(summary(without_held_out(small_upgrade()))$inspect,
+                length(inspected(without_held_out(small_upgrade()))))
 })

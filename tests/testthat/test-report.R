@@ -181,6 +181,39 @@ word_body <- function(file) {
 
 word_tables <- function(body) tables_of(body, "//w:tbl", ".//w:tr", "./w:tc")
 
+test_that("a report folds away all but three of the sentences on what to inspect next", {
+  skip_without_pandoc()
+  skip_if_not_installed("xml2")
+  told <- sprintf("Sentence %d.", 1:5)
+  rmd <- c("::: {.card}", "```{r, echo = FALSE, results = 'asis'}",
+           "amiss:::markdown_inspections(told)", "```", ":::")
+  page <- function(told, format) {
+    source <- withr::local_tempfile(fileext = ".Rmd")
+    writeLines(c("---", "title: x", "---", "", rmd), source)
+    rmarkdown::render(source, format, envir = list2env(list(told = told), parent = globalenv()),
+                      quiet = TRUE)
+  }
+  html <- xml2::read_html(page(told, "html_document"))
+  items <- function(path) trimws(xml2::xml_text(xml2::xml_find_all(html, path)))
+  expect_identical(items("//details//li"), told[4:5])
+  expect_identical(items("//details/summary"), "2 more to inspect")
+  expect_identical(items("//li[not(ancestor::details)]"), told[1:3])
+  expect_length(xml2::xml_find_all(html, "//details[@open]"), 0)
+  html <- xml2::read_html(page(told[1:3], "html_document"))
+  expect_length(items("//details"), 0)
+  # So does the summary of a report.
+  rmd <- c("```{r, echo = FALSE}", "report_fragment(told, \"summary\")", "```")
+  upgrade <- without_held_out(small_upgrade())
+  upgrade$models[[2]]$confounded_with <- "gain"
+  html <- xml2::read_html(page(upgrade, "html_document"))
+  expect_identical(gsub("\\s+", " ", items("//details//li")),
+                   unname(upgrade_inspections(upgrade)["steps"]))
+  # Word folds nothing: there all follow under a head.
+  rmd <- c("```{r, echo = FALSE, results = 'asis'}", "amiss:::markdown_inspections(told)", "```")
+  text <- xml2::xml_text(word_body(page(told, "word_document")))
+  expect_match(text, "Sentence 3.*2 more to inspect.*Sentence 4.*Sentence 5")
+})
+
 test_that("a report is one file that names the cause and needs nothing from outside", {
   skip_on_cran()
   skip_without_pandoc()
