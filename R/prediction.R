@@ -205,19 +205,25 @@ moves_at <- function(fit, use, threads, record = fit$measurements) {
   slopes_at(fit, use, threads, record)
 }
 
-# The simulator's slopes at other rows, at the run of least squares.
+# The simulator's slopes at other rows, at the run of least squares: by differences on both sides,
+# as far as the priors go.
 slopes_at <- function(fit, use, threads, record) {
   parameters <- fit$emulator$parameters
   space <- coordinates_of(parameters)
   z <- fit$emulator$moves$z
-  step <- rules$search_difference * difference_side(z, space)
-  around <- rbind(z, matrix(z, length(z), length(z), byrow = TRUE) + diag(step, length(z)))
+  step <- diag(rules$search_difference, length(z))
+  ends <- lapply(c(1, -1), function(side) {
+    t(pmin(pmax(z + side * step, space$lower), space$upper))
+  })
+  around <- do.call(rbind, ends)
   runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, space), parameters), use, threads,
                          record)
   if (!all(is.finite(runs))) {
     abort_numerical("The simulator failed beside its best run at these rows.")
   }
-  sweep(runs[, -1, drop = FALSE] - runs[, 1], 2, fit$emulator$moves$unit / step, "*")
+  up <- seq_along(z)
+  sweep(runs[, up, drop = FALSE] - runs[, -up, drop = FALSE], 2,
+        fit$emulator$moves$unit / diag(ends[[1]] - ends[[2]]), "*")
 }
 
 # The vectors of an emulator's basis at other rows: the same combinations of its runs, without those

@@ -350,6 +350,7 @@ study_boundary <- function(boundary, call = rlang::caller_env()) {
                     i = "For example {.code {name}: {{label: outdoor air, unit: degC}}}."),
                   call = call)
     }
+    if (is.character(one$circular)) one$circular <- switch(one$circular, yes = TRUE, no = FALSE)
     do.call(condition, as.list(one))
   }, each, names(each))
 }
