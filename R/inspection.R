@@ -85,13 +85,10 @@ fits_by_name <- function(model) {
 }
 
 # "The emulator of a is not trusted (why)", or the same of several.
-untrusted_words <- function(what, models, why) {
+untrusted_words <- function(one, several, models, why) {
   names <- vapply(models, `[[`, "", "name")
-  if (length(models) == 1)
-    sprintf("The %s %s is not trusted (%s)", what, names, why)
-  else
-    sprintf("The %s %s are not trusted", sub("(emulator|result)", "\\1s", what),
-            listed(sprintf("%s (%s)", names, why)))
+  if (length(models) == 1) sprintf("The %s %s is not trusted (%s)", one, names, why)
+  else sprintf("The %s %s are not trusted", several, listed(sprintf("%s (%s)", names, why)))
 }
 
 emulator_inspection <- function(models) {
@@ -100,7 +97,7 @@ emulator_inspection <- function(models) {
   more <- if (is.null(models[[1]]$fit$emulator$simulator)) "give more runs where the posterior lies"
           else sprintf("make more runs (%s now)", listed(format_each_comma(runs)))
   c(emulator = sprintf("%s: %s before anything is read from %s numbers.",
-                       untrusted_words("emulator of", models, why), more,
+                       untrusted_words("emulator of", "emulators of", models, why), more,
                        if (length(models) > 1) "their" else "its"))
 }
 
@@ -108,7 +105,8 @@ sampler_inspection <- function(models) {
   why <- vapply(models, function(m) sub("^not trusted: ", "", sampler_said(m$fit)$verdict), "")
   chains <- unique(vapply(models, function(m) as.integer(m$fit$control$ais$pilot_chains), 0L))
   c(sampler = sprintf("%s: give %s more chains (pilot_chains, %s now).",
-                      untrusted_words("sampler's result for", models, why),
+                      untrusted_words("sampler's result for", "sampler's results for", models,
+                                       why),
                       if (length(models) > 1) "them" else "it", listed(chains)))
 }
 
