@@ -10,10 +10,7 @@
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
 suppressPackageStartupMessages(library(amiss))
-scope <- new.env(parent = globalenv())
-for (part in c("worlds", "least_squares", "network", "runoff", "wrong", "families")) {
-  sys.source(file.path(here, "hidden_effects", paste0(part, ".R")), scope)
-}
+scope <- worlds_scope(here)
 families <- strsplit(option("family", "box,network,runoff,wrong", smallest = "runoff"), ",",
                      fixed = TRUE)[[1]]
 worlds <- as.integer(option("worlds", "8", smallest = "1"))

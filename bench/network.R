@@ -10,10 +10,7 @@ suppressPackageStartupMessages(library(amiss))
 rows <- as.integer(option("rows", 10000, smallest = 300))
 repeats <- as.integer(option("repeats", 5, smallest = 1))
 
-scope <- new.env(parent = globalenv())
-for (part in c("worlds", "least_squares", "network")) {
-  sys.source(file.path(here, "hidden_effects", paste0(part, ".R")), scope)
-}
+scope <- worlds_scope(here, c("worlds", "least_squares", "network"))
 set.seed(as.numeric(option("seed", 1)))
 described <- scope$with_past(scope$base_network("thick wall"), 20, 5)
 house <- scope$network_simulator(described, 1)

@@ -18,3 +18,11 @@ write_rows <- function(rows, out) {
   if (!file.rename(part, out)) stop(out, " cannot be written", call. = FALSE)
   message("written to ", out)
 }
+
+# The functions of bench/hidden_effects that draw worlds.
+worlds_scope <- function(here, parts = c("worlds", "least_squares", "network", "runoff", "wrong",
+                                         "families")) {
+  scope <- new.env(parent = globalenv())
+  for (part in parts) sys.source(file.path(here, "hidden_effects", paste0(part, ".R")), scope)
+  scope
+}

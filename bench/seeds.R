@@ -9,10 +9,7 @@
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
 suppressPackageStartupMessages(library(amiss))
-scope <- new.env(parent = globalenv())
-for (part in c("worlds", "least_squares", "network", "runoff", "wrong", "families")) {
-  sys.source(file.path(here, "hidden_effects", paste0(part, ".R")), scope)
-}
+scope <- worlds_scope(here)
 split_words <- function(x) strsplit(x, ",", fixed = TRUE)[[1]]
 houses <- split_words(option("houses", "O5,N2", "O5"))
 families <- split_words(option("family", "network,runoff,wrong", smallest = "runoff"))
