@@ -72,16 +72,18 @@ within_limits <- function(mean, precision, space) {
     if (any(!held)) {
       pull <- -as.numeric(precision[!held, , drop = FALSE] %*% (z - mean))
       step <- solve(precision[!held, !held, drop = FALSE], pull)
-      room <- ifelse(step == 0, Inf,
-                     (ifelse(step > 0, upper[!held], lower[!held]) - z[!held]) / step)
+      end <- lower
+      end[!held][step > 0] <- upper[!held][step > 0]
+      room <- (end[!held] - z[!held]) / step
+      room[step == 0] <- Inf
       z[!held] <- z[!held] + min(1, room) * step
       if (min(room) < 1) {
         held[which(!held)[which.min(room)]] <- TRUE
         next
       }
     }
-    outwards <- ifelse(z >= upper, 1, -1)
-    inwards <- ifelse(held, as.numeric(precision %*% (z - mean)) * outwards, 0)
+    outwards <- 2 * (z >= upper) - 1
+    inwards <- held * as.numeric(precision %*% (z - mean)) * outwards
     if (max(inwards) < 1e-9) break
     held[which.max(inwards)] <- FALSE
   }

@@ -105,20 +105,45 @@ promised_by <- function(search) {
   sum(way * (precision %*% way)) / 2
 }
 
-# The next run: the optimum of the bent line within the trusted distance, by Gauss-Newton steps on
-# it.
+# The next run: the optimum of the bent line within the trusted distance. The slopes are those of
+# the bent line: if it rises everywhere where its optimum is looked for, that was too far away.
 propose <- function(search, context) {
   model <- search$model
   z <- model$runs$z[search$at, ]
   bent <- bent_line(model, search$at, search$reference)
   line <- along(bent, 0 * z)
   search$slopes <- line$slopes
-  best <- squares_of_line(search, z, line, context)
-  search$promised <- best$promised
+  first <- squares_of_line(search, z, line, context)
+  search$promised <- first$promised
+  within <- search$trusted
+  for (try in seq_len(rules$bent_tries)) {
+    found <- optimum_of_bend(search, bent, line, first, within, context)
+    if (found$gain > 0) break
+    within <- rules$least_shrinkage * found$length
+  }
+  search$proposal <- stats::setNames(found$z, names(z))
+  search$predicted <- found$gain
+  if (search$step >= search$steps) search$status <- "steps"
+  # What the slopes promise, or the bend leaves of it unless the distance does.
+  open <- min(search$promised, if (is.infinite(within) || found$gain <= 0) found$gain)
+  nats <- nats_of(search, found$from)
+  if (open < search$gain * nats) search$status <- "converged"
+  # A search that cannot come nearer to the record than the run without the mechanism is.
+  if (!search$weighted && search$step > 0 && !is.null(search$off) &&
+      found$from - search$promised > squared_misfit(model)[search$off] - rules$futile_gain)
+    search$status <- "behind"
+  search
+}
+
+# The best of Gauss-Newton steps on the bent line: list(z, gain, from, length), what it gains by the
+# bent line, the misfit where the search is, and how far the first step went.
+optimum_of_bend <- function(search, bent, line, best, within, context) {
+  model <- search$model
+  z <- model$runs$z[search$at, ]
   tried <- rbind(z)
   outputs <- cbind(line$output)
   for (inner in seq_len(rules$bent_steps)) {
-    to <- step_within(best, z, search$trusted, model$space, bent$scale)
+    to <- step_within(best, z, within, model$space, bent$scale)
     line <- along(bent, to - z)
     moved <- max(abs(to - tried[nrow(tried), ]))
     tried <- rbind(tried, to)
@@ -128,18 +153,8 @@ propose <- function(search, context) {
   }
   misfit <- misfit_of(search, outputs, tried, context)
   lowest <- which.min(misfit[-1]) + 1
-  search$proposal <- stats::setNames(tried[lowest, ], names(z))
-  search$predicted <- misfit[1] - misfit[lowest]
-  if (search$step >= search$steps) search$status <- "steps"
-  # What the slopes promise, or the bend leaves of it unless the trusted distance does.
-  open <- min(search$promised, if (is.infinite(search$trusted)) search$predicted)
-  nats <- nats_of(search, misfit[1])
-  if (open < search$gain * nats) search$status <- "converged"
-  # A search that cannot come nearer to the record than the run without the mechanism is.
-  if (!search$weighted && search$step > 0 && !is.null(search$off) &&
-      misfit[1] - search$promised > squared_misfit(model)[search$off] - rules$futile_gain)
-    search$status <- "behind"
-  search
+  list(z = tried[lowest, ], gain = misfit[1] - misfit[lowest], from = misfit[1],
+       length = sqrt(sum((bent$scale * (tried[2, ] - z))^2)))
 }
 
 # Minus the log posterior density of runs: at first as if all of the error were white noise of the
@@ -413,7 +428,8 @@ tangent_at <- function(model, at, slopes, moves, context) {
        history = lapply(unname(each), `[`, c("setting", "variance", "t")), moves = unname(moves))
 }
 
-# list(mean, covariance) under a line through z, for draws of error and discrepancy that are known.
+# list(mean, covariance): where a Gauss-Newton step on values_of() leads along a line through z, for
+# draws of error and discrepancy that are known, and the inverse of its curvature.
 tangent_given <- function(model, z, output, slopes, history, moves, context) {
   engine <- engine_context(context$seed, context$threads)
   each <- Map(function(record, own, rows, history) {

@@ -371,6 +371,7 @@ check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()
 
 check_simulator <- function(simulator, call = rlang::caller_env()) {
   present(simulator, call)
+  if (was_checked(simulator, "simulator")) return(invisible(TRUE))
   known <- function(class) !is.null(utils::getS3method("simulate_runs", class, optional = TRUE))
   if (!any(vapply(class(simulator), known, NA))) {
     abort_input(c("{.arg simulator} is of class {.cls {class(simulator)}}, which is no simulator.",
@@ -378,6 +379,7 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
                             "with {.fun ensemble}.")), call = call)
   }
   check_whole(simulator, "simulator", call = call)
+  note_checked(simulator, "simulator")
 }
 
 # Runs of simulators in this session, by which a study says what it cost.

@@ -180,8 +180,7 @@ settled_trial <- function(model, present, bar, context) {
 # A trial that its runs confirm has had its first round.
 verify_trial <- function(model, present, context) {
   before <- if (is_confirmed(model)) model$fit$log_evidence
-  model <- verify_model(model, context, before, rules$trial_rounds)
-  with_taken(model, present, context)
+  with_taken(verify_model(model, context, before), present, context)
 }
 
 # A trial searched again from runs over all priors, far from where it ended: an extension may have a

@@ -322,12 +322,12 @@ Rcpp::List tangent_posterior_(const Rcpp::List& data, const Rcpp::List& priors, 
   return out;
 }
 
-// The same for points of error and discrepancy that are known.
+// Where a Gauss-Newton step leads for points of error and discrepancy that are known.
 // [[Rcpp::export]]
 Rcpp::List tangent_given_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& points,
                           const Eigen::VectorXd& x0, const Eigen::VectorXd& run,
                           const Eigen::MatrixXd& slopes, const Rcpp::List& context) {
-  const TangentPosterior result =
+  const TangentOptimum result =
       tangent_given(make_history_data(data), make_history_priors(priors), make_points(points), x0, run,
                     slopes, convert::context(context));
   return Rcpp::List::create(Rcpp::_["mean"] = result.mean, Rcpp::_["covariance"] = result.covariance);

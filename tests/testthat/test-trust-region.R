@@ -89,3 +89,26 @@ test_that("a model at a lower mode than its run of least squares is searched aga
   expect_lte(amiss:::straight_distance(moved)[moved$least$at], 1)
   expect_false(amiss:::misses_least(moved, checked$fits))
 })
+
+test_that("a search goes on if the bent line gains nearby, though its optimum was looked for too far", {
+  m <- linear_measurements()
+  model <- amiss:::new_model(list(linear_simulator()), list(amiss:::loop_record(m, quick_ais)))
+  context <- amiss:::new_context(1, 1, list())
+  model <- amiss:::with_runs(model, rbind(c(1, 1)), context)$model
+  slopes <- amiss:::difference_slopes(model, 1, context)
+  search <- amiss:::begin_search(slopes$model, 1, slopes$slopes, slopes$stale)
+  of <- function(gains) {
+    asked <- numeric()
+    stand_in(optimum_of_bend = function(search, bent, line, best, within, context) {
+      asked <<- c(asked, within)
+      list(z = c(0.5, 0.5), gain = gains[length(asked)], from = 1e4, length = min(within, 2))
+    })
+    found <- amiss:::propose(search, context)
+    list(asked = asked, status = found$status, predicted = found$predicted)
+  }
+  # Each time a tenth of the way that was too far.
+  expect_equal(of(c(-5, -1, 300)), list(asked = c(Inf, 0.2, 0.02), status = "going",
+                                        predicted = 300))
+  # No gain at a thousandth of the way: none is left.
+  expect_equal(of(c(-5, -1, -0.1, -0.01))$status, "converged")
+})

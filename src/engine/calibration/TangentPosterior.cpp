@@ -7,6 +7,7 @@
 #include "engine/ais/Sampler.hpp"
 #include "engine/ais/StandardNormal.hpp"
 #include "engine/calibration/Calibration.hpp"
+#include "engine/linalg/log_sum_exp.hpp"
 
 namespace amiss {
 
@@ -79,15 +80,40 @@ TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors
   return parameters_given(model, history, acting, x0.size());
 }
 
-TangentPosterior tangent_given(HistoryData data, const HistoryPriors& priors,
-                               const std::vector<HistoryParameters>& history, const VectorXd& x0,
-                               const VectorXd& run, const MatrixXd& slopes, const Context& context) {
+TangentOptimum tangent_given(HistoryData data, const HistoryPriors& priors,
+                             const std::vector<HistoryParameters>& history, const VectorXd& x0,
+                             const VectorXd& run, const MatrixXd& slopes, const Context& context) {
   const std::vector<Index> acting = acting_parameters(slopes);
   std::vector<int> settings;
   for (const HistoryParameters& point : history) settings.push_back(point.setting);
   const HistoryModel model(along_tangent(std::move(data), acting, x0, run, slopes), priors, context,
                            settings);
-  return parameters_given(model, history, acting, x0.size());
+  const Index p = static_cast<Index>(acting.size());
+  VectorXd here(p);
+  for (Index i = 0; i < p; ++i) here[i] = x0[acting[static_cast<std::size_t>(i)]];
+  const VectorXd fixed = VectorXd::Zero(p);
+  std::vector<CoefficientLikelihood> given;
+  VectorXd log_density(static_cast<Index>(history.size()));
+  for (const HistoryParameters& point : history) {
+    given.push_back(model.given(point));
+    log_density[static_cast<Index>(given.size()) - 1] = given.back().log_density(here, fixed);
+  }
+  const VectorXd weights = normalised_exp(log_density);
+  VectorXd score = -here;
+  MatrixXd curvature = MatrixXd::Identity(p, p);
+  for (std::size_t k = 0; k < given.size(); ++k) {
+    score += weights[static_cast<Index>(k)] * given[k].score(here);
+    curvature += weights[static_cast<Index>(k)] * given[k].information(fixed);
+  }
+  const MatrixXd covariance = curvature.llt().solve(MatrixXd::Identity(p, p));
+  const VectorXd top = here + covariance * score;
+  TangentOptimum out{VectorXd::Zero(x0.size()), MatrixXd::Identity(x0.size(), x0.size())};
+  for (Index i = 0; i < p; ++i) {
+    const Index row = acting[static_cast<std::size_t>(i)];
+    out.mean[row] = top[i];
+    for (Index j = 0; j < p; ++j) out.covariance(row, acting[static_cast<std::size_t>(j)]) = covariance(i, j);
+  }
+  return out;
 }
 
 }  // namespace amiss

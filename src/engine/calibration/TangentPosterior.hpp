@@ -22,10 +22,19 @@ TangentPosterior tangent_posterior(HistoryData data, const HistoryPriors& priors
                                    const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes, int draws,
                                    const AisOptions& options, const Context& context);
 
-/// The same with points of error and discrepancy that are known, each of equal weight.
-TangentPosterior tangent_given(HistoryData data, const HistoryPriors& priors,
-                               const std::vector<HistoryParameters>& history, const Eigen::VectorXd& x0,
-                               const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes,
-                               const Context& context);
+/// The top of a parabola and the inverse of its curvature.
+struct TangentOptimum {
+  Eigen::VectorXd mean;        ///< P: of the parameters
+  Eigen::MatrixXd covariance;  ///< P x P
+};
+
+/// With points (V_k) of error and discrepancy that are known: where a Gauss-Newton step leads from x0 on
+///     l(x) = log mean_k N(y; f(x), V_k) + log N(x; 0, I),
+///     grad l = sum_k w_k [J' V_k^-1 (y - f0)] - x0,  w_k = N(y; f0, V_k) / sum of them,
+/// its curvature I + sum_k w_k J' V_k^-1 J. A short step on that way raises l.
+TangentOptimum tangent_given(HistoryData data, const HistoryPriors& priors,
+                             const std::vector<HistoryParameters>& history, const Eigen::VectorXd& x0,
+                             const Eigen::VectorXd& run, const Eigen::MatrixXd& slopes,
+                             const Context& context);
 
 }  // namespace amiss

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "calibration_helpers.hpp"
 #include "engine/calibration/TangentPosterior.hpp"
+#include "engine/linalg/log_sum_exp.hpp"
 
 namespace amiss {
 namespace {
@@ -36,6 +38,35 @@ TEST(TangentPosterior, OfALinearSimulatorIsExact) {
   }
   EXPECT_LT((own.mean - mean).norm(), 1e-9);
   EXPECT_LT((own.covariance - (second - mean * mean.transpose())).norm(), 1e-9);
+}
+
+// The step is that of Newton with the curvature of each point alone: its score is the gradient of the mean
+// density, by differences.
+TEST(TangentGiven, ScoreIsTheGradientOfTheMeanDensity) {
+  HistoryData data = make_data();
+  const MatrixXd slopes = normal_matrix(kN, 2, 511);
+  const Eigen::Vector2d x0(0.3, -0.8);
+  const VectorXd run = normal_vector(kN, 512);
+  data.y = run + slopes * Eigen::Vector2d(0.05, 0.02) + 0.3 * normal_vector(kN, 513);
+  const HistoryPriors priors = make_priors(kError);
+  const std::vector<HistoryParameters> history =
+      tangent_posterior(data, priors, x0, run, slopes, 5, AisOptions(), Context()).history;
+  HistoryData line = data;
+  line.y += slopes * x0 - run;
+  line.basis = slopes;
+  const HistoryModel model(line, priors, Context());
+  const auto value = [&](const VectorXd& x) {
+    VectorXd each(static_cast<Index>(history.size()));
+    for (std::size_t k = 0; k < history.size(); ++k)
+      each[static_cast<Index>(k)] = model.log_likelihood(history[k], x, VectorXd::Zero(2));
+    return log_mean_exp(each) - 0.5 * x.squaredNorm();
+  };
+  const TangentOptimum step = tangent_given(data, priors, history, x0, run, slopes, Context());
+  const VectorXd score = step.covariance.ldlt().solve(step.mean - x0);
+  for (Index i = 0; i < 2; ++i) {
+    const VectorXd by = 1e-5 * VectorXd::Unit(2, i);
+    EXPECT_NEAR(score[i], (value(x0 + by) - value(x0 - by)) / 2e-5, 1e-5 * (1 + std::abs(score[i])));
+  }
 }
 
 TEST(TangentPosterior, AParameterThatChangesNothingKeepsItsPrior) {
