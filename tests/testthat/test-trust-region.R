@@ -90,7 +90,7 @@ test_that("a model at a lower mode than its run of least squares is searched aga
   expect_false(amiss:::misses_least(moved, checked$fits))
 })
 
-test_that("a search goes on if the bent line gains nearby, though its optimum was looked for too far", {
+test_that("a search goes on if the bent line gains nearer than where its optimum was sought", {
   m <- linear_measurements()
   model <- amiss:::new_model(list(linear_simulator()), list(amiss:::loop_record(m, quick_ais)))
   context <- amiss:::new_context(1, 1, list())
