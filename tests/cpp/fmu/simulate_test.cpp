@@ -1,7 +1,9 @@
 #include "fmu/simulate.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
 
@@ -13,9 +15,19 @@ namespace {
 
 Library house_library(int version) { return Library(version == 2 ? HOUSE_2 : HOUSE_3); }
 
+// Tests run side by side: each process has a folder of its own, written once.
+const std::string& house_resources() {
+  static const std::string folder = [] {
+    const std::string made = testing::TempDir() + "amiss_house_" + std::to_string(getpid());
+    std::filesystem::create_directories(made);
+    std::ofstream(made + "/start.txt") << "20\n";
+    return made;
+  }();
+  return folder;
+}
+
 Origin house_origin(int version) {
-  const std::string folder = testing::TempDir();
-  std::ofstream(folder + "/start.txt") << "20\n";
+  const std::string& folder = house_resources();
   return {version, "{house}", folder, "house", false};
 }
 
