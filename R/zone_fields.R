@@ -135,7 +135,8 @@ column_fields <- function(x) {
 }
 
 check_zone <- function(zone, name = "zone", call = rlang::caller_env()) {
-  if (was_checked(zone, "zone")) return(invisible(zone))
+  present(zone, call)
+  if (was_checked(zone, "zone")) return(invisible(TRUE))
   check_object(zone, "amiss_zone", name, "Make one with {.fn zone}.", call = call)
   check_fields(zone, zone_fields$zone, "zone", call)
   for (one in zone$components) check_component(one, call)
