@@ -320,9 +320,10 @@ doubt_sentences <- function(comparison) {
   edge <- comparison$tables$parameters[comparison$tables$parameters$at_edge, ]
   at_edge <- vapply(split(edge$label, factor(edge$model, unique(edge$model))), listed, "")
   c(of_each, if (nrow(edge)) {
-    sprintf(paste("At the edge of what was thought possible: %s. Widen these priors, or suspect",
-                  "that the parameters make up for something else."),
-            paste0(names(at_edge), ": ", at_edge, collapse = "; "))
+    sprintf("At the edge of what was thought possible: %s. %s for something else.",
+            paste0(names(at_edge), ": ", at_edge, collapse = "; "),
+            if (nrow(edge) == 1) "Widen this prior, or suspect that the parameter makes up"
+            else "Widen these priors, or suspect that the parameters make up")
   })
 }
 

@@ -473,10 +473,12 @@ remaining_sentences <- function(upgrade) {
       sprintf("With finer steps of the simulator %s: %s biased by its steps.", moved,
               if (length(step_moved(model)) > 1) "these values are" else "this value is"),
     vapply(group_words(model$attribution), paste0, "", "."),
-    if (length(edge)) sprintf(paste("At the edge of what was thought possible: %s. Widen these",
-                                    "ranges, or suspect that these parameters make up for",
-                                    "something else."),
-                              listed(edge))
+    if (length(edge)) {
+      sprintf("At the edge of what was thought possible: %s. %s for something else.", listed(edge),
+              if (length(edge) == 1)
+                "Widen this range, or suspect that the parameter makes up"
+              else "Widen these ranges, or suspect that these parameters make up")
+    }
     else "No parameter is at the edge of its range.",
     sprintf("The search stopped because %s%s.",
             upgrade$stopped_reason,

@@ -373,10 +373,7 @@ predict.amiss_emulator <- function(object, newdata, ...) {
                     i = "The emulator knows nothing there; run the simulator."))
     }
   }
-  unit <- vapply(names(object$parameters),
-                 function(n) prior_cdf(object$parameters[[n]]$prior, newdata[, n]),
-                 numeric(nrow(newdata)))
-  unit <- matrix(unit, nrow(newdata))
+  unit <- values_to_unit(newdata[, names(object$parameters), drop = FALSE], object$parameters)
   beyond <- which(!in_region(object$processes$region, unit))
   if (length(beyond)) {
     abort_input(c(paste("Row {beyond[1]} of {.arg newdata} lies outside the region that the",

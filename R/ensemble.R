@@ -369,6 +369,12 @@ unit_to_values <- function(unit, parameters) {
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
 }
 
+values_to_unit <- function(values, parameters) {
+  unit <- vapply(seq_along(parameters), function(p) prior_cdf(parameters[[p]]$prior, values[, p]),
+                 numeric(nrow(values)))
+  matrix(unit, nrow(values), length(parameters))
+}
+
 # `region`: where the runs lie, if not everywhere; `over_priors`: the emulator of runs that do;
 # `hours`: times of the rows, if known; `held_out`: given runs at the validation rows.
 new_ensemble <- function(parameters, unit, values, outputs, simulator, seed, region = NULL,

@@ -318,6 +318,8 @@ check_score <- function(fits) {
 }
 
 with_fit <- function(model, fits, level, rounds, context) {
+  if (is.null(fits[[1]]$exchanges))
+    fits <- over_orders(model, fits, joint_unit(model, fits), context$seed)
   best <- best_runs(model)
   fits <- Map(function(fit, best) {
     fit$best <- best

@@ -40,7 +40,8 @@ new_joint <- function(fits) {
          log_evidence = first$log_evidence, standard_error = first$standard_error,
          interval = first$interval, check = joint_check(fits),
          trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
-         runs_made = first$runs_made, modes = first$modes, seed = first$seed),
+         runs_made = first$runs_made, modes = first$modes, exchanges = first$exchanges,
+         seed = first$seed),
     class = "amiss_joint")
 }
 

@@ -4,7 +4,10 @@
 # list(model, modes, agree): the base model after scouts and searches, the best mode first.
 find_modes <- function(model, context) {
   model <- with_scouts(model, context)
-  more_modes(model, list(), start_runs(model), context)
+  starts <- start_runs(model)
+  first <- more_modes(model, list(), starts[1], context)
+  model <- with_exchanges(first$model, first$modes[[1]], context)
+  more_modes(model, first$modes, starts[-1], context)
 }
 
 # Searches beside those that are known, until a second one ends at the best mode: list(model, modes,
@@ -15,7 +18,7 @@ more_modes <- function(model, modes, starts, context, begin = begun_from) {
     if (is_spent(context) && length(modes)) break
     search <- run_search(begin(model, start, modes, context), context)
     model <- search$model
-    modes <- c(modes, list(search))
+    modes <- c(modes, list(known_image(model, search, modes) %||% search))
     if (length(modes) < 2) next
     ranked <- ranked_modes(model, modes, context)
     model <- ranked$model

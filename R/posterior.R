@@ -254,17 +254,25 @@ parameter_modes <- function(fit, name) {
   })
 }
 
-# A sentence for each parameter of several modes: its median and interval hold over none of them.
+# A sentence for each parameter of several modes: its median and interval hold over none of them;
+# and one for those that may exchange their values.
 mode_words <- function(fit) {
-  unlist(lapply(names(drawn_parameters(fit)), function(name) {
+  declared <- drawn_parameters(fit)
+  label <- stats::setNames(distinct_labels(declared), names(declared))
+  several <- lapply(names(declared), function(name) {
     modes <- parameter_modes(fit, name)
     if (length(modes) < 2) return(NULL)
     ends <- vapply(modes, function(mode) {
       sprintf("%s (%s)", interval_words(mode$lower95, mode$upper95), percent(mode$share))
     }, "")
-    sprintf("%s has %d modes: %s. Its median and interval describe none of them.", name,
+    sprintf("%s has %d modes: %s. Its median and interval describe none of them.", label[[name]],
             length(modes), listed(ends))
-  }))
+  })
+  exchanges <- lapply(fit$exchanges, function(pair) {
+    sprintf("%s may exchange their values, and the simulation stays the same.",
+            listed(label[pair]))
+  })
+  unlist(c(several, exchanges))
 }
 
 posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, cor = TRUE)$cor

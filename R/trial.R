@@ -226,7 +226,9 @@ over_priors <- function(model, context) {
 searched_again <- function(trial, present, context) {
   if (trial$level == "given") return(trial)
   before <- runs_spent(context)
-  found <- list(model = trial, modes = list(own_mode(trial, context)), agree = FALSE)
+  own <- own_mode(trial, context)
+  trial <- with_exchanges(trial, own, context)
+  found <- list(model = trial, modes = list(own), agree = FALSE)
   for (z in far_points(trial, context)) {
     made <- with_runs(found$model, rbind(z), context)
     found$model <- made$model

@@ -27,3 +27,17 @@ squared_simulator <- function() {
   function_simulator(function(values, drivers) 20 + values[["a"]]^2 * drivers[, "Te"],
                      free("a", uniform(-1, 1)), boundary = "Te")
 }
+
+# Outflow of a store for an inflow that is constant over an hour.
+routed <- function(inflow, time) {
+  kept <- if (time > 0) exp(-1 / time) else 0
+  as.numeric(stats::filter((1 - kept) * inflow, kept, "recursive"))
+}
+
+# Two stores in a row: output does not know which of them is the quick one.
+stores_simulator <- function(first = free("first", uniform(0.5, 12), "h"),
+                             second = free("second", uniform(0.5, 12), "h")) {
+  function_simulator(function(values, drivers) {
+    20 + 8 * routed(routed(drivers[, "Te"], values[["first"]]), values[["second"]])
+  }, first, second, boundary = "Te")
+}
