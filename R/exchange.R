@@ -2,15 +2,36 @@
 # emulator look at one order of them, and draws are spread over all.
 
 # The model with `exchanges`: pairs of parameters of one unit whose exchange changes none of the
-# runs nearest to the record. Only pairs that lie apart at the mode, as its search sees it, are
-# looked at.
+# runs nearest to the record; and `images`, the runs at the mode with another pair exchanged. Only
+# pairs that lie apart at the mode, as its search sees it, are looked at.
 with_exchanges <- function(model, mode, context) {
   unit <- vapply(model$parameters, `[[`, "", "unit")
   pairs <- which(outer(unit, unit, "==") & upper.tri(diag(length(unit))), arr.ind = TRUE)
   model$exchanges <- Filter(function(pair) is_apart(model, mode, pair), asplit(unname(pairs), 1))
+  model$images <- integer()
   model <- with_unnoticed(model, mode$at, context)
+  images <- model$images
   nearest <- utils::head(order(squared_misfit(model)), rules$first_check)
-  with_unnoticed(model, setdiff(nearest, mode$at), context)
+  model <- with_unnoticed(model, setdiff(nearest, mode$at), context)
+  model$images <- images
+  model
+}
+
+# Where two parts of a model are alike, its other modes lie near to where they have exchanged a
+# parameter. If the simulator gives its slopes, searches from there cost a few runs each:
+# list(model, modes, agree) with what they find beside the only mode that is known.
+from_images <- function(found, context) {
+  found$model <- with_exchanges(found$model, found$modes[[1]], context)
+  for (at in found$model$images) {
+    slopes <- given_slopes(found$model, found$model$runs$z[at, ])
+    if (is.null(slopes) || is_spent(context)) break
+    search <- begin_search(found$model, at, slopes, 0, alone = TRUE)
+    search$known <- found$modes
+    search <- run_search(search, context)
+    found$model <- search$model
+    if (!has_arrived(search)) found$modes <- c(found$modes, list(search))
+  }
+  found
 }
 
 is_apart <- function(model, mode, pair) {
@@ -19,7 +40,7 @@ is_apart <- function(model, mode, pair) {
   isTRUE(sum(apart * solve(conditioned(mode$covariance), apart)) > length(apart))
 }
 
-# Of the exchanges those that change none of some runs.
+# Of the exchanges those that change none of some runs; the others' runs are `images`.
 with_unnoticed <- function(model, runs, context) {
   z <- model$runs$z[runs, , drop = FALSE]
   images <- lapply(model$exchanges,
@@ -33,8 +54,9 @@ with_unnoticed <- function(model, runs, context) {
   from <- unlist(lapply(possible, function(fine) runs[fine]))[seq_along(made$at)]
   outputs <- model$runs$outputs
   change <- over_noise(model, outputs[, made$at, drop = FALSE] - outputs[, from, drop = FALSE])
-  noticed <- unique(of[!(seq_along(of) %in% which(change < rules$off_change))])
-  model$exchanges <- model$exchanges[setdiff(seq_along(images), noticed)]
+  is_same <- seq_along(of) %in% which(change < rules$off_change)
+  model$exchanges <- model$exchanges[setdiff(seq_along(images), of[!is_same])]
+  model$images <- made$at[!is_same[seq_along(made$at)]]
   model
 }
 

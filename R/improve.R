@@ -4,9 +4,9 @@
 
 # How precisely the sampler works: to see where a posterior lies, and for a result.
 verified_ais <- list(pilot_chains = 200, groups = 6, max_groups = 8, max_sweeps = 12,
-                     precision = 0.2, gradient = FALSE)
+                     precision = 0.2, gradient = TRUE)
 rough_ais <- list(pilot_chains = 128, groups = 2, max_groups = 4, max_sweeps = 8, precision = 0.5,
-                  gradient = FALSE, importance_draws = 0)
+                  gradient = TRUE, importance_draws = 0)
 
 # What searches know, the best first: the run of the mode; of all of them the run of least squares,
 # and its slopes.
@@ -365,21 +365,32 @@ not_agreed <- function(trust, modes) {
 }
 
 # Whether a second search ended in the region of the posterior, as seen in the end; and how many
-# ended at a place as probable as the draws of the posterior that were run, but without draws: a
-# mode that was lost.
+# ended at a mode that was lost: it has no draws, though it holds a share of the posterior that
+# counts.
 confirmed_modes <- function(model, modes, fits) {
   modes$agree <- modes$agree || sum(straight_distance(model)[modes$ends] <= 1) > 1
-  z <- t(from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$space))
+  z <- from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$space)
   empty <- !mapply(function(at, covariance) {
-    apart <- forwardsolve(t(chol(covariance)), z - model$runs$z[at, ])
-    any(colSums(apart^2) < 4 * (nrow(z) + 4))
+    apart <- forwardsolve(t(chol(covariance)), t(z) - model$runs$z[at, ])
+    any(colSums(apart^2) < 4 * (nrow(apart) + 4))
   }, modes$ends, modes$covariances)
-  value <- values_under(model, fits, c(model$checked$at, modes$ends[empty]))
-  drawn <- seq_along(model$checked$at)
-  typical <- stats::median(rep(value[drawn], model$checked$times))
-  modes$lost <- sum(value[-drawn] > typical - rules$same_height)
+  modes$lost <- sum(share_of_modes(model, fits, modes$ends[empty], modes$covariances[empty]) >
+                      rules$lost_share)
   modes$covariances <- NULL
   modes
+}
+
+# The mass of modes over that of the posterior's draws, both as normal ones: the density at the peak
+# times the root of the determinant of the covariance. The density at the peak of the draws is that
+# of their median, by the median of chi^2.
+share_of_modes <- function(model, fits, ends, covariances) {
+  z <- from_unit(joint_unit(model, fits), model$space)
+  drawn <- stats::cov.wt(z, fits[[1]]$weights)$cov
+  value <- values_under(model, fits, c(model$checked$at, ends))
+  of_draws <- seq_along(model$checked$at)
+  peak <- stats::median(rep(value[of_draws], model$checked$times)) + stats::qchisq(0.5, ncol(z)) / 2
+  half_log_det <- function(covariance) sum(log(diag(chol(conditioned(covariance)))))
+  exp(value[-of_draws] + vapply(covariances, half_log_det, 0) - peak - half_log_det(drawn))
 }
 
 # log posterior density of runs, by draws of error and discrepancy of calibrations.

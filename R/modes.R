@@ -5,9 +5,8 @@
 find_modes <- function(model, context) {
   model <- with_scouts(model, context)
   starts <- start_runs(model)
-  first <- more_modes(model, list(), starts[1], context)
-  model <- with_exchanges(first$model, first$modes[[1]], context)
-  more_modes(model, first$modes, starts[-1], context)
+  first <- from_images(more_modes(model, list(), starts[1], context), context)
+  more_modes(first$model, first$modes, starts[-1], context)
 }
 
 # Searches beside those that are known, until a second one ends at the best mode: list(model, modes,

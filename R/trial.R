@@ -226,9 +226,8 @@ over_priors <- function(model, context) {
 searched_again <- function(trial, present, context) {
   if (trial$level == "given") return(trial)
   before <- runs_spent(context)
-  own <- own_mode(trial, context)
-  trial <- with_exchanges(trial, own, context)
-  found <- list(model = trial, modes = list(own), agree = FALSE)
+  found <- list(model = trial, modes = list(own_mode(trial, context)), agree = FALSE)
+  found <- from_images(found, context)
   for (z in far_points(trial, context)) {
     made <- with_runs(found$model, rbind(z), context)
     found$model <- made$model
@@ -237,7 +236,7 @@ searched_again <- function(trial, present, context) {
     found <- more_modes(made$model, found$modes, made$at, context, begun_alone)
     if (found$agree) break
   }
-  trial$runs <- found$model$runs
+  trial[c("runs", "exchanges")] <- found$model[c("runs", "exchanges")]
   trial$modes <- told_modes(found)
   counting <- counting_modes(found$modes)
   ends <- vapply(counting, `[[`, 0, "at")

@@ -74,3 +74,21 @@ test_that("a store that a mechanism brings is found in either order", {
   expect_true(upgrade$models[[2]]$fit$trust$trusted)
   expect_identical(tidy(upgrade)$modes, c(2L, 2L))
 })
+
+test_that("a mode without draws is weighed by its mass", {
+  m <- measured_run(squared_simulator(), c(a = 0.6))
+  context <- search_context()
+  found <- amiss:::find_modes(searched_model(squared_simulator(), m), context)
+  model <- amiss:::with_modes(found$model, found$modes[1], 1)
+  model <- amiss:::verify_model(model, context)
+  at <- found$modes[[1]]$at
+  # The mirror image has the same mass; one that is less probable by e has less by e.
+  other <- amiss:::with_runs(model, -model$runs$z[at, , drop = FALSE], context)
+  share <- function(covariance) {
+    amiss:::share_of_modes(other$model, list(model$fit), other$at, list(covariance))
+  }
+  covariance <- found$modes[[1]]$covariance
+  # Of ten runs at draws the median density is known to half a nat.
+  expect_lt(abs(log(share(covariance))), 0.7)
+  expect_equal(share(covariance / 4), share(covariance) / 2, tolerance = 1e-6)
+})
