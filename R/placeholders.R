@@ -158,12 +158,9 @@ fill_text <- function(compiled, values, width, place, call = rlang::caller_env()
 
 slot_text <- function(slot, values, width, place, call) {
   value <- evaluate_arithmetic(slot$call, values)
-  why <- if (!is.finite(value)) paste0("it is ", value)
-  text <- if (is.null(why)) tryCatch(number_text(value, slot$format, width), error = function(e) {
-    why <<- conditionMessage(e)
-    NULL
-  })
-  if (!is.null(text)) return(text)
+  text <- if (is.finite(value)) tryCatch(number_text(value, slot$format, width), error = identity)
+  if (is.character(text)) return(text)
+  why <- if (is.null(text)) paste0("it is ", value) else conditionMessage(text)
   abort_input(c("{.val {slot$text}} in {place} cannot be written at {point_words(values)}.",
                 x = "Its value is {signif(value, 8)}; {why}.",
                 i = paste("Widen its format, as in {.val {{{{k:%12.5e}}}}}, or narrow the priors",

@@ -102,18 +102,17 @@ try_to_run <- function(plan, job, folder) {
   for (attempt in 0:plan$simulator$retries) {
     unlink(folder, recursive = TRUE)
     began <- elapsed()
-    failed <- NULL
     value <- tryCatch({
       make_folder(plan, job, folder)
       run_program(plan, job, folder)
-    }, error = function(e) failed <<- e)
-    if (is.null(failed)) {
+    }, error = identity)
+    if (!inherits(value, "error")) {
       keep_good(plan, job, folder)
       return(list(value = value, seconds = elapsed() - began))
     }
   }
-  said <- last_words(plan$steps, failed$step %||% length(plan$steps), folder)
-  why <- cli::ansi_strip(conditionMessage(failed))
+  said <- last_words(plan$steps, value$step %||% length(plan$steps), folder)
+  why <- cli::ansi_strip(conditionMessage(value))
   c(list(why = why),
     keep_failed(folder, file.path(plan$simulator$cache, paste0("failed-", job$key))),
     said = list(said))

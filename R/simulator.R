@@ -430,19 +430,20 @@ simulate_measured <- function(simulator, values, measurements, uses, threads,
                               call = rlang::caller_env()) {
   check_driver_columns(simulator, measurements, call)
   rows <- which(measurements$use %in% uses & !is.na(measurements$y))
-  out <- matrix(NaN, length(measurements$y), nrow(values))
   pieces <- simulated_rows(measurements, rows)
   over <- if (length(pieces) > 1) paste0(" (", length(pieces), " segments)")
-  counting_runs(nrow(values), function(part) {
+  out <- counting_runs(nrow(values), function(part) {
+    out <- matrix(NaN, length(measurements$y), nrow(values))
     counted(paste0("runs of the simulator", over), length(pieces) * nrow(values),
             for (i in seq_along(pieces)) {
               within <- pieces[[i]]
               fine <- part(simulate_rows(simulator, values, measurements$raw, within,
                                          threads, call))
               averaged <- block_means(fine, measurements$block[within], measurements$per_step)
-              out[as.integer(rownames(averaged)), ] <<- averaged
+              out[as.integer(rownames(averaged)), ] <- averaged
               piece_done(i * nrow(values))
             })
+    out
   })
   out[rows, , drop = FALSE]
 }

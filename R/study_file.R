@@ -94,12 +94,12 @@ noted_tags <- function(text, tags) {
 
 # Aliases can make a short text a huge tree: the walk stops at the first value too many.
 check_study_size <- function(study, refuse) {
-  values <- 0
-  walk <- function(x, depth) {
-    values <<- values + length(x)
+  walk <- function(x, depth, before) {
+    values <- before + length(x)
     if (depth > deepest_study) refuse(paste("It is nested deeper than", deepest_study, "levels."))
     if (values > largest_study) refuse(paste("It holds more than", largest_study, "values."))
-    if (is.list(x)) for (part in x) walk(part, depth + 1)
+    if (is.list(x)) for (part in x) values <- walk(part, depth + 1, values)
+    values
   }
-  walk(study, 1)
+  walk(study, 1, 0)
 }

@@ -42,13 +42,12 @@ check_time_options <- function(format, zone, call) {
 }
 
 # Listed once for a session: each time OlsonNames() walks through a tree of folders.
-zone_names <- local({
-  names <- NULL
-  function() {
-    if (is.null(names)) names <<- OlsonNames()
-    names
-  }
-})
+known_zones <- new.env(parent = emptyenv())
+
+zone_names <- function() {
+  if (is.null(known_zones$names)) known_zones$names <- OlsonNames()
+  known_zones$names
+}
 
 # Text, plain numbers, or one of the classes that parse_time() reads.
 plain_time <- function(values, name, call) {
