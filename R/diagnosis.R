@@ -473,6 +473,7 @@ remaining_sentences <- function(upgrade) {
       sprintf("With finer steps of the simulator %s: %s biased by its steps.", moved,
               if (length(step_moved(model)) > 1) "these values are" else "this value is"),
     vapply(group_words(model$attribution), paste0, "", "."),
+    mode_words(model$fit),
     if (length(edge)) {
       sprintf("At the edge of what was thought possible: %s. %s for something else.", listed(edge),
               if (length(edge) == 1)

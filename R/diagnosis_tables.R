@@ -34,9 +34,16 @@ parameters_words <- function(fit) {
   rows <- parameter_rows(fit)
   data.frame(
     name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit),
-    median = short(rows$median, 3), "95 % interval" = interval_words(rows$lower95, rows$upper95, 3),
+    median = short(rows$median, 3), "95 % interval" = intervals_words(fit),
     "range thought possible" = interval_words(rows$prior_lower, rows$prior_upper, 3),
     note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
+}
+
+# The 95 % interval of each parameter, or those of its modes.
+intervals_words <- function(fit) {
+  modes <- mode_rows(fit)
+  words <- interval_words(modes$lower95, modes$upper95, 3)
+  unname(vapply(split(words, factor(modes$name, unique(modes$name))), listed, "", "or"))
 }
 
 scores_table <- function(upgrade) {

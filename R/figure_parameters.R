@@ -14,12 +14,14 @@ figure_parameters <- function(fits) {
   table$panel <- factor(table$panel, unique(table$panel))
   table$row <- factor(table$stage, rev(levels(table$stage)))
   edge <- table[table$at_edge, ]
+  modes <- stage_table(fits, mode_rows)
+  modes <- merge(modes, table[c("stage", "label", "panel", "row")])
   figure <- ggplot2::ggplot(table, ggplot2::aes(y = .data$row, colour = .data$stage)) +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$prior_lower, xmax = .data$prior_upper),
                             colour = "grey88", linewidth = 9) +
-    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95),
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), modes,
                             linewidth = 1.6) +
-    ggplot2::geom_point(ggplot2::aes(.data$median), size = 3.6) +
+    ggplot2::geom_point(ggplot2::aes(.data$median), modes, size = 3.6) +
     ggplot2::geom_point(ggplot2::aes(.data$median, shape = "at the edge of its prior"), edge,
                         colour = "black", size = 6, stroke = 1.1) +
     ggplot2::scale_shape_manual(values = c("at the edge of its prior" = 1)) +
@@ -27,9 +29,12 @@ figure_parameters <- function(fits) {
     ggplot2::coord_cartesian(clip = "off") +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 2, scales = "free",
                         labeller = wrap_strips(2)) + stage_scales() +
-    figure_titles(parameters_title(table), paste("Grey: what was thought possible (prior). Points",
-                                                 "and lines: what the measurements say, with 95 %",
-                                                 "intervals.")) +
+    figure_titles(parameters_title(table),
+                  paste(c("Grey: what was thought possible (prior). Points and lines: what the",
+                          "measurements say, with 95 % intervals.",
+                          if (nrow(modes) > nrow(table))
+                            "Several of one colour: the record does not tell which is right."),
+                        collapse = " ")) +
     figure_theme() +
     ggplot2::theme(panel.grid.major.y = ggplot2::element_blank(),
                    axis.text.y = ggplot2::element_blank(),

@@ -181,7 +181,7 @@ site_inspection <- function(upgrade, models) {
   table <- changes_table(upgrade)
   brought <- table[table$mechanism %in% vapply(models, `[[`, "", "mechanism"), ]
   if (!NROW(brought)) return(NULL)
-  between <- sub(" to ", " and ", brought[["95 % interval"]], fixed = TRUE)
+  between <- gsub(" to ", " and ", brought[["95 % interval"]], fixed = TRUE)
   last <- upgrade$models[[length(upgrade$models)]]
   biased <- !is.null(reach_sentence(last$fit)) ||
     remaining_error(last, upgrade$measurements)$large

@@ -235,8 +235,8 @@ say_parameters <- function(fit, most) {
   say_bullets(mode_words(fit), "!")
 }
 
-# Modes of a parameter: parts of its draws that a gap keeps apart, list(lower95, upper95, share)
-# each. A gap counts if it is a quarter of the 95 % interval or more, with a twentieth of the
+# Modes of a parameter: parts of its draws that a gap keeps apart, list(median, lower95, upper95,
+# share) each. A gap counts if it is a quarter of the 95 % interval or more, with a twentieth of the
 # posterior on either side.
 parameter_modes <- function(fit, name) {
   x <- fit$values[, name]
@@ -249,30 +249,38 @@ parameter_modes <- function(fit, name) {
   gap <- which(diff(x) > 0.25 * width & below > 0.05 & below < 0.95)
   part <- findInterval(seq_along(x), gap + 1)
   lapply(unname(split(seq_along(x), part)), function(own) {
-    ends <- weighted_quantile(x[own], w[own], c(0.025, 0.975))
-    list(lower95 = ends[1], upper95 = ends[2], share = sum(w[own]))
+    q <- weighted_quantile(x[own], w[own], c(0.5, 0.025, 0.975))
+    list(median = q[1], lower95 = q[2], upper95 = q[3], share = sum(w[own]))
   })
 }
 
-# A sentence for each parameter of several modes: its median and interval hold over none of them;
-# and one for those that may exchange their values.
+# A row for each mode of each parameter.
+mode_rows <- function(fit) {
+  label <- distinct_labels(drawn_parameters(fit))
+  do.call(rbind, lapply(names(label), function(name) {
+    modes <- do.call(rbind.data.frame, parameter_modes(fit, name))
+    data.frame(name, label = label[[name]], modes)
+  }))
+}
+
+# A sentence for each parameter of several modes, and one for those that may exchange their values.
 mode_words <- function(fit) {
-  declared <- drawn_parameters(fit)
-  label <- stats::setNames(distinct_labels(declared), names(declared))
-  several <- lapply(names(declared), function(name) {
+  label <- distinct_labels(drawn_parameters(fit))
+  several <- lapply(names(label), function(name) {
     modes <- parameter_modes(fit, name)
     if (length(modes) < 2) return(NULL)
     ends <- vapply(modes, function(mode) {
       sprintf("%s (%s)", interval_words(mode$lower95, mode$upper95), percent(mode$share))
     }, "")
-    sprintf("%s has %d modes: %s. Its median and interval describe none of them.", label[[name]],
-            length(modes), listed(ends))
+    sprintf("The posterior of %s has %d modes: %s.", label[[name]], length(modes), listed(ends))
   })
+  several <- unlist(several)
   exchanges <- lapply(fit$exchanges, function(pair) {
-    sprintf("%s may exchange their values, and the simulation stays the same.",
+    sprintf("If %s exchange their values, nothing changes: no record tells which is which.",
             listed(label[pair]))
   })
-  unlist(c(several, exchanges))
+  c(several, if (length(several)) "Median and interval describe no mode.",
+    unlist(exchanges))
 }
 
 posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, cor = TRUE)$cor

@@ -39,7 +39,7 @@ test_that("a posterior holds both orders of two stores, and the evidence is that
   expect_identical(tidy(both)$modes, c(2L, 2L))
   # Three standard errors of the share of a thousand draws.
   expect_equal(sum(both$weights[both$values[, "first"] > 5]), 0.5, tolerance = 0.1)
-  expect_match(amiss:::mode_words(both), "first and second may exchange", all = FALSE)
+  expect_match(amiss:::mode_words(both), "If first and second exchange", all = FALSE)
   # Under priors that hold one order alone, the evidence is that of this order, in a smaller volume.
   one <- calibrated(one_order())
   error <- sqrt(both$standard_error^2 + one$standard_error^2)

@@ -46,7 +46,7 @@ test_that("a posterior of two modes says so, in the table and in words", {
   upper <- seq_len(nrow(fit$values)) %% 2 == 0
   parted$values[, "gain"] <- parted$values[, "gain"] + 0.5 * upper
   expect_identical(tidy(parted)$modes, c(1L, 2L))
-  expect_match(printed(parted), "gain has 2 modes: 0.*describe none of them")
+  expect_match(printed(parted), "posterior of gain has 2 modes: 0.*describe no mode")
   modes <- amiss:::parameter_modes(parted, "gain")
   expect_equal(vapply(modes, `[[`, 0, "share"), c(sum(w[!upper]), sum(w[upper])))
 })
