@@ -96,7 +96,7 @@ start_runs <- function(model, starts = NULL, among = seq_len(nrow(model$runs$z))
 ranked_modes <- function(model, modes, context) {
   at <- vapply(modes, `[[`, 0, "at")
   each <- vapply(modes, function(mode) values_at(model, at, mode$history, mode$moves, context), at)
-  value <- apply(each, 1, log_mean_exp)
+  value <- apply(matrix(each, length(at)), 1, log_mean_exp)
   order <- order(-value)
   modes <- Map(function(mode, value) replace(mode, "value", value), modes[order], value[order])
   for (other in modes[-1]) {

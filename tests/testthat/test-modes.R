@@ -64,6 +64,10 @@ test_that("modes are compared by the same draws, and a ridge is one mode", {
   expect_false(is.unsorted(-values))
   expect_equal(values, vapply(found$modes, `[[`, 0, "value"), tolerance = 1e-8)
   expect_true(ranked$agree)
+  # If a budget allowed one search alone, it has one mode.
+  alone <- amiss:::ranked_modes(found$model, found$modes[1], context)
+  expect_length(alone$modes, 1)
+  expect_false(alone$agree)
 })
 
 # ---- of a model that is adopted
