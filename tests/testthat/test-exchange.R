@@ -37,7 +37,7 @@ test_that("a posterior holds both orders of two stores, and the evidence is that
   both <- calibrated(stores_simulator())
   expect_true(both$trust$trusted)
   expect_identical(tidy(both)$modes, c(2L, 2L))
-  # Three standard errors of the share of a thousand draws.
+  # Some three hundred draws take an order each: they know the share to 0.03.
   expect_equal(sum(both$weights[both$values[, "first"] > 5]), 0.5, tolerance = 0.1)
   expect_match(amiss:::mode_words(both), "If first and second exchange", all = FALSE)
   # Under priors that hold one order alone, the evidence is that of this order, in a smaller volume.
@@ -82,7 +82,7 @@ test_that("a mode without draws is weighed by its mass", {
   model <- amiss:::with_modes(found$model, found$modes[1], 1)
   model <- amiss:::verify_model(model, context)
   at <- found$modes[[1]]$at
-  # The mirror image has the same mass; one that is less probable by e has less by e.
+  # The mirror image has the same mass, and a mode of half the width has half of it.
   other <- amiss:::with_runs(model, -model$runs$z[at, , drop = FALSE], context)
   share <- function(covariance) {
     amiss:::share_of_modes(other$model, list(model$fit), other$at, list(covariance))
