@@ -219,12 +219,16 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
 # Which conditions cannot be distinguished, and what would distinguish them.
 group_words <- function(attribution) {
   vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
-    sprintf(paste("%s cannot be distinguished in this record (correlation %.3f): measure while %s",
-                  "differ"),
-            listed(g$conditions), g$correlation,
+    sprintf("%s cannot be distinguished in this record%s: measure while %s differ",
+            listed(g$conditions), if (go_together(g)) sprintf(" (correlation %.3f)", g$correlation)
+                                  else "",
             if (length(g$conditions) == 2) "the two" else "they")
   }, "")
 }
+
+# Whether a correlation is why conditions cannot be distinguished: a short record may not tell weak
+# responses apart either.
+go_together <- function(group) group$correlation >= rules$confounded
 
 #' @export
 tidy.amiss_attribution <- function(x, ...) {

@@ -138,7 +138,8 @@ fit_of_record <- function(set, record, own, result) {
   posterior <- c(result$posterior, own[c("setting", "variance", "t")])
   posterior$unit <- posterior$unit[, record$parameters, drop = FALSE]
   new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept,
-          coefficients = own$coefficients, withheld = own$withheld, tangent = own$tangent,
+          coefficients = own$coefficients, withheld = own$withheld,
+          withheld_covariance = own$withheld_covariance, tangent = own$tangent,
           centre = own$centre, scale = own$scale,
           reach = stats::setNames(own$reach, format(set$control$reach, trim = TRUE)))
 }

@@ -467,8 +467,7 @@ remaining_sentences <- function(upgrade) {
         paste0(": either the stated noise is too small, or something else is missing",
                if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
       else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
-    reach_sentence(model$fit) %||%
-      if (last$large) "The parameters may make up for what is missing: their values may be biased.",
+    reach_sentence(model$fit) %||% if (last$large) bias_sentence(model$fit),
     if (!is.null(moved))
       sprintf("With finer steps of the simulator %s: %s biased by its steps.", moved,
               if (length(step_moved(model)) > 1) "these values are" else "this value is"),

@@ -32,11 +32,40 @@ changes_table <- function(upgrade) {
 
 parameters_words <- function(fit) {
   rows <- parameter_rows(fit)
-  data.frame(
+  calibrated <- data.frame(
     name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit),
-    median = short(rows$median, 3), "95 % interval" = intervals_words(fit),
-    "range thought possible" = interval_words(rows$prior_lower, rows$prior_upper, 3),
-    note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL)
+    median = short(rows$median, 3), "95 % interval" = intervals_words(fit), check.names = FALSE,
+    row.names = NULL)
+  on_site <- physical_words(fit)
+  if (!is.null(on_site)) calibrated[["on site"]] <- on_site
+  cbind(calibrated,
+        data.frame(
+          "range thought possible" = interval_words(rows$prior_lower, rows$prior_upper, 3),
+          note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL))
+}
+
+# Where physical values lie. Modes stand as they are.
+physical_words <- function(fit) {
+  physical <- physical_intervals(fit)
+  if (is.null(physical)) return(NULL)
+  of_modes <- intervals_words(fit)
+  ifelse(grepl(" or ", of_modes, fixed = TRUE), of_modes,
+         interval_words(physical$lower, physical$upper, 3))
+}
+
+# The parameters that what is missing may bias most.
+bias_sentence <- function(fit) {
+  physical <- physical_intervals(fit)
+  if (is.null(physical))
+    return("The parameters may make up for what is missing: their values may be biased.")
+  rows <- parameter_rows(fit)
+  wider <- (physical$upper - physical$lower) / (rows$upper95 - rows$lower95)
+  most <- utils::head(order(-wider), 2)
+  sprintf("The parameters may make up for what is missing: on site %s.",
+          listed(sprintf("%s may lie anywhere from %s (calibrated: %s)", rows$label[most],
+                         with_unit(interval_words(physical$lower[most], physical$upper[most], 3),
+                                   rows$unit[most]),
+                         interval_words(rows$lower95[most], rows$upper95[most], 3))))
 }
 
 # The 95 % interval of each parameter, or those of its modes.

@@ -8,6 +8,15 @@ parameters_title <- function(table) {
                count[2])
 }
 
+# Where physical values lie, of parameters that have one mode.
+physical_rows <- function(fit) {
+  physical <- physical_intervals(fit)
+  if (is.null(physical)) physical <- with(parameter_table(fit), data.frame(name, lower = lower95,
+                                                                           upper = upper95))
+  modes <- table(mode_rows(fit)$name)
+  physical[modes[physical$name] < 2, ]
+}
+
 figure_parameters <- function(fits) {
   table <- stage_table(fits, parameter_rows)
   table$panel <- axis_label(table$label, table$unit)
@@ -16,9 +25,13 @@ figure_parameters <- function(fits) {
   edge <- table[table$at_edge, ]
   modes <- stage_table(fits, mode_rows)
   modes <- merge(modes, table[c("stage", "label", "panel", "row")])
+  physical <- merge(stage_table(fits, physical_rows), table)
+  physical <- physical[physical$lower < physical$lower95 | physical$upper > physical$upper95, ]
   figure <- ggplot2::ggplot(table, ggplot2::aes(y = .data$row, colour = .data$stage)) +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$prior_lower, xmax = .data$prior_upper),
                             colour = "grey88", linewidth = 9) +
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower, xmax = .data$upper), physical,
+                            linewidth = 0.5) +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), modes,
                             linewidth = 1.6) +
     ggplot2::geom_point(ggplot2::aes(.data$median), modes, size = 3.6) +
@@ -32,6 +45,7 @@ figure_parameters <- function(fits) {
     figure_titles(parameters_title(table),
                   paste(c("Grey: what was thought possible (prior). Points and lines: what the",
                           "measurements say, with 95 % intervals.",
+                          if (nrow(physical)) "Thin lines: where the value on site may lie.",
                           if (nrow(modes) > nrow(table))
                             "Several of one colour: the record does not tell which is right."),
                         collapse = " ")) +

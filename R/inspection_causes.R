@@ -176,22 +176,22 @@ described_inspection <- function(upgrade, models) {
                           listed(conditions), upgrade$measurements$target))
 }
 
-# What the calibrated values ask to be found on site.
+# What the calibrated values ask to be found on site, where physical values lie.
 site_inspection <- function(upgrade, models) {
   table <- changes_table(upgrade)
   brought <- table[table$mechanism %in% vapply(models, `[[`, "", "mechanism"), ]
   if (!NROW(brought)) return(NULL)
-  between <- gsub(" to ", " and ", brought[["95 % interval"]], fixed = TRUE)
   last <- upgrade$models[[length(upgrade$models)]]
-  biased <- !is.null(reach_sentence(last$fit)) ||
-    remaining_error(last, upgrade$measurements)$large
+  between <- gsub(" to ", " and ", brought[["on site"]] %||% brought[["95 % interval"]],
+                  fixed = TRUE)
   values <- sprintf("%s lies between %s", brought$parameter, with_unit(between, brought$unit))
   of <- split(values, factor(brought$mechanism, unique(brought$mechanism)))
   asks <- sprintf("f %s is %s cause, %s", names(of), if (length(of) > 1) "a" else "the",
                   vapply(of, listed, ""))
   c(site = paste(c(if (length(of) == 1) sprintf("I%s: check that on site.", asks)
                    else sprintf("Check on site: i%s.", paste(asks, collapse = "; i")),
-                   if (biased) "What is still missing may bias these values.",
+                   if (is.null(brought[["on site"]]) && !is.null(reach_sentence(last$fit)))
+                     "What is still missing may bias these values.",
                    if (any(brought$parameter %in% step_moved(last)))
                      "Finer steps would move these values."), collapse = " "))
 }
@@ -289,8 +289,11 @@ group_inspections <- function(attribution) {
   groups <- Filter(function(g) g$significant, attribution$groups)
   if (!length(groups)) return(NULL)
   several <- vapply(groups, function(g) length(g$conditions) > 2, NA)
-  together <- vapply(groups, function(g) sprintf("%s go together (correlation %.2f)",
-                                                 listed(g$conditions), g$correlation), "")
+  together <- vapply(groups, function(g) {
+    if (go_together(g)) sprintf("%s go together (correlation %.2f)", listed(g$conditions),
+                                g$correlation)
+    else sprintf("a response to %s would do", listed(g$conditions, "or to"))
+  }, "")
   apart <- vapply(groups, function(g) {
     sprintf("%s changes while %s %s", g$conditions[1], listed(g$conditions[-1]),
             if (length(g$conditions) > 2) "stay as they are" else "stays as it is")

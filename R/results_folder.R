@@ -160,7 +160,7 @@ result_list.amiss_upgrade <- function(x) {
       if (!several) list(step_error = model$steps[[1]]$error),
       checked(fit), list(refinements = fit$rounds), if (!several) list(reach = as.list(fit$reach)),
       scored(model$scores),
-      list(parameters = table_rows(parameter_table(fit)), attribution = answers(model$attribution)))
+      list(parameters = table_rows(physical_table(fit)), attribution = answers(model$attribution)))
     if (several) listed$records <- lapply(names(fit$records), record_list, model)
     listed
   }

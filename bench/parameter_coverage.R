@@ -39,6 +39,8 @@ one_world <- function(seed, family, parts) {
   data.frame(family = family, seed = seed, name = table$term,
              mechanism = table$term %in% names(hidden),
              held = table$conf.low <= truth[table$term] & truth[table$term] <= table$conf.high,
+             physical = table$physical.low <= truth[table$term] &
+               truth[table$term] <= table$physical.high,
              passed = fit$check$passed, runs = fit$runs_made, seconds = proc.time()[[3]] - start)
 }
 
@@ -47,6 +49,7 @@ rows <- do.call(rbind, future.apply::future_lapply(seeds, one_world, family, par
                                                    future.seed = NULL, future.scheduling = Inf))
 write_rows(rows, option("out", "parameter_coverage.json"))
 cat(sprintf(paste("%s: intervals hold %.1f %% of %d parameters, %.1f %% of %d of mechanisms;",
-                  "%.0f runs and %.1f s a world\n"),
+                  "of physical values %.1f %% and %.1f %%; %.0f runs and %.1f s a world\n"),
             family, 100 * mean(rows$held), nrow(rows), 100 * mean(rows$held[rows$mechanism]),
-            sum(rows$mechanism), mean(rows$runs), mean(rows$seconds)))
+            sum(rows$mechanism), 100 * mean(rows$physical),
+            100 * mean(rows$physical[rows$mechanism]), mean(rows$runs), mean(rows$seconds)))

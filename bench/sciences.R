@@ -3,7 +3,7 @@
 # battery cell with two causes, a greenhouse and a photovoltaic module whose causes the catalogues
 # do not hold, a town where nothing is missing, a river under wind, glucose with two causes, a
 # reactor that fouls, a drug that tissue takes up. What is named, what was hidden, and how many of
-# the true values lie in their 95 % intervals.
+# the true values lie in their 95 % intervals (physical ones, and those of calibrated values).
 # Usage: Rscript bench/sciences.R
 #          [--records reservoir,cell,greenhouse,town,river,glucose,reactor,module,drug]
 #          [--seed 1] [--runs 120] [--out FILE]
@@ -38,7 +38,8 @@ score_record <- function(name) {
     adopted = listed(vapply(adopted, function(m) sprintf("%s (%s)", m$mechanism, m$verdict), "")),
     answers_to = listed(answers$boundary[answers$significant][1][any(answers$significant)]),
     verdict = summary(upgrade)$verdict, log10_bf = upgrade$gain$log10_bf, parameters = nrow(own),
-    covered = sum(own$conf.low <= true & true <= own$conf.high),
+    covered = sum(own$physical.low <= true & true <= own$physical.high),
+    calibrated_covered = sum(own$conf.low <= true & true <= own$conf.high),
     rmse_before = upgrade$gain$rmse_validation[1], rmse_after = upgrade$gain$rmse_validation[2],
     noise = record$measurements$noise_sd, runs = upgrade$runs_total,
     seconds = proc.time()[["elapsed"]] - started)

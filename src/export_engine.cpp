@@ -143,7 +143,8 @@ struct Records {
 Rcpp::List list_record(const RecordPosterior& record, const HistoryModel& model) {
   using Rcpp::_;
   Rcpp::List out = Rcpp::List::create(
-      _["coefficients"] = record.coefficients, _["withheld"] = record.withheld, _["reach"] = record.reach,
+      _["coefficients"] = record.coefficients, _["withheld"] = record.withheld,
+      _["withheld_covariance"] = record.withheld_covariance, _["reach"] = record.reach,
       _["tangent"] = convert::simulator_list(record.tangent),
       _["centre"] = VectorXd(model.centre().transpose()), _["scale"] = VectorXd(model.scale().transpose()));
   add_points(out, record.history);

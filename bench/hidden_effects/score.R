@@ -139,7 +139,7 @@ parameter_covered <- function(world, upgrade) {
   last <- amiss::tidy(upgrade$models[[length(upgrade$models)]]$fit)
   true <- world$effects[[first]]
   own <- last[last$term == names(true)[1], ]
-  own$conf.low <= true[[1]] && true[[1]] <= own$conf.high
+  own$physical.low <= true[[1]] && true[[1]] <= own$physical.high
 }
 
 # What is done today: the residuals of the calibrated base model held against each condition. The

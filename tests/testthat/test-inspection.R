@@ -14,7 +14,7 @@ test_that("what to inspect next names the value that the mechanism asks for", {
   sun <- tidy(small_upgrade())
   sun <- sun[sun$term == "sun_gain", ]
   expect_match(about(told, "site"),
-               sprintf("gain of the sun lies between %s and", short(sun$conf.low, 3)))
+               sprintf("gain of the sun lies between %s and", short(sun$physical.low, 3)))
   expect_match(about(told, "steps"), "max_steps")
   expect_setequal(names(told), c("site", "steps"))
   expect_identical(summary(untied())$inspect, told)

@@ -32,7 +32,7 @@ test_that("median and covariance are those of the weighted draws", {
 test_that("the tidy table carries labels, units and what the other methods say", {
   table <- tidy(fit, conf.level = 0.9)
   expect_named(table, c("term", "label", "unit", "estimate", "std.error", "conf.low", "conf.high",
-                        "modes"))
+                        "physical.low", "physical.high", "modes"))
   expect_identical(table$modes, c(1L, 1L))
   expect_identical(table$unit, c("K", ""))
   expect_identical(table$label, c("offset", "gain"))

@@ -168,15 +168,22 @@ RecordPosterior record_posterior(const CalibrationTarget& target, std::size_t r,
   for (Index k = 0; k < kept; ++k) points.col(k) = inputs.col(calibration.kept[static_cast<std::size_t>(k)]);
   record.emulator->predict_at(points, mean, variance);
   out.coefficients.resize(model.data().responses.cols(), kept);
-  out.withheld.resize(model.data().moves.cols(), kept);
+  const Index moves = model.data().moves.cols();
+  out.withheld.resize(moves, kept);
+  out.withheld_covariance.resize(moves * moves, kept);
   std::vector<MatrixXd> held(model.priors().reach.size());  // of each reach that is met
   for (Index k = 0; k < kept; ++k) {
     const HistoryParameters& point =
         out.history[static_cast<std::size_t>(calibration.kept[static_cast<std::size_t>(k)])];
-    out.coefficients.col(k) = model.coefficients(point, mean.row(k).transpose(), variance.row(k).transpose());
+    const HistoryModel::Coefficients given =
+        model.coefficients(point, mean.row(k).transpose(), variance.row(k).transpose());
+    out.coefficients.col(k) = given.mean;
     MatrixXd& withheld = held[static_cast<std::size_t>(point.setting / model.error_settings())];
     if (withheld.size() == 0) withheld = model.withheld(point.setting);
-    out.withheld.col(k) = withheld * out.coefficients.col(k);
+    out.withheld.col(k) = withheld * given.mean;
+    const MatrixXd root = withheld * given.root;
+    const MatrixXd covariance = root * root.transpose();
+    out.withheld_covariance.col(k) = VectorXd::Map(covariance.data(), covariance.size());
   }
   out.tangent = tangent_at(*record.emulator, inputs * posterior.weights);
   return out;

@@ -398,18 +398,30 @@ CoefficientLikelihood HistoryModel::given(const HistoryParameters& point) const 
                       factor.largest)};
 }
 
-VectorXd HistoryModel::coefficients(const HistoryParameters& point, const VectorXd& mean,
-                                    const VectorXd& variance) const {
+// The responses stand last in F, so that with the last rows and columns of L alone the covariance is
+// D^1/2 L^-T L^-1 D^1/2.
+HistoryModel::Coefficients HistoryModel::coefficients(const HistoryParameters& point, const VectorXd& mean,
+                                                      const VectorXd& variance) const {
   const WhitenedData& seen = whitened(point.setting);
   double square = 0.0;
   const VectorXd cross = shifted_cross(seen, mean - reference_, square);
   const double precision = 1.0 / point.variance;
   const Factor factor = factorise(seen, precision, point.t, variance.cwiseSqrt(), cross);
   const VectorXd solved = factor.lower.matrixL().transpose().solve(factor.half);
-  VectorXd out = VectorXd::Zero(data_.responses.cols());
-  for (std::size_t j = static_cast<std::size_t>(seen.coefficients); j < factor.kept.size(); ++j) {
-    const Index k = static_cast<Index>(j);
-    out[factor.kept[j] - seen.coefficients] = precision * factor.root[k] * solved[k];
+  const Index q = seen.coefficients, acting = solved.size() - q;
+  MatrixXd root = MatrixXd::Identity(acting, acting);
+  if (acting > 0)  // Eigen looks at its first element
+    factor.lower.matrixLLT()
+        .bottomRightCorner(acting, acting)
+        .triangularView<Eigen::Lower>()
+        .transpose()
+        .solveInPlace(root);
+  const Index p = data_.responses.cols();
+  Coefficients out{VectorXd::Zero(p), MatrixXd::Zero(p, acting)};
+  for (Index j = 0; j < acting; ++j) {
+    const Index column = factor.kept[static_cast<std::size_t>(q + j)] - q;
+    out.mean[column] = precision * factor.root[q + j] * solved[q + j];
+    out.root.row(column) = factor.root[q + j] * root.row(j);
   }
   return out;
 }

@@ -93,9 +93,14 @@ class HistoryModel {
   /// The same as a function of the coefficients, for one point: cheap where many are asked for.
   CoefficientLikelihood given(const HistoryParameters& point) const;
 
-  /// Posterior mean of the coefficients of the filter columns Psi (p).
-  Eigen::VectorXd coefficients(const HistoryParameters& point, const Eigen::VectorXd& mean,
-                               const Eigen::VectorXd& variance) const;
+  /// Posterior mean (p) of the coefficients of the filter columns Psi, and a root of their covariance
+  /// (p x columns that act).
+  struct Coefficients {
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd root;
+  };
+  Coefficients coefficients(const HistoryParameters& point, const Eigen::VectorXd& mean,
+                            const Eigen::VectorXd& variance) const;
 
   /// (y - K m)' (cov y)^-1 (y - K m) for coefficients that are standard normal in the terms of `whitened`.
   double quadratic(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t) const;

@@ -159,9 +159,14 @@ TEST(Calibrate, WhatItReportsFollowsFromItsDraws) {
     const HistoryParameters& p = own.history[static_cast<std::size_t>(i)];
     VectorXd mean, variance;
     predict(joint.emulator, c.unit.row(i), mean, variance);
-    const VectorXd expected = joint.model.coefficients(p, mean, variance);
-    EXPECT_LT((own.coefficients.col(k) - expected).cwiseAbs().maxCoeff(), 1e-9);  // emulated one by one
-    EXPECT_LT((own.withheld.col(k) - joint.model.withheld(p.setting) * expected).cwiseAbs().maxCoeff(), 1e-9);
+    const HistoryModel::Coefficients expected = joint.model.coefficients(p, mean, variance);
+    const MatrixXd withheld = joint.model.withheld(p.setting);
+    EXPECT_LT((own.coefficients.col(k) - expected.mean).cwiseAbs().maxCoeff(), 1e-9);  // emulated one by one
+    EXPECT_LT((own.withheld.col(k) - withheld * expected.mean).cwiseAbs().maxCoeff(), 1e-9);
+    const MatrixXd root = withheld * expected.root;
+    const MatrixXd covariance = root * root.transpose();
+    const VectorXd columns = VectorXd::Map(covariance.data(), 4);
+    EXPECT_LT((own.withheld_covariance.col(k) - columns).cwiseAbs().maxCoeff(), 1e-9);
   }
   const GaussianSimulator tangent =
       tangent_at(joint.emulator, (c.posterior.draws * c.posterior.weights).tail(2));

@@ -194,17 +194,21 @@ TEST(HistoryModel, GivenAPointItIsTheSameFunctionOfTheCoefficients) {
   }
 }
 
-TEST(HistoryModel, CoefficientsAreThePosteriorMean) {
+TEST(HistoryModel, CoefficientsHaveThePosteriorMeanAndCovariance) {
   const HistoryData data = make_data();
   const HistoryModel model = make_model(data);
   for (int g : {5, 14, 26}) {
     for (const VectorXd& t : {kT, VectorXd(Eigen::Vector3d(0.8, 0.0, 0.1))}) {
       const MatrixXd seen =
           dense_covariance(data, at(g, t)) + data.basis * kSpread.asDiagonal() * data.basis.transpose();
-      const VectorXd expected = prior_variances(data, t).asDiagonal() * dense_psi(data, g).transpose() *
-                                seen.ldlt().solve(data.y - data.basis * kMean);
+      const MatrixXd prior = prior_variances(data, t).asDiagonal();
+      const MatrixXd across = prior * dense_psi(data, g).transpose();
+      const VectorXd mean = across * seen.ldlt().solve(data.y - data.basis * kMean);
+      const MatrixXd covariance = prior - across * seen.ldlt().solve(MatrixXd(across.transpose()));
+      const HistoryModel::Coefficients found = model.coefficients(at(g, t), kMean, kSpread);
       // Coefficients of the order of 1, rounded as above.
-      EXPECT_LT((model.coefficients(at(g, t), kMean, kSpread) - expected).cwiseAbs().maxCoeff(), 1e-9) << g;
+      EXPECT_LT((found.mean - mean).cwiseAbs().maxCoeff(), 1e-9) << g;
+      EXPECT_LT((found.root * found.root.transpose() - covariance).cwiseAbs().maxCoeff(), 1e-9) << g;
     }
   }
 }
