@@ -36,8 +36,8 @@ parameters_words <- function(fit) {
     name = rows$name, parameter = rows$label, unit = pretty_unit(rows$unit),
     median = short(rows$median, 3), "95 % interval" = intervals_words(fit), check.names = FALSE,
     row.names = NULL)
-  on_site <- physical_words(fit)
-  if (!is.null(on_site)) calibrated[["on site"]] <- on_site
+  physical <- physical_words(fit)
+  if (!is.null(physical)) calibrated[["physical value"]] <- physical
   cbind(calibrated,
         data.frame(
           "range thought possible" = interval_words(rows$prior_lower, rows$prior_upper, 3),
@@ -61,11 +61,12 @@ bias_sentence <- function(fit) {
   rows <- parameter_rows(fit)
   wider <- (physical$upper - physical$lower) / (rows$upper95 - rows$lower95)
   most <- utils::head(order(-wider), 2)
-  sprintf("The parameters may make up for what is missing: on site %s.",
+  sprintf("The parameters may make up for what is missing: the physical value of %s.",
           listed(sprintf("%s may lie anywhere from %s (calibrated: %s)", rows$label[most],
                          with_unit(interval_words(physical$lower[most], physical$upper[most], 3),
                                    rows$unit[most]),
-                         interval_words(rows$lower95[most], rows$upper95[most], 3))))
+                         interval_words(rows$lower95[most], rows$upper95[most], 3)),
+                 "and that of"))
 }
 
 # The 95 % interval of each parameter, or those of its modes.

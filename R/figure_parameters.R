@@ -11,8 +11,8 @@ parameters_title <- function(table) {
 # Where physical values lie, of parameters that have one mode.
 physical_rows <- function(fit) {
   physical <- physical_intervals(fit)
-  if (is.null(physical)) physical <- with(parameter_table(fit), data.frame(name, lower = lower95,
-                                                                           upper = upper95))
+  if (is.null(physical))
+    physical <- with(parameter_table(fit), data.frame(name, lower = lower95, upper = upper95))
   modes <- table(mode_rows(fit)$name)
   physical[modes[physical$name] < 2, ]
 }
@@ -45,7 +45,7 @@ figure_parameters <- function(fits) {
     figure_titles(parameters_title(table),
                   paste(c("Grey: what was thought possible (prior). Points and lines: what the",
                           "measurements say, with 95 % intervals.",
-                          if (nrow(physical)) "Thin lines: where the value on site may lie.",
+                          if (nrow(physical)) "Thin lines: where physical values may lie.",
                           if (nrow(modes) > nrow(table))
                             "Several of one colour: the record does not tell which is right."),
                         collapse = " ")) +

@@ -182,7 +182,7 @@ site_inspection <- function(upgrade, models) {
   brought <- table[table$mechanism %in% vapply(models, `[[`, "", "mechanism"), ]
   if (!NROW(brought)) return(NULL)
   last <- upgrade$models[[length(upgrade$models)]]
-  between <- gsub(" to ", " and ", brought[["on site"]] %||% brought[["95 % interval"]],
+  between <- gsub(" to ", " and ", brought[["physical value"]] %||% brought[["95 % interval"]],
                   fixed = TRUE)
   values <- sprintf("%s lies between %s", brought$parameter, with_unit(between, brought$unit))
   of <- split(values, factor(brought$mechanism, unique(brought$mechanism)))
@@ -190,7 +190,7 @@ site_inspection <- function(upgrade, models) {
                   vapply(of, listed, ""))
   c(site = paste(c(if (length(of) == 1) sprintf("I%s: check that on site.", asks)
                    else sprintf("Check on site: i%s.", paste(asks, collapse = "; i")),
-                   if (is.null(brought[["on site"]]) && !is.null(reach_sentence(last$fit)))
+                   if (is.null(brought[["physical value"]]) && !is.null(reach_sentence(last$fit)))
                      "What is still missing may bias these values.",
                    if (any(brought$parameter %in% step_moved(last)))
                      "Finer steps would move these values."), collapse = " "))

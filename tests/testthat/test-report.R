@@ -310,7 +310,7 @@ test_that("a report says what result.json says", {
     c(paste(short(first$rmse_validation), "\u2192", short(last$rmse_validation), "K"),
       paste(short(first$rmse_calibration), "\u2192", short(last$rmse_calibration), "K")))
   parameters <- table_with(tables, c("parameter", "unit", "median", "95 % interval",
-                                     "range thought possible"))
+                                     "physical value", "range thought possible"))
   expect_setequal(parameters[, 3], vapply(last$parameters, function(p) short(p$median, 3), ""))
   drivers <- table_with(tables, "boundary condition")
   for (condition in last$attribution) {

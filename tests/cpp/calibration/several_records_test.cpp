@@ -134,7 +134,7 @@ TEST(SeveralRecords, WhatItReportsOfEachFollowsFromItsDraws) {
     EXPECT_EQ(point.t, target.history(c.posterior.draws.col(last), r).t);
     VectorXd mean, variance;
     predict(*records[r].emulator, c.unit.row(last).segment(static_cast<Index>(r), 2), mean, variance);
-    const VectorXd expected = records[r].model->coefficients(point, mean, variance);
+    const VectorXd expected = records[r].model->coefficients(point, mean, variance).mean;
     EXPECT_LT((c.records[r].coefficients.rightCols(1) - expected).cwiseAbs().maxCoeff(), 1e-9);
     EXPECT_NEAR(c.records[r].reach.sum(), 1.0, 1e-12);
   }

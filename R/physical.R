@@ -1,0 +1,86 @@
+# Where the parameters' physical values lie. A calibrated value is the one by which the simulation
+# is nearest to the record. If what the simulator lacks does, in part, what a parameter does, the
+# calibrated value makes up for that part, because the discrepancy keeps out of it.
+#
+# With the moves E of a record (a column for a unit of each parameter) its discrepancy is
+# Psi b = Phi b - E X b: the parameters have taken E X b. Without that, their posterior is the one
+# under the whole response Phi b, if the prior is flat. Over records r, each with
+# G_r = E_r' E_r / sigma_r^2, they have moved by (I + sum G_r)^-1 sum G_r X_r b_r. Given a kept draw
+# b is normal. The interval holds that of the kept draws without the moves, and the posterior's.
+# @return A data frame with name, lower and upper, or NULL if a calibration knows no slopes.
+physical_intervals <- function(fit, level = 0.95) {
+  records <- record_fits(fit)
+  if (!all(vapply(records, knows_slopes, NA))) return(NULL)
+  parameters <- drawn_parameters(fit)
+  space <- coordinates_of(parameters)
+  moved <- moved_by_missing(records, names(parameters))
+  z <- t(from_unit(posterior_unit(fit)[records[[1]]$kept + 1L, , drop = FALSE], space))
+  tails <- c((1 - level) / 2, (1 + level) / 2)
+  ends <- vapply(seq_along(parameters), function(j) {
+    at <- z[j, ] - moved$mean[j, ] + outer(moved$sd[j, ], normal_points)
+    pmin(pmax(stats::quantile(at, tails), space$lower[j]), space$upper[j])
+  }, c(0, 0))
+  values <- unit_to_values(to_unit(ends, space), parameters)
+  of_posterior <- stats::confint(fit, level = level)[names(parameters), , drop = FALSE]
+  data.frame(name = names(parameters), lower = pmin(values[1, ], of_posterior[, 1]),
+             upper = pmax(values[2, ], of_posterior[, 2]), row.names = NULL)
+}
+
+# Equally probable ones: each draw given is as good as so many.
+normal_points <- stats::qnorm((seq_len(40) - 0.5) / 40)
+
+knows_slopes <- function(fit) {
+  !is.null(fit$emulator$moves$unit) && !is.null(fit$withheld_covariance)
+}
+
+# How far what is missing has moved the parameters, in their coordinates z: mean and standard
+# deviation (P x kept draws) given each draw.
+moved_by_missing <- function(records, names) {
+  p <- length(names)
+  unit <- numeric(p)
+  information <- diag(p)
+  score <- covariance <- 0
+  for (fit in records) {
+    own <- match(names(fit$emulator$parameters), names)
+    moves <- fit$emulator$moves
+    unit[own] <- moves$unit
+    variance <- stats::weighted.mean(fit$posterior$variance, fit$posterior$weights)
+    gram <- matrix(0, p, length(own))
+    gram[own, ] <- crossprod(moves$root) / variance
+    information[, own] <- information[, own] + gram
+    score <- score + gram %*% fit$withheld
+    covariance <- covariance + kronecker(gram, gram) %*% fit$withheld_covariance
+  }
+  way <- unit * solve(information)
+  variances <- apply(covariance, 2, function(one) rowSums((way %*% matrix(one, p)) * way))
+  list(mean = way %*% score, sd = sqrt(matrix(pmax(variances, 0), p)))
+}
+
+# The table of a fit's parameters, with the intervals of physical values if they are known.
+physical_table <- function(fit) {
+  table <- parameter_table(fit)
+  physical <- physical_intervals(fit)
+  if (!is.null(physical))
+    table[c("physical_lower", "physical_upper")] <- physical[c("lower", "upper")]
+  table
+}
+
+#' @rdname posterior
+#' @export
+tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
+  check_whole(x, "x")
+  rlang::check_dots_empty()
+  check_level(conf.level, "conf.level")
+  ends <- stats::confint(x, level = conf.level)
+  physical <- physical_intervals(x, conf.level)
+  physical <- physical[match(rownames(ends), physical$name), ]
+  declared <- drawn_parameters(x)[rownames(ends)]
+  data.frame(term = rownames(ends), label = distinct_labels(declared),
+             unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
+             std.error = unname(sqrt(diag(stats::vcov(x)))),
+             conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]),
+             physical.low = physical$lower %||% NA_real_,
+             physical.high = physical$upper %||% NA_real_,
+             modes = vapply(rownames(ends), function(name) length(parameter_modes(x, name)), 0L),
+             row.names = NULL)
+}
