@@ -219,7 +219,7 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
 # Which conditions cannot be distinguished, and what would distinguish them.
 group_words <- function(attribution) {
   vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
-    sprintf("%s cannot be distinguished in this record%s: measure while %s differ",
+    sprintf("In this record %s cannot be distinguished%s: measure while %s differ",
             listed(g$conditions), if (go_together(g)) sprintf(" (correlation %.3f)", g$correlation)
                                   else "",
             if (length(g$conditions) == 2) "the two" else "they")

@@ -69,7 +69,7 @@ test_that("a copy of the true driver does not hide it: both are named as one", {
   expect_equal(found$table$log10_bf_dropped[members], rep(group$log10_bf_dropped, 2))
   expect_match(printed(found), "driven by Tn or Tc")
   expect_match(printed(found),
-               paste("Tn and Tc cannot be distinguished in this record .correlation 1.000.:",
+               paste("In this record Tn and Tc cannot be distinguished .correlation 1.000.:",
                      "measure while the two differ"))
 })
 

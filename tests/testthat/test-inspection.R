@@ -115,6 +115,11 @@ test_that("conditions that go together, answers without a mechanism and absent d
   expect_match(about(inspected(upgrade), "group"),
                paste("Te and Gv go together .correlation 0.97.*Te changes while",
                      "Gv stays as it is"))
+  # A weak correlation is not told as the reason.
+  upgrade$models[[1]]$attribution$groups[[1]]$correlation <- 0.12
+  expect_match(about(inspected(upgrade), "group"),
+               "a response to Te or to Gv would do.*Te changes while Gv stays as it is")
+  expect_no_match(amiss:::group_words(upgrade$models[[1]]$attribution), "correlation")
   upgrade$catalogue$sun$boundary <- c("Gv", "wind")
   expect_match(about(inspected(upgrade), "driver"), "analysed: wind, which drives sun")
 })

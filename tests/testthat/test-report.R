@@ -85,7 +85,7 @@ test_that("conditions that cannot be distinguished are reported as such in what 
   upgrade$models[[1]]$prediction$mean <- seen$observed + 0.05 * rep_len(c(1, -1), nrow(seen))
   expect_match(summary(upgrade)$headline,
                "of the size of the stated noise .1.0 times.*responds to Te or Gv: something small")
-  expect_match(told$remains, "Te and Gv cannot be distinguished in this record", all = FALSE)
+  expect_match(told$remains, "In this record Te and Gv cannot be distinguished", all = FALSE)
 })
 
 test_that("an upgrade prints each mechanism with its verdict, within fifteen lines", {
