@@ -89,7 +89,9 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   * `verdict`, `doubts`, `confounded_with`, `held_out_gain`.
 #'   * `step_error`: what shorter steps of the simulator change, as in [upgrade_model()].
 #'   * `emulator_error`, `emulator_ratio`, `emulator_checked`: what the check by runs said.
-#'   * `refinements`, `reach`, scores, `parameters` and `attribution`.
+#'   * `refinements`, `reach`, scores and `attribution`.
+#'   * `parameters`: median and 95 % interval of each, and where its physical value lies
+#'     (`physical_lower`, `physical_upper`, as `tidy()` of a calibration has them).
 #'
 #'   If the command `amiss` ends with status 0, the work was done. It does not mean that a cause was
 #'   found or that numbers are trusted.

@@ -36,7 +36,8 @@ test_that("a study's result has the agreed fields", {
                     "log10_evidence", "log10_evidence_interval", "trusted", "rmse_calibration",
                     "rmse_validation", "coverage95_validation", "parameters", "attribution") %in%
                   names(json$models[[1]])))
-  expect_named(json$models[[1]]$parameters[[1]], c("name", "unit", "median", "lower95", "upper95"))
+  expect_named(json$models[[1]]$parameters[[1]], c("name", "unit", "median", "lower95", "upper95",
+                                                     "physical_lower", "physical_upper"))
   expect_named(json$models[[1]]$attribution[[1]],
                c("boundary", "log10_bf_dropped", "share", "p_value", "significant", "group"))
   expect_true(all(c("from", "mechanism", "log10_bf", "interval", "probability") %in%
