@@ -364,9 +364,19 @@ check_enough_runs <- function(runs, parameters, given = runs, call = rlang::call
 
 unit_to_values <- function(unit, parameters) {
   values <- vapply(seq_along(parameters),
-                   function(p) prior_quantile(parameters[[p]]$prior, unit[, p]),
+                   function(p) finite_quantile(parameters[[p]]$prior, unit[, p]),
                    numeric(nrow(unit)))
   matrix(values, nrow(unit), dimnames = list(NULL, names(parameters)))
+}
+
+# Of a prior without limits 0 and 1 stand for the smallest and the largest probability that a number
+# can hold: a posterior may lie that far out.
+finite_quantile <- function(prior, u) {
+  value <- prior_quantile(prior, u)
+  far <- is.infinite(value)
+  value[far] <- prior_quantile(
+    prior, pmin(pmax(u[far], .Machine$double.xmin), 1 - .Machine$double.neg.eps))
+  value
 }
 
 values_to_unit <- function(values, parameters) {

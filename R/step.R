@@ -19,7 +19,8 @@ next_step <- function(state, context) {
   }
   if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
   state$present <- as_present(state$present, state$catalogue[left], context)
-  trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
+  trials <- staged(paste("step", length(state$models)),
+                   try_all(state, left, sparing(context, rules$trials_share)))
   trials <- race(state$present, trials, context)
   if (asks_again(state) && !has_cause(trials, state$present, context))
     trials <- second_look(state$present, trials, context)
@@ -85,7 +86,9 @@ try_all <- function(state, left, context) {
     if (is_spent(context)) break
     simulators <- extended_simulators(state$catalogue[[name]], state)
     bar <- bar_of(trials, state$present, context)
-    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, context))
+    # About twice an equal share of a budget: what a trial leaves, those after it have.
+    own <- sparing(context, 2 / (1 + length(ordered) - length(trials)))
+    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, own))
     report_trial(trials[[name]], state$present, context)
   }
   trials

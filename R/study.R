@@ -177,6 +177,7 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
 #' @rdname run_study
 #' @export
 read_study <- function(path, quiet = TRUE, trust = FALSE) {
+  check_input(checkmate::check_string(path, min.chars = 1), "path")
   check_input(checkmate::check_file_exists(path, access = "r"), "path")
   check_input(checkmate::check_flag(quiet), "quiet")
   check_input(checkmate::check_flag(trust), "trust")

@@ -132,6 +132,7 @@ slopes_in <- function(model, at, looked, new, slopes) {
   weights <- ifelse(rowSums(ways^2) > 0, 1 / pmax(rowSums(ways^2), 1e-6)^2, 0)
   change <- model$runs$outputs[, looked, drop = FALSE] - model$runs$outputs[, at]
   gram <- crossprod(ways * sqrt(weights))
+  if (!any(gram > 0)) return(slopes)  # the budget left no other run
   slopes[, new] <- change %*% (weights * ways) %*%
     solve(gram + diag(1e-3 * max(diag(gram)), length(new)))
   slopes

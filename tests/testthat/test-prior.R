@@ -33,3 +33,12 @@ test_that("labels tell parameters apart", {
                    c("a", "gain (b)", "gain (c)", "a (d)", "e"))
   expect_false(anyDuplicated(labels(c("a", "x"), c("b", "x"), c("c", "x (a)"))) > 0)
 })
+
+test_that("a posterior far out in a prior without limits has finite values", {
+  parameters <- list(rate = free("rate", lognormal(5, 0.2)))
+  values <- amiss:::unit_to_values(cbind(c(0, 0.5, 1)), parameters)
+  expect_true(all(is.finite(values)))
+  expect_equal(values[2, 1], exp(5), ignore_attr = TRUE)
+  limited <- list(k = free("k", uniform(0, 3)))
+  expect_identical(amiss:::unit_to_values(cbind(c(0, 1)), limited)[, 1], c(0, 3))
+})
