@@ -18,7 +18,7 @@ struct RecordPosterior {
   /// Psi b = Phi b - E withheld.
   Eigen::MatrixXd withheld;
   Eigen::MatrixXd withheld_covariance;  ///< r^2 x kept: of each such column given its draw, r x r by columns
-  Eigen::VectorXd reach;      ///< posterior probability of each reach of the grid
+  Eigen::VectorXd reach;                ///< posterior probability of each reach of the grid
   GaussianSimulator tangent;  ///< the simulator as the line that touches it at the posterior's centre
 };
 
