@@ -15,9 +15,3 @@ runs_spent <- function(context) runs_so_far() - context$began
 runs_found <- function(context) found_so_far() - context$began_found
 
 is_spent <- function(context) runs_left(context) < 1
-
-# For a stage that leaves a part of the budget to those after it.
-sparing <- function(context, share) {
-  context$budget <- runs_spent(context) + share * runs_left(context)
-  context
-}

@@ -407,7 +407,7 @@ values_under <- function(model, fits, at) {
 
 # The base model from its first run to its verified posterior.
 calibrate_model <- function(model, context) {
-  found <- find_modes(model, sparing(context, rules$search_share))
+  found <- find_modes(model, context)
   model <- with_modes(found$model, found$modes, context$seed)
   model$modes <- told_modes(found)
   verify_model(model, context)

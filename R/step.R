@@ -19,8 +19,7 @@ next_step <- function(state, context) {
   }
   if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
   state$present <- as_present(state$present, state$catalogue[left], context)
-  trials <- staged(paste("step", length(state$models)),
-                   try_all(state, left, sparing(context, rules$trials_share)))
+  trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
   trials <- race(state$present, trials, context)
   if (asks_again(state) && !has_cause(trials, state$present, context))
     trials <- second_look(state$present, trials, context)
@@ -86,9 +85,7 @@ try_all <- function(state, left, context) {
     if (is_spent(context)) break
     simulators <- extended_simulators(state$catalogue[[name]], state)
     bar <- bar_of(trials, state$present, context)
-    # About twice an equal share of a budget: what a trial leaves, those after it have.
-    own <- sparing(context, 2 / (1 + length(ordered) - length(trials)))
-    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, own))
+    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, context))
     report_trial(trials[[name]], state$present, context)
   }
   trials
