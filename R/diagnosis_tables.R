@@ -44,29 +44,27 @@ parameters_words <- function(fit) {
           note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL))
 }
 
-# Where physical values lie. Modes stand as they are.
+# Where physical values lie. If there are several modes, they stand as they are.
 physical_words <- function(fit) {
   physical <- physical_intervals(fit)
   if (is.null(physical)) return(NULL)
-  of_modes <- intervals_words(fit)
-  ifelse(grepl(" or ", of_modes, fixed = TRUE), of_modes,
-         interval_words(physical$lower, physical$upper, 3))
+  modes <- table(mode_rows(fit)$name)[physical$name]
+  ifelse(modes > 1, intervals_words(fit), interval_words(physical$lower, physical$upper, 3))
 }
 
-# The parameters that what is missing may bias most.
+# The two parameters that what is missing may bias most, if that is known.
 bias_sentence <- function(fit) {
+  told <- "The parameters may make up for what is missing: "
   physical <- physical_intervals(fit)
-  if (is.null(physical))
-    return("The parameters may make up for what is missing: their values may be biased.")
   rows <- parameter_rows(fit)
   wider <- (physical$upper - physical$lower) / (rows$upper95 - rows$lower95)
-  most <- utils::head(order(-wider), 2)
-  sprintf("The parameters may make up for what is missing: the physical value of %s.",
-          listed(sprintf("%s may lie anywhere from %s (calibrated: %s)", rows$label[most],
-                         with_unit(interval_words(physical$lower[most], physical$upper[most], 3),
-                                   rows$unit[most]),
-                         interval_words(rows$lower95[most], rows$upper95[most], 3)),
-                 "and that of"))
+  most <- utils::head(intersect(order(-wider), which(wider > 1)), 2)
+  if (!length(most)) return(paste0(told, "their values may be biased."))
+  values <- sprintf("%s may lie anywhere from %s (calibrated: %s)", rows$label[most],
+                    with_unit(interval_words(physical$lower[most], physical$upper[most], 3),
+                              rows$unit[most]),
+                    interval_words(rows$lower95[most], rows$upper95[most], 3))
+  paste0(told, "the physical value of ", listed(values, "and that of"), ".")
 }
 
 # The 95 % interval of each parameter, or those of its modes.

@@ -13,8 +13,7 @@ physical_rows <- function(fit) {
   physical <- physical_intervals(fit)
   if (is.null(physical))
     physical <- with(parameter_table(fit), data.frame(name, lower = lower95, upper = upper95))
-  modes <- table(mode_rows(fit)$name)
-  physical[modes[physical$name] < 2, ]
+  physical[table(mode_rows(fit)$name)[physical$name] == 1, ]
 }
 
 figure_parameters <- function(fits) {

@@ -40,7 +40,6 @@ disagreements <- function(upgrade) {
   told <- place$told
   last <- upgrade$models[[length(upgrade$models)]]
   adopted <- upgrade$models[-1]
-  unit <- upgrade$measurements$unit
   found <- character()
   note <- function(...) found <<- c(found, sprintf(...))
   texts <- list(print = place$print, summary = place$summary, report = place$report)
@@ -64,10 +63,12 @@ disagreements <- function(upgrade) {
   for (value in rmse[is.finite(rmse)]) for (where in c("summary", "report"))
     if (!says(texts[[where]], engine$short(value), fixed = TRUE))
       note("%s lacks the error %s", where, engine$short(value))
-  scored <- last$prediction[last$prediction$use == "calibrate", ]
-  missing <- as.numeric(regmatches(squeezed(texts[c("summary", "report")]),
-                                   gregexpr("(?<=typically )[0-9.]+", squeezed(texts),
-                                            perl = TRUE))[[1]])
+  numbers <- function(before, text = texts) {
+    text <- squeezed(text)
+    as.numeric(regmatches(text, gregexpr(sprintf("(?<=%s)[0-9]+([.][0-9]+)?", before), text,
+                                         perl = TRUE))[[1]])
+  }
+  missing <- numbers("typically ", place$figures$missing)
   whole <- max(rmse, na.rm = TRUE)
   if (any(missing > 1.05 * whole)) note("typically %s missing of %s", max(missing), whole)
 
@@ -110,11 +111,9 @@ disagreements <- function(upgrade) {
 
   # Correlations told as a reason are large, no odds are beyond reason, physical values hold the
   # calibrated ones.
-  r <- as.numeric(sub("correlation ", "", unlist(regmatches(
-    squeezed(texts), gregexpr("correlation [0-9.]*[0-9]", squeezed(texts))))))
+  r <- numbers("correlation ")
   if (any(r < 0.4)) note("go together, by a correlation of %s", min(r))
-  powers <- as.numeric(sub("10\\^", "", unlist(regmatches(
-    squeezed(texts), gregexpr("10\\^[0-9]+", squeezed(texts))))))
+  powers <- numbers("10\\^")
   if (any(powers > 1000)) note("odds of 10^%d", max(powers))
   values <- tidy(upgrade)
   if (any(values$physical.low > values$conf.low | values$physical.high < values$conf.high,

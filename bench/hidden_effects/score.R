@@ -28,7 +28,8 @@ score_world <- function(world, control = list(max_steps = 2,
     headline = verdict$headline,
     log10_bf = max(upgrade$candidates$log10_bf[upgrade$candidates$from == upgrade$models[[1]]$name],
                    na.rm = TRUE),
-    gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade),
+    gain_share = gain_share(world, upgrade), covered = parameter_covered(world, upgrade, "conf"),
+    physical_covered = parameter_covered(world, upgrade, "physical"),
     rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best,
     over_least = if (least_squares) over_least_squares(world, upgrade) else c(NA, NA),
     doubts = lapply(upgrade$models[-1], function(m) names(m$doubts)),
@@ -133,13 +134,15 @@ gain_share <- function(world, upgrade) {
   (rmse[1] - rmse[2]) / (rmse[1] - truth)
 }
 
-parameter_covered <- function(world, upgrade) {
+# By the interval of the calibrated value ("conf"), or of the physical one.
+parameter_covered <- function(world, upgrade, which) {
   first <- if (length(upgrade$models) > 1) upgrade$models[[2]]$mechanism
   if (is.null(first) || !first %in% world$kinds) return(NA)
   last <- amiss::tidy(upgrade$models[[length(upgrade$models)]]$fit)
   true <- world$effects[[first]]
   own <- last[last$term == names(true)[1], ]
-  own$physical.low <= true[[1]] && true[[1]] <= own$physical.high
+  ends <- own[paste0(which, c(".low", ".high"))]
+  ends[[1]] <= true[[1]] && true[[1]] <= ends[[2]]
 }
 
 # What is done today: the residuals of the calibrated base model held against each condition. The
@@ -210,6 +213,7 @@ score_rates <- function(rows) {
       detection_at_1 = rate(flags(one, named_right)),
       detection_below_1 = rate(flags(weak, named_right)),
       parameter_covered = rate(flags(strong, function(r) r$covered)),
+      physical_covered = rate(flags(strong, function(r) r$physical_covered)),
       false_condition = rate(flags(none, function(r) !is.na(r$condition))),
       false_mechanism = rate(flags(none, function(r) !is.na(r$mechanism))),
       false_paper_condition = rate(flags(none, function(r) !is.na(r$paper_condition))),
