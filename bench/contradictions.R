@@ -65,8 +65,8 @@ disagreements <- function(upgrade) {
       note("%s lacks the error %s", where, engine$short(value))
   numbers <- function(before, text = texts) {
     text <- squeezed(text)
-    as.numeric(regmatches(text, gregexpr(sprintf("(?<=%s)[0-9]+([.][0-9]+)?", before), text,
-                                         perl = TRUE))[[1]])
+    pattern <- sprintf("(?<=%s)[0-9]+([.][0-9]+)?(e-?[0-9]+)?", before)
+    as.numeric(regmatches(text, gregexpr(pattern, text, perl = TRUE))[[1]])
   }
   missing <- numbers("typically ", place$figures$missing)
   whole <- max(rmse, na.rm = TRUE)

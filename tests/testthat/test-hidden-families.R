@@ -182,7 +182,8 @@ test_that(
                   condition = "P", attributed_condition = "P", mechanism = "heater state",
                   adopted = c("heater state", "envelope leak"), verdicts = c("named", "likely"),
                   verdict = "named", unexplained = FALSE, covered = TRUE,
-                  physical_covered = TRUE, check_passed = TRUE, rmse_ratio = 1.1, gain_share = 1, wall_s = 1)
+                  physical_covered = TRUE, check_passed = TRUE, rmse_ratio = 1.1, gain_share = 1,
+                  wall_s = 1)
     utils::modifyList(usual, list(...))
   }
   rows <- list(row(), row(verdicts = c("named", "named"), rmse_ratio = 1.5),
