@@ -10,7 +10,7 @@ base_model <- function(started, runs, context) {
   records <- lapply(measurements, loop_record, context$control$calibration)
   model <- new_model(simulators, records)
   if (!is.null(runs)) model$scouts <- runs
-  calibrate_model(model, context)
+  calibrate_model(model, sparing(context, rules$base_share, wanted_scouts(model)))
 }
 
 given_model <- function(ensembles, measurements, name, context, parent = NULL, mechanism = NULL) {

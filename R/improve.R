@@ -242,17 +242,19 @@ verify_model <- function(model, context, before = NULL,
   least <- least_local(model)
   best <- NULL
   for (round in seq_len(max(1, rounds))) {
-    model <- with_exact_least(with_local_runs(model, least, context), context)
+    checks <- if (is.null(before)) rules$first_check else rules$check_runs
+    before_check <- leaving(context, checks)
+    model <- with_exact_least(with_local_runs(model, least, before_check), before_check)
     rough <- posterior_of(model, context, rough_ais)
     model <- following(rough)
     found <- list(model = model, fits = fits_in_region(model, context, model_ais(context)))
     filled <- sum(fills(found$model))
-    if (filled < least / 2 && !is_spent(context)) {  # the region has moved away from its runs
+    # The region has moved away from its runs.
+    if (filled < least / 2 && round < rounds && !is_spent(before_check)) {
       model <- found$model
       least <- least_local(model)
       next
     }
-    checks <- if (is.null(before)) rules$first_check else rules$check_runs
     found <- check_by_runs(found$model, found$fits, checks, context)
     model <- found$model
     if (round < rounds && misses_least(model, found$fits) && !is_spent(context)) {
@@ -407,7 +409,7 @@ values_under <- function(model, fits, at) {
 
 # The base model from its first run to its verified posterior.
 calibrate_model <- function(model, context) {
-  found <- find_modes(model, context)
+  found <- find_modes(model, sparing(context, rules$search_share, wanted_scouts(model)))
   model <- with_modes(found$model, found$modes, context$seed)
   model$modes <- told_modes(found)
   verify_model(model, context)

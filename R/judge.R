@@ -31,6 +31,10 @@ doubts <- list(
   steps = doubt(function(case) {
     step_doubt(case$parent, case$model, case$new, case$row$log10_bf, case$measurements)
   }, "coarse steps of a simulator look like a cause"),
+  steps_open = doubt(function(case) {
+    if (any(vapply(case$model$steps, is_open_effect, NA)))
+      "the budget left no runs to see what shorter steps of the simulator change"
+  }, "coarse steps of a simulator look like a cause"),
   no_gain = doubt(function(case) {
     if (case$no_gain) "held-out data do not improve"
   }, "what fits alone does not predict"),
@@ -55,39 +59,39 @@ doubts <- list(
     }
   }, "a band that misses a fifth of new data is wrong"),
   slow = doubt(function(case) {
-    if (case$drift && acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
+    if (case$drift && case$slow) {
       "anything that changes slowly would explain the error as well"
     }
   }, "a parabola in time does as well, and so does the mechanism"),
   drift = doubt(function(case) {
-    if (case$drift && !acts_as_drift(case$parent$fit, case$model$fit, case$threads)) {
+    if (case$drift && !case$slow) {
       "a drifting sensor would explain the error as well"
     }
   }, "a parabola in time does as well"))
 
 # Fills `verdict`, `doubts`, `confounded_with` and `held_out_gain` of every model that adopted a
 # mechanism, and `steps` (step_effect() of each record) of all, and `suspects` of the first
-# (record_suspects()). A mechanism is a stand-in if held-out data do not improve; it is named if
-# nothing speaks against it, and likely otherwise.
+# (record_suspects()). `left`: how many runs of the simulator may be made. A mechanism is a stand-in
+# if held-out data do not improve; it is named if nothing speaks against it, and likely otherwise.
 judge_models <- function(models, candidates, catalogue, measurements, control, threads,
-                         runs = Inf) {
+                         left = function() Inf) {
   models <- lapply(models, function(model) {
-    model$steps <- lapply(record_fits(model$fit), step_effect, threads)
+    model$steps <- lapply(record_fits(model$fit), step_effect, threads, left)
     model
   })
-  models[[1]]$suspects <- record_suspects(models, measurements, threads, runs)
-  shared <- list(candidates = candidates, measurements = measurements, threads = threads,
+  models[[1]]$suspects <- record_suspects(models, measurements, threads, left())
+  shared <- list(candidates = candidates, measurements = measurements, left = left,
                  remains = much_remains(models, measurements),
                  faults = c(names(read_findings(models, measurements)), models[[1]]$suspects$id),
                  inside = last_model(models)$scores$validate[["coverage95"]])
   for (k in seq_along(models)[-1]) {
-    case <- c(shared, mechanism_case(models, k, catalogue, candidates, control, threads))
+    case <- c(shared, mechanism_case(models, k, catalogue, candidates, control, threads, left))
     models[[k]] <- judged_model(case)
   }
   models
 }
 
-mechanism_case <- function(models, k, catalogue, candidates, control, threads) {
+mechanism_case <- function(models, k, catalogue, candidates, control, threads, left) {
   model <- models[[k]]
   parent <- models[[k - 1]]
   trials <- candidates[candidates$from == parent$name, ]
@@ -97,12 +101,13 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads) {
   # either alone.
   later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
   gain <- held_out_gain(parent, model)
+  drift <- k == 2 && drift_rivals(models, control, threads)
   list(model = model, parent = parent, models = models[seq_len(k)], row = row, new = new,
        entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain,
        no_gain = isFALSE(gain$improves),
        others = 1 - row$probability - sum(trials$probability[trials$mechanism %in% later]),
        confounded = confounded_parameters(model$fit, new),
-       drift = k == 2 && drift_rivals(models, control, threads))
+       drift = drift, slow = drift && acts_as_drift(parent$fit, model$fit, threads, left))
 }
 
 judged_model <- function(case) {

@@ -49,11 +49,9 @@ begun_from <- function(model, start, modes, context) {
 
 # Runs over the priors, as many as it takes to begin; those that are known count.
 with_scouts <- function(model, context) {
-  p <- length(model$parameters)
-  n <- max(0, (model$scouts %||% (rules$scouts_base + rules$scouts_parameter * p)) -
-                nrow(model$runs$z))
+  n <- max(0, wanted_scouts(model) - nrow(model$runs$z))
   if (n == 0) return(model)
-  unit <- with_seed(context$seed, lhs::randomLHS(n, p))
+  unit <- with_seed(context$seed, lhs::randomLHS(n, length(model$parameters)))
   made <- with_runs(model, from_unit(unit, model$space), context)
   model <- made$model
   model$over_priors <- c(model$over_priors, made$at)
@@ -62,6 +60,9 @@ with_scouts <- function(model, context) {
     check_runs_change(model$runs$outputs[rows, succeeded(model), drop = FALSE])
   model
 }
+
+wanted_scouts <- function(model)
+  model$scouts %||% (rules$scouts_base + rules$scouts_parameter * length(model$parameters))
 
 check_some_succeeded <- function(model, call = rlang::caller_env()) {
   if (sum(succeeded(model)) >= min(3, nrow(model$runs$z))) return(invisible())

@@ -1,9 +1,9 @@
 # The race of the trials of a step: those in front are verified, until the leader is exact and
 # nobody can reach it. If none takes the error away, all are searched again.
 
-# The next trial to verify, or NULL: the one that ranks highest of those that may be adopted and may
-# lead, so that what the others must reach is known early; then, of those whose evidence says
-# nothing yet, the one that is nearest to the record.
+# The next trial to verify, or NULL: of those that may be adopted and may lead the one that is
+# nearest to the record, so that what the others must reach is known early; of equally near ones the
+# one that ranks highest.
 next_to_verify <- function(trials, present, context) {
   adoptable <- Filter(Negate(function(model) cannot_be_adopted(model, present)), trials)
   open <- Filter(function(model) model$level == "tried", adoptable)
@@ -12,12 +12,10 @@ next_to_verify <- function(trials, present, context) {
   bar <- list(factor = context$control$decisive,
               standing = if (is.null(leader)) -Inf else standing_of(leader, present))
   open <- Filter(function(model) could_win(model, present, bar, leader %||% present), open)
-  is_near <- vapply(open, is_promising, NA, present, leader %||% present)
-  if (!all(is_near)) {
-    open <- open[!is_near]
-    return(open[[which.max(vapply(open, standing_of, 0, present))]]$mechanism)
-  }
-  if (length(open)) open[[which.min(vapply(open, least_error, 0))]]$mechanism
+  if (!length(open)) return(NULL)
+  error <- vapply(open, least_error, 0)
+  nearest <- open[rules$fallen_error * error <= min(error)]
+  nearest[[which.max(vapply(nearest, standing_of, 0, present))]]$mechanism
 }
 
 # Of models with a decisive factor the one that ranks highest, or NULL.

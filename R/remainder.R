@@ -90,8 +90,9 @@ drift_rivals <- function(models, control, threads) {
 }
 
 # Whether a parabola in time holds nearly all that an extension of a model changes, at the centre of
-# its posterior.
-acts_as_drift <- function(parent, fit, threads) {
+# its posterior: two runs of each record, if as many are `left`.
+acts_as_drift <- function(parent, fit, threads, left = function() Inf) {
+  if (left() < 2 * length(record_fits(fit))) return(FALSE)
   slow <- mapply(function(before, after) {
     if (is.null(after$emulator$simulator)) return(FALSE)
     parameters <- after$emulator$parameters

@@ -19,7 +19,9 @@ next_step <- function(state, context) {
   }
   if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
   state$present <- as_present(state$present, state$catalogue[left], context)
-  trials <- staged(paste("step", length(state$models)), try_all(state, left, context))
+  trials <- staged(paste("step", length(state$models)),
+                   try_all(state, left, sparing(context, rules$trials_share,
+                                                rules$least_trial)))
   trials <- race(state$present, trials, context)
   if (asks_again(state) && !has_cause(trials, state$present, context))
     trials <- second_look(state$present, trials, context)
@@ -85,7 +87,9 @@ try_all <- function(state, left, context) {
     if (is_spent(context)) break
     simulators <- extended_simulators(state$catalogue[[name]], state)
     bar <- bar_of(trials, state$present, context)
-    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, context))
+    # About twice an equal share of a budget: what a trial leaves, those after it have.
+    own <- sparing(context, 2 / (1 + length(ordered) - length(trials)), rules$least_trial)
+    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, own))
     report_trial(trials[[name]], state$present, context)
   }
   trials
@@ -175,8 +179,11 @@ no_winner <- function(table, present, context) {
 
 why_not <- function(table, decisive, context) {
   seen <- table[!is.na(table$log10_bf), ]
+  if (is_spent(context) && is_open(table, decisive)) {
+    best <- if (nrow(seen)) paste0(" (", found_words(seen, decisive), ")")
+    return(list(id = "budget", words = paste0(budget_words(context), best)))
+  }
   if (!nrow(seen)) return(list(id = "none_computed", words = "no mechanism could be computed"))
-  best <- best_trial(table, decisive)
   highest <- seen[which.max(seen$log10_bf), ]
   if (keeps_error(highest) && highest$log10_bf >= decisive) {
     return(list(id = "keeps_error", words = sprintf(
@@ -190,18 +197,30 @@ why_not <- function(table, decisive, context) {
                                       "drives it)"), highest$mechanism, highest$log10_bf,
                                 highest$beside_unknown)))
   }
+  best <- best_trial(table, decisive)
   if (!nrow(best) || highest$log10_bf < decisive) best <- highest
-  # As many digits as it takes to see that it is less than what is needed.
-  digits <- if (best$log10_bf < decisive && round(best$log10_bf, 1) >= decisive) 2 else 1
-  found <- sprintf("best: %s, log10 Bayes factor %.*f", best$mechanism, digits, best$log10_bf)
+  found <- found_words(best, decisive)
   if (best$log10_bf < decisive) {
     list(id = "not_decisive", words = sprintf(
       "no mechanism is decisive (%s; %s or more and an interval above zero are needed)", found,
       format(decisive)))
-  } else if (is_spent(context)) {
-    list(id = "budget", words = sprintf("%s (%s, not verified)", budget_words(context), found))
   } else {
     list(id = "uncertain",
          words = sprintf("the evidence for the best mechanism is too uncertain (%s)", found))
   }
+}
+
+# Whether more runs could make a mechanism decisive.
+is_open <- function(table, decisive) {
+  any(table$judged_by == "none") ||
+    any(table$judged_by == "trial" & !is.na(table$log10_bf) & table$upper95 >= decisive)
+}
+
+# The mechanism of the highest factor, with as many digits as it takes to see that it is less than
+# what is needed.
+found_words <- function(table, decisive) {
+  best <- table[which.max(table$log10_bf), ]
+  digits <- if (best$log10_bf < decisive && round(best$log10_bf, 1) >= decisive) 2 else 1
+  sprintf("best: %s, log10 Bayes factor %.*f%s", best$mechanism, digits, best$log10_bf,
+          if (best$judged_by == "trial") ", not verified" else "")
 }

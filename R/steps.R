@@ -4,16 +4,20 @@
 # What steps a quarter as long change in calibration: list(error, moved), the RMS in the target's
 # unit of what the parameters cannot take up, and by how many of its standard deviations each would
 # move. NULL where that is not known: of runs that are given, of a simulator whose steps are not
-# those of its rows, or one whose output does not settle as they get shorter.
-step_effect <- function(fit, threads) {
+# those of its rows, or one whose output does not settle as they get shorter. `open` instead if the
+# budget leaves no runs to know it: `left` says how many there are.
+step_effect <- function(fit, threads, left = function() Inf) {
   if (!follows_step(fit$emulator$simulator)) return(NULL)
-  change <- tryCatch(suppress_run_warnings(suppressWarnings(step_change(fit, threads))),
+  if (left() < 3) return(list(open = TRUE))
+  change <- tryCatch(suppress_run_warnings(suppressWarnings(step_change(fit, threads, left))),
                      error = function(e) NULL)
-  if (!is.null(change)) taken_up(fit, change)
+  if (is.list(change)) change else if (!is.null(change)) taken_up(fit, change)
 }
 
-# What steps a quarter as long change in the output at the posterior's centre, or NULL.
-step_change <- function(fit, threads) {
+is_open_effect <- function(effect) isTRUE(effect$open)
+
+# What steps a quarter as long change in the output at the posterior's centre, NULL, or `open`.
+step_change <- function(fit, threads, left) {
   simulator <- fit$emulator$simulator
   m <- fit$measurements
   values <- unit_to_values(stats::pnorm(matrix(posterior_centre(fit), 1)), fit$emulator$parameters)
@@ -30,18 +34,22 @@ step_change <- function(fit, threads) {
     settles <- rms(quarter - half) <= 0.75 * rms(half)  # a half in a scheme of first order
     if (isTRUE(settles || rms(quarter) < rules$negligible_step * m$noise_sd)) quarter
   }
-  settled(character()) %||% settled(likely_amounts(driver_names(simulator),
-                                                   function(amounts) rms(change(2, amounts))))
+  at_once <- settled(character())
+  if (!is.null(at_once)) return(at_once)
+  amounts <- likely_amounts(driver_names(simulator), function(amounts) rms(change(2, amounts)),
+                            function() left() - 2)
+  if (is.null(amounts)) list(open = TRUE) else settled(amounts)
 }
 
 # Which drivers are amounts of a row, to be shared among shorter ones, and not what holds over it:
 # those with which the output changes least (`off`) of none, each and all, and of what then differs
-# by one where that at least halves it.
-likely_amounts <- function(drivers, off) {
+# by one where that at least halves it. NULL if there are no runs `left` to know it.
+likely_amounts <- function(drivers, off, left = function() Inf) {
   tried <- c(list(character(), drivers), as.list(drivers))
   amounts <- NULL
   least <- Inf
   repeat {
+    if (left() < length(tried)) return(NULL)
     each <- vapply(tried, off, 0)
     if (!is.null(amounts) && min(each) >= 0.5 * least) return(amounts)
     least <- min(each)

@@ -22,9 +22,9 @@ try_mechanism <- function(present, name, simulators, off, bar, context) {
   model <- looked$model
   model$own_runs <- runs_spent(context) - before
   if (looked$silent) return(utils::modifyList(model, list(level = "silent")))
-  if (!length(looked$starts)) {
-    return(utils::modifyList(model, list(level = if (is_spent(context)) "missed" else "untried")))
-  }
+  if (is_spent(context) && sum(succeeded(model)) < 2)
+    return(utils::modifyList(model, list(level = "missed")))
+  if (!length(looked$starts)) return(utils::modifyList(model, list(level = "untried")))
   search <- search_trial(looked, context)
   model <- with_least(with_modes(search$model, list(search), context$seed), context)
   model$off <- looked$off
@@ -89,7 +89,9 @@ look_at_mechanism <- function(model, present, off, context) {
   if (!length(fine)) return(list(model = model, silent = FALSE))
   base <- present$runs$outputs[, present$present$at]
   change <- over_noise(model, model$runs$outputs[, fine, drop = FALSE] - base)
-  if (setequal(kept, old) && all(change == 0)) return(list(model = model, silent = TRUE))
+  looked_whole <- length(made$at) == nrow(values)
+  if (setequal(kept, old) && looked_whole && all(change == 0))
+    return(list(model = model, silent = TRUE))
   off <- off %||% switched_off(model, fine, new, change)
   slopes <- matrix(0, nrow(model$runs$outputs), length(model$parameters),
                    dimnames = list(NULL, names(model$parameters)))

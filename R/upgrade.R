@@ -151,9 +151,11 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, contr
   seed <- kept_seed(seed, checkpoint)
   key <- list(measurements = started$measurements, control = control, seed = seed)
   context <- new_context(seed, check_threads(threads), control, checkpoint_keeper(checkpoint, key),
-                         progress(quiet), control$runs_total)
-  state <- first_state(started, catalogue, runs, context)
-  while (is.null(state$stopped)) state <- next_step(state, context)
+                         progress(quiet), control$runs_total,
+                         length(each_record(started$measurements)))
+  of_steps <- leaving(context, judging_points(context))
+  state <- first_state(started, catalogue, runs, of_steps)
+  while (is.null(state$stopped)) state <- next_step(state, of_steps)
   context$say("Stopped: {state$stopped$words}")
   finish_upgrade(state, context)
 }
@@ -161,7 +163,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, contr
 finish_upgrade <- function(state, context) {
   measurements <- state$started$measurements
   models <- judge_models(state$models, state$candidates, state$catalogue, measurements,
-                         context$control, context$threads, runs_left(context))
+                         context$control, context$threads, function() runs_left(context))
   structure(list(format_version = format_version, models = models, candidates = state$candidates,
                  responses = state$responses, catalogue = state$catalogue,
                  named_cause = named_cause(models, state$candidates, state$catalogue),
@@ -171,6 +173,11 @@ finish_upgrade <- function(state, context) {
                  inert = inert_parameters(state), runs_total = runs_spent(context),
                  runs_found = runs_found(context), measurements = measurements, seed = context$seed,
                  control = context$control), class = "amiss_upgrade")
+}
+
+# What of a budget is left to judge what was adopted: how it acts, and the steps of the simulator.
+judging_points <- function(context) {
+  floor(min(rules$judging_runs, rules$judging_share * context$budget) / context$records)
 }
 
 # Parameters of the base model that what was adopted has replaced or made idle.

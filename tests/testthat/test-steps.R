@@ -100,6 +100,16 @@ test_that("what is an amount of a row is shared among shorter ones", {
     expect_setequal(amiss:::likely_amounts(names(counts), off_by(right)), right)
 })
 
+test_that("steps that no runs are left to shorten are open, and a doubt", {
+  of_none <- amiss:::step_effect(store_fit(store(2)), threads = 1, left = function() 2)
+  expect_true(amiss:::is_open_effect(of_none))
+  # No more than the drivers' amounts could be looked for.
+  expect_null(amiss:::likely_amounts(c("rain", "sun"), function(amounts) 1, left = function() 3))
+  expect_match(amiss:::doubts$steps_open$says(list(model = list(steps = list(a = of_none)))),
+               "left no runs")
+  expect_null(amiss:::doubts$steps_open$says(list(model = list(steps = list(NULL)))))
+})
+
 test_that("nothing is said of steps that are not those of the rows, or that cannot be known", {
   by_row <- store(1, function(values, drivers) store_level(values, drivers[, "rain"], 1, 2))
   expect_null(effect_of(by_row))

@@ -98,7 +98,7 @@ test_that("two steps with eight mechanisms take about 400 runs", {
 })
 
 test_that("never more runs are made than asked for, and a verdict is given", {
-  for (budget in c(3, 8, 20, 30, 31, 32, 40, 60, 80, 100, 150)) {
+  for (budget in c(3, 7, 8, 20, 30, 31, 32, 40, 60, 80, 100, 150)) {
     calls <- 0
     counted <- linear_simulator()
     whole <- counted$f
@@ -121,7 +121,8 @@ test_that("never more runs are made than asked for, and a verdict is given", {
 
 test_that("of several records no more runs are made than asked for", {
   m <- list(a = sunny_record(), b = sunny_record())
-  for (budget in c(31, 100)) {
+  # An odd one leaves a run that is not enough for both.
+  for (budget in c(31, 61, 100)) {
     upgrade <- loop(sun, m = m, simulator = list(a = linear_simulator(), b = linear_simulator()),
                     control = list(runs_total = budget))
     expect_lte(upgrade$runs_total, budget, label = paste("runs of a budget of", budget))
@@ -129,16 +130,20 @@ test_that("of several records no more runs are made than asked for", {
 })
 
 test_that("a budget that ends the loop is told", {
-  spent <- loop(sun, control = list(runs_total = 40))
+  # As many as the base model is run over its priors.
+  spent <- loop(sun, control = list(runs_total = 6))
   expect_identical(spent$stopped_id, "budget")
-  expect_match(spent$stopped_because, "budget of 40 runs")
+  expect_match(spent$stopped_because, "budget of 6 runs")
   expect_length(spent$models, 1)
   expect_null(spent$candidates)
-  # Half way through: what was not tried is no failure.
-  half <- loop(drift, sun, control = list(runs_total = 75))
-  expect_lte(half$runs_total, 75)
-  expect_true(all(half$candidates$judged_by %in% c("trial", "none")))
-  expect_match(half$stopped_because, "budget of 75 runs")
+  # Half way through: what was not tried is no failure, and one run of it does not show that it
+  # changes nothing.
+  for (budget in c(7, 16)) {
+    half <- loop(drift, sun, control = list(runs_total = budget))
+    expect_lte(half$runs_total, budget)
+    expect_true(all(half$candidates$judged_by %in% c("trial", "none")))
+    expect_match(half$stopped_because, paste("budget of", budget, "runs"))
+  }
 })
 
 test_that("runs over the priors that are asked for are made", {
@@ -350,7 +355,7 @@ test_that("a trial's evidence may be off by what its runs leave open, a verified
   expect_equal(bound(unchecked), 3 + rules$trial_doubt * 2)
 })
 
-test_that("of trials that can still win the one of highest evidence is verified", {
+test_that("of trials that can still win the nearest, then that of highest evidence is verified", {
   present <- model_by_hand(0, se = 0, error = 1)
   context <- amiss:::new_context(1, 1, list(decisive = 2))
   following <- function(...) {
@@ -359,6 +364,10 @@ test_that("of trials that can still win the one of highest evidence is verified"
     amiss:::next_to_verify(trials, present, context)
   }
   expect_equal(following(tried_by_hand(5, name = "a"), tried_by_hand(6, name = "b")), "b")
+  near <- tried_by_hand(5, name = "a", error = 0.9)
+  expect_equal(following(near, tried_by_hand(6, name = "b")), "a")
+  expect_equal(following(tried_by_hand(5, name = "a", error = 0.995),
+                         tried_by_hand(6, name = "b")), "b")
   # One that is in doubt may still lead.
   doubtful <- tried_by_hand(5, name = "a", passed = FALSE)
   expect_equal(following(doubtful, tried_by_hand(6, name = "b")), "b")
