@@ -139,7 +139,8 @@ fit_of_record <- function(set, record, own, result) {
   posterior$unit <- posterior$unit[, record$parameters, drop = FALSE]
   new_fit("amiss_calibration", set, posterior, posterior, kept = result$kept,
           coefficients = own$coefficients, withheld = own$withheld,
-          withheld_covariance = own$withheld_covariance, tangent = own$tangent,
+          withheld_covariance = own$withheld_covariance,
+          withheld_of_condition = own$withheld_of_condition, tangent = own$tangent,
           centre = own$centre, scale = own$scale,
           reach = stats::setNames(own$reach, format(set$control$reach, trim = TRUE)))
 }

@@ -23,9 +23,11 @@ points_left <- function(context) floor(max(0, runs_left(context)) / context$reco
 
 # For a stage that leaves a part of the budget to those after it, but for the `points` that it
 # cannot do without.
-sparing <- function(context, share, points = 0) {
-  own <- max(share * runs_left(context), points * context$records)
-  context$budget <- min(context$budget, runs_spent(context) + own)
+sparing <- function(context, share, points = 0)
+  at_most(context, max(share * runs_left(context) / context$records, points))
+
+at_most <- function(context, points) {
+  context$budget <- min(context$budget, runs_spent(context) + points * context$records)
   context
 }
 

@@ -80,12 +80,14 @@ print.amiss_discrepancy <- function(x, ...) on_stdout(x, {
   cli::cli_bullets(c(">" = "next: {.fun plot} or {.fun attribute_discrepancy}"))
 })
 
-# Posterior mean response of the discrepancy to each condition at the calibration rows (N x S).
+# Posterior mean response of the discrepancy to each condition at the calibration rows (N x S); they
+# add up to the discrepancy.
 condition_responses <- function(fit, data) {
   phi <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
   b <- rowMeans(fit$coefficients)
   vapply(seq_along(fit$measurements$conditions), function(s) {
     columns <- data$condition == s - 1L
-    as.numeric(phi[, columns, drop = FALSE] %*% b[columns])
+    as.numeric(phi[, columns, drop = FALSE] %*% b[columns] -
+                 data$moves %*% fit$withheld_of_condition[, s])
   }, numeric(nrow(phi)))
 }

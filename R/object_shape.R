@@ -64,6 +64,7 @@ object_shapes <- list(
   amiss_calibration = c(posterior = ":history_posterior", priors = ":history_priors",
                         control = ":history_control", kept = "real[d]", coefficients = "real[e,d]",
                         withheld = "real[w,d]", withheld_covariance = "real[y,d]",
+                        withheld_of_condition = "real[w,c]",
                         centre = "real[e]", scale = "real[e]", reach = "number",
                         tangent = ":tangent"),
   history_posterior = c(unit = "real[k,p]", weights = "real[k]", setting = "real[k]",

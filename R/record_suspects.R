@@ -210,9 +210,12 @@ is_known <- function(case, lag) {
 lagged_driver <- function(v, hours, lag) stats::approx(hours, v, hours - lag, rule = 2)$y
 
 # Whether an error is left that runs with another driver may explain, and runs are left to make.
+# What was adopted may have taken nearly all of it.
 is_unsettled <- function(case) {
-  left <- if (is.null(case$adopted)) case$before$left else case$adopted$left
-  length(moving_drivers(case)) > 0 && mean(left^2) > rules$excess_error * case$noise^2 &&
+  excess <- function(left) mean(left^2) / case$noise^2 - 1
+  before <- excess(case$before$left)
+  after <- if (is.null(case$adopted)) before else excess(case$adopted$left)
+  length(moving_drivers(case)) > 0 && after > max(rules$excess_error - 1, rules$remains * before) &&
     case$runs >= 8 * length(moving_drivers(case))
 }
 

@@ -87,12 +87,18 @@ try_all <- function(state, left, context) {
     if (is_spent(context)) break
     simulators <- extended_simulators(state$catalogue[[name]], state)
     bar <- bar_of(trials, state$present, context)
-    # About twice an equal share of a budget: what a trial leaves, those after it have.
-    own <- sparing(context, 2 / (1 + length(ordered) - length(trials)), rules$least_trial)
+    own <- at_most(context, points_of_turn(context, length(ordered) - length(trials)))
     trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, own))
     report_trial(trials[[name]], state$present, context)
   }
   trials
+}
+
+# Of a budget, those of the next of k trials: about twice an equal share, as what it does not need
+# those after it have; but as many for each of them as a trial needs.
+points_of_turn <- function(context, k) {
+  left <- points_left(context)
+  max(rules$least_trial, min(2 / (1 + k) * left, left - (k - 1) * rules$least_trial))
 }
 
 # A mechanism that cannot be computed is told as such, and the others go on.
@@ -180,8 +186,7 @@ no_winner <- function(table, present, context) {
 why_not <- function(table, decisive, context) {
   seen <- table[!is.na(table$log10_bf), ]
   if (is_spent(context) && is_open(table, decisive)) {
-    best <- if (nrow(seen)) paste0(" (", found_words(seen, decisive), ")")
-    return(list(id = "budget", words = paste0(budget_words(context), best)))
+    return(list(id = "budget", words = paste0(budget_words(context), best_so_far(seen, decisive))))
   }
   if (!nrow(seen)) return(list(id = "none_computed", words = "no mechanism could be computed"))
   highest <- seen[which.max(seen$log10_bf), ]
@@ -216,11 +221,15 @@ is_open <- function(table, decisive) {
     any(table$judged_by == "trial" & !is.na(table$log10_bf) & table$upper95 >= decisive)
 }
 
-# The mechanism of the highest factor, with as many digits as it takes to see that it is less than
-# what is needed.
-found_words <- function(table, decisive) {
-  best <- table[which.max(table$log10_bf), ]
-  digits <- if (best$log10_bf < decisive && round(best$log10_bf, 1) >= decisive) 2 else 1
-  sprintf("best: %s, log10 Bayes factor %.*f%s", best$mechanism, digits, best$log10_bf,
+best_so_far <- function(seen, decisive) {
+  if (!nrow(seen)) return("")
+  best <- seen[which.max(seen$log10_bf), ]
+  sprintf(" (%s%s)", found_words(best, decisive),
           if (best$judged_by == "trial") ", not verified" else "")
+}
+
+# With as many digits as it takes to see that it is less than what is needed.
+found_words <- function(row, decisive) {
+  digits <- if (row$log10_bf < decisive && round(row$log10_bf, 1) >= decisive) 2 else 1
+  sprintf("best: %s, log10 Bayes factor %.*f", row$mechanism, digits, row$log10_bf)
 }

@@ -144,7 +144,8 @@ Rcpp::List list_record(const RecordPosterior& record, const HistoryModel& model)
   using Rcpp::_;
   Rcpp::List out = Rcpp::List::create(
       _["coefficients"] = record.coefficients, _["withheld"] = record.withheld,
-      _["withheld_covariance"] = record.withheld_covariance, _["reach"] = record.reach,
+      _["withheld_covariance"] = record.withheld_covariance,
+      _["withheld_of_condition"] = record.withheld_of_condition, _["reach"] = record.reach,
       _["tangent"] = convert::simulator_list(record.tangent),
       _["centre"] = VectorXd(model.centre().transpose()), _["scale"] = VectorXd(model.scale().transpose()));
   add_points(out, record.history);

@@ -116,11 +116,12 @@ test_that("the discrepancy is the whole response that the model lacks", {
   }
 })
 
-test_that("each condition's response is told, and their sum is the discrepancy where it is free", {
-  fit <- lacking(Inf)
-  own <- discrepancy(fit)
-  expect_identical(colnames(own$responses), c("Te", "Gv", "Tn"))
-  expect_equal(rowSums(own$responses), own$series$discrepancy, tolerance = 1e-8)
+test_that("each condition's response is told, and their sum is the discrepancy", {
+  for (reach in c(13, Inf)) {  # kept out of the parameters' way, and free
+    own <- discrepancy(lacking(reach))
+    expect_identical(colnames(own$responses), c("Te", "Gv", "Tn"))
+    expect_equal(rowSums(own$responses), own$series$discrepancy, tolerance = 1e-8)
+  }
   expect_gt(cor(own$responses[, "Tn"], lagged(hidden, 3)[1:320]), 0.99)
 })
 

@@ -171,6 +171,7 @@ RecordPosterior record_posterior(const CalibrationTarget& target, std::size_t r,
   const Index moves = model.data().moves.cols();
   out.withheld.resize(moves, kept);
   out.withheld_covariance.resize(moves * moves, kept);
+  out.withheld_of_condition = MatrixXd::Zero(moves, model.conditions());
   std::vector<MatrixXd> held(model.priors().reach.size());  // of each reach that is met
   for (Index k = 0; k < kept; ++k) {
     const HistoryParameters& point =
@@ -181,6 +182,11 @@ RecordPosterior record_posterior(const CalibrationTarget& target, std::size_t r,
     MatrixXd& withheld = held[static_cast<std::size_t>(point.setting / model.error_settings())];
     if (withheld.size() == 0) withheld = model.withheld(point.setting);
     out.withheld.col(k) = withheld * given.mean;
+    for (Index j = 0; j < withheld.cols(); ++j) {
+      const int condition = model.data().condition[static_cast<std::size_t>(j)];
+      out.withheld_of_condition.col(condition) +=
+          withheld.col(j) * (given.mean[j] / static_cast<double>(kept));
+    }
     const MatrixXd root = withheld * given.root;
     const MatrixXd covariance = root * root.transpose();
     out.withheld_covariance.col(k) = VectorXd::Map(covariance.data(), covariance.size());

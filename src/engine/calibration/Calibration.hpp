@@ -18,7 +18,9 @@ struct RecordPosterior {
   /// Psi b = Phi b - E withheld.
   Eigen::MatrixXd withheld;
   Eigen::MatrixXd withheld_covariance;  ///< r^2 x kept: of each such column given its draw, r x r by columns
-  Eigen::VectorXd reach;                ///< posterior probability of each reach of the grid
+  Eigen::MatrixXd
+      withheld_of_condition;  ///< r x S: what of it is due to each condition, in the mean over kept draws
+  Eigen::VectorXd reach;      ///< posterior probability of each reach of the grid
   GaussianSimulator tangent;  ///< the simulator as the line that touches it at the posterior's centre
 };
 

@@ -150,6 +150,7 @@ TEST(Calibrate, WhatItReportsFollowsFromItsDraws) {
   ASSERT_EQ(own.withheld.rows(), 2);
   ASSERT_EQ(own.withheld.cols(), 20);
   ASSERT_EQ(c.kept.size(), 20u);
+  MatrixXd of_condition = MatrixXd::Zero(2, joint.model.conditions());
   for (Index k = 0; k < 20; ++k) {
     const Index i = c.kept[static_cast<std::size_t>(k)];
     // Draw i holds the weight at which a (k + 1/2)-th part of 20 is reached.
@@ -167,7 +168,14 @@ TEST(Calibrate, WhatItReportsFollowsFromItsDraws) {
     const MatrixXd covariance = root * root.transpose();
     const VectorXd columns = VectorXd::Map(covariance.data(), 4);
     EXPECT_LT((own.withheld_covariance.col(k) - columns).cwiseAbs().maxCoeff(), 1e-9);
+    for (Index j = 0; j < 3; ++j) {
+      of_condition.col(joint.model.data().condition[static_cast<std::size_t>(j)]) +=
+          withheld.col(j) * expected.mean[j] / 20;
+    }
   }
+  EXPECT_LT((own.withheld_of_condition - of_condition).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((own.withheld_of_condition.rowwise().sum() - own.withheld.rowwise().mean()).cwiseAbs().maxCoeff(),
+            1e-9);
   const GaussianSimulator tangent =
       tangent_at(joint.emulator, (c.posterior.draws * c.posterior.weights).tail(2));
   EXPECT_LT((own.tangent.mean - tangent.mean).cwiseQuotient(tangent.mean).cwiseAbs().maxCoeff(), 1e-9);
