@@ -66,19 +66,20 @@ cannot_be_adopted <- function(model, present) {
 }
 
 # What a mechanism must reach to be adopted, as far as `trials` show: a decisive `factor`, and a
-# `standing` that none of those surely has that may be adopted.
+# `standing` that none of those surely has that may be adopted; and the `leader`, which has it.
 bar_of <- function(trials, present, context) {
-  bar <- list(factor = context$control$decisive, standing = -Inf)
+  bar <- list(factor = context$control$decisive, standing = -Inf, leader = present)
   surely <- Filter(function(model) {
     isTRUE(model$fit$trust$trusted) && !cannot_be_adopted(model, present) &&
       is_ahead(model, present, bar)
   }, trials)
   least <- vapply(surely, function(model) standing_of(model, present) - doubt_of(model, present), 0)
-  list(factor = bar$factor, standing = max(bar$standing, least))
+  if (!length(surely)) return(bar)
+  list(factor = bar$factor, standing = max(least), leader = surely[[which.max(least)]])
 }
 
-could_win <- function(model, present, bar, leader = present) {
-  doubt <- doubt_of(model, present, leader)
+could_win <- function(model, present, bar) {
+  doubt <- doubt_of(model, present, bar$leader)
   log10_factor(model, present) + doubt >= bar$factor &&
     standing_of(model, present) + doubt >= bar$standing
 }

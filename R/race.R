@@ -9,9 +9,9 @@ next_to_verify <- function(trials, present, context) {
   open <- Filter(function(model) model$level == "tried", adoptable)
   if (!length(open)) return(NULL)
   leader <- leader_of(Filter(is_verified, adoptable), present, context$control$decisive)
-  bar <- list(factor = context$control$decisive,
+  bar <- list(factor = context$control$decisive, leader = leader %||% present,
               standing = if (is.null(leader)) -Inf else standing_of(leader, present))
-  open <- Filter(function(model) could_win(model, present, bar, leader %||% present), open)
+  open <- Filter(function(model) could_win(model, present, bar), open)
   if (!length(open)) return(NULL)
   error <- vapply(open, least_error, 0)
   nearest <- open[rules$fallen_error * error <= min(error)]

@@ -213,9 +213,13 @@ lagged_driver <- function(v, hours, lag) stats::approx(hours, v, hours - lag, ru
 # What was adopted may have taken nearly all of it.
 is_unsettled <- function(case) {
   excess <- function(left) mean(left^2) / case$noise^2 - 1
-  before <- excess(case$before$left)
-  after <- if (is.null(case$adopted)) before else excess(case$adopted$left)
-  length(moving_drivers(case)) > 0 && after > max(rules$excess_error - 1, rules$remains * before) &&
+  least <- rules$excess_error - 1
+  left <- case$before$left
+  if (!is.null(case$adopted)) {
+    left <- case$adopted$left
+    least <- max(least, rules$remains * excess(case$y - case$simulated))
+  }
+  length(moving_drivers(case)) > 0 && excess(left) > least &&
     case$runs >= 8 * length(moving_drivers(case))
 }
 
