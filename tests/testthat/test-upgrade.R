@@ -407,10 +407,26 @@ test_that("what a mechanism must reach is what another surely has that may be ad
   expect_equal(bar(model_by_hand(5, se = 0, error = 1.5)), -Inf)  # the error rises
 })
 
+test_that("a trial that its runs refute goes on if it is nearer to the record than the leader", {
+  present <- model_by_hand(0, se = 0, error = 1)
+  context <- amiss:::new_context(1, 1, list(decisive = 2))
+  leader <- tried_by_hand(9, se = 0, error = 0.4)
+  leader$fit$trust <- list(trusted = TRUE)
+  could_win <- function(error, trials) {
+    refuted <- tried_by_hand(-40, se = 0, passed = FALSE, error = error)
+    amiss:::could_win(refuted, present, amiss:::bar_of(trials, present, context))
+  }
+  expect_true(could_win(0.6, list()))
+  expect_false(could_win(0.6, list(leader)))
+  expect_true(could_win(0.3, list(leader)))
+})
+
 test_that("a trial goes on while its runs leave open whether it can win", {
   present <- model_by_hand(0, se = 0, error = 1)
-  clear <- function(..., bar = 2)
-    amiss:::is_clear(tried_by_hand(...), present, list(factor = bar, standing = -Inf))
+  clear <- function(..., bar = 2) {
+    reach <- list(factor = bar, standing = -Inf, leader = present)
+    amiss:::is_clear(tried_by_hand(...), present, reach)
+  }
   expect_true(clear(3))
   expect_false(clear(2.2, effective = 0.5))
   expect_true(clear(3, effective = 0.5))
