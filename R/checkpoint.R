@@ -43,8 +43,15 @@ check_checkpoint <- function(folder, call) {
   check_folder_possible(folder, "checkpoint", call)
 }
 
+longest_path <- 4000
+
 # Whether a folder is there, or can be made, and written.
 check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
+  bytes <- nchar(folder, "bytes")
+  if (bytes > longest_path) {
+    abort_input(paste("{.arg {name}} cannot be used: a path may have {longest_path} bytes, this",
+                      "one has {bytes}."), call = call)
+  }
   there <- folder
   while (!file.exists(there) && there != dirname(there)) there <- dirname(there)
   if (dir.exists(there) && file.access(there, 2) == 0) return(invisible(TRUE))

@@ -42,7 +42,8 @@ new_model <- function(simulators, records, name = "base", parent = NULL, mechani
 # numbers of the runs.
 with_runs <- function(model, z, context) {
   z <- pmin(pmax(z, rep(model$space$lower, each = nrow(z))), rep(model$space$upper, each = nrow(z)))
-  z <- z[seq_len(min(nrow(z), points_left(context))), , drop = FALSE]
+  left <- floor(max(0, runs_left(context)) / length(model$simulators))
+  z <- z[seq_len(min(nrow(z), left)), , drop = FALSE]
   at <- nrow(model$runs$z) + seq_len(nrow(z))
   if (length(at)) model$runs <- bind_runs(model$runs, run_at(model, z, context))
   list(model = model, at = at)

@@ -227,3 +227,8 @@ test_that("kept runs count towards the budget as when they were made", {
   expect_identical(again$runs_total, first$runs_total)
   expect_identical(again$stopped_because, first$stopped_because)
 })
+
+test_that("a path that no system takes is refused", {
+  expect_error(amiss:::check_folder_possible(strrep("a", 1e4), "checkpoint"), "10000",
+               class = "amiss_error_input")
+})
