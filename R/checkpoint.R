@@ -50,7 +50,7 @@ check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
   bytes <- nchar(folder, "bytes")
   if (bytes > longest_path) {
     abort_input(paste("{.arg {name}} cannot be used: a path may have {longest_path} bytes, this",
-                      "one has {bytes}."), call = call)
+                      "one has {bytes}. Give a shorter one."), call = call)
   }
   there <- folder
   while (!file.exists(there) && there != dirname(there)) there <- dirname(there)

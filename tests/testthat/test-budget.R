@@ -36,7 +36,6 @@ test_that("with 200 runs causes of several times the noise are still adopted", {
     expect_lte(upgrade$runs_total, 200)
     identical(upgrade$models[[length(upgrade$models)]]$mechanism, world$kinds[[1]])
   }, NA)
-  # bench/budget.R says how often that is so. Of these three all were right, and one before stages
-  # shared a budget.
+  # bench/budget.R says how often that is so: one in six may be missed.
   expect_gte(sum(right), 2)
 })
