@@ -134,6 +134,7 @@ content_hash <- function(x) rlang::hash(serialize(x, NULL, version = 2))
 # the global environment only what a function names.
 plain <- function(x, seen = new.env()) {
   if (is.environment(x)) return(plain_environment(x, seen))
+  if (typeof(x) == "externalptr") seen[["pointer"]] <- TRUE
   if (is.primitive(x)) return(deparse(x))
   if (is.function(x)) return(list(code(x), plain(environment(x), seen), named_globals(x, seen)))
   if (is.symbol(x)) return(as.character(x))
@@ -163,7 +164,8 @@ plain_environment <- function(x, seen) {
 named_globals <- function(f, seen) {
   if (isNamespace(environment(f))) return(list())
   names <- intersect(unlist(lapply(as.list(f), all.names)), ls(globalenv(), all.names = TRUE))
-  names <- names[!vapply(paste("global", names), exists, NA, envir = seen, inherits = FALSE)]
+  keys <- paste("global", names, recycle0 = TRUE)
+  names <- names[!vapply(keys, exists, NA, envir = seen, inherits = FALSE)]
   for (name in names) seen[[paste("global", name)]] <- length(seen) + 1
   bindings(globalenv(), names, seen)
 }

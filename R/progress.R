@@ -61,8 +61,8 @@ begin_stage <- function(text, frame = rlang::caller_env()) {
   paste(c(around, text), collapse = ": ")
 }
 
-# Evaluates `code`, which calls piece_done() for each of `n` pieces.
-counted <- function(text, n, code) {
+# Evaluates `code`, which calls piece_done() of this class for each of `n` pieces.
+counted <- function(text, n, code, class = "amiss_piece_done") {
   way <- progress_way()
   if (way == "none") return(code)
   where <- begin_stage(text)
@@ -78,8 +78,8 @@ counted <- function(text, n, code) {
     }
   }
   process <- Sys.getpid()  # a forked worker has these handlers too
-  withCallingHandlers(code, amiss_piece_done = function(piece) {
-    if (Sys.getpid() != process) return()
+  withCallingHandlers(code, immediateCondition = function(piece) {
+    if (Sys.getpid() != process || !inherits(piece, class)) return()
     done <<- piece$done %||% (done + 1)
     show()
   })
@@ -87,8 +87,8 @@ counted <- function(text, n, code) {
 
 # Another piece is done, or `done` of them in all. Workers of package future pass the condition on
 # at once. Made by hand: rlang::signal() takes a fifth of a millisecond, as long as many a run.
-piece_done <- function(done = NULL) {
-  signalCondition(structure(class = c("amiss_piece_done", "immediateCondition", "condition"),
+piece_done <- function(done = NULL, class = "amiss_piece_done") {
+  signalCondition(structure(class = c(class, "immediateCondition", "condition"),
                             list(message = "", call = NULL, done = done)))
 }
 

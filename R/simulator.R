@@ -395,6 +395,8 @@ count_runs <- function(runs) ledger$runs <- ledger$runs + runs
 # Runs that were not made, as a program's cache had them.
 found_so_far <- function() ledger$found
 
+count_found <- function(runs) ledger$found <- ledger$found + runs
+
 # A method of simulate_runs() that keeps runs notes of each whether it was found, and the seconds
 # that it took when it was made.
 note_found <- function(found, seconds) {
@@ -420,7 +422,7 @@ counting_runs <- function(runs, code) {
   }
   result <- code(part)
   finished <- TRUE
-  ledger$found <- ledger$found + sum(all_found)
+  count_found(sum(all_found))
   result
 }
 

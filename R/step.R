@@ -78,19 +78,33 @@ budget_words <- function(context) {
 
 # ---- trials
 
-# Those first that the discrepancy speaks for.
+# Those first that the discrepancy speaks for. The first shows what the others must reach, which
+# know nothing of one another. Of a budget each leaves to those after it what it does not need.
 try_all <- function(state, left, context) {
-  trials <- list()
   ordered <- trial_order(state$catalogue[left], last_model(state$models)$attribution)
+  simulators <- lapply(state$catalogue[ordered], extended_simulators, state)
   turn <- turns("mechanism", length(ordered))
-  for (name in ordered) {
-    if (is_spent(context)) break
-    simulators <- extended_simulators(state$catalogue[[name]], state)
-    bar <- bar_of(trials, state$present, context)
-    own <- at_most(context, points_of_turn(context, length(ordered) - length(trials)))
-    trials[[name]] <- staged(turn(name), try_one(state, name, simulators, bar, own))
-    report_trial(trials[[name]], state$present, context)
+  try <- function(name, before, context) {
+    bar <- bar_of(before, state$present, context)
+    staged(turn(name), try_one(state, name, simulators[[name]], bar, context))
   }
+  report <- function(trial) report_trial(trial, state$present, context)
+  trials <- list()
+  if (is.finite(context$budget)) {
+    for (name in ordered) {
+      if (is_spent(context)) break
+      own <- at_most(context, points_of_turn(context, length(ordered) - length(trials)))
+      trials[[name]] <- try(name, trials, own)
+      report(trials[[name]])
+    }
+    return(trials)
+  }
+  trials[[ordered[1]]] <- try(ordered[1], list(), context)
+  report(trials[[1]])
+  first <- trials
+  trials[ordered[-1]] <- side_by_side(ordered[-1], function(name, context) {
+    try(name, first, context)
+  }, report, context, simulators)
   trials
 }
 

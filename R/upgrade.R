@@ -29,6 +29,13 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'
 #' [decision_rules()] lists every number that decides.
 #'
+#' # Workers
+#'
+#' If [future::plan()] offers workers and there is no budget, the mechanisms of a step after the
+#' first are tried side by side, with the same results. Functions and values that a simulator names
+#' in the global environment go to the workers; what it writes there is lost. If simulators or
+#' mechanisms hold a pointer, as those of compiled code may, they are tried one after the other.
+#'
 #' # Given runs
 #'
 #' The base model may be an [ensemble()] of runs that were made elsewhere, and mechanisms may be

@@ -240,7 +240,8 @@ test_that("a mechanism that changes nothing costs its first look, and appears in
 })
 
 test_that("a mechanism whose runs fail does not end the loop, nor one whose numbers fail", {
-  upgrade <- loop(fails, sun)
+  expect_warning(upgrade <- loop(fails, sun), "\"fails\" could not be tried",
+                 class = "amiss_warning_trial")
   row <- upgrade$candidates[upgrade$candidates$mechanism == "fails", ]
   expect_identical(row$judged_by, "none")
   expect_equal(row$probability, 0)
