@@ -1,6 +1,7 @@
 #!/usr/bin/env Rscript
 # Hidden-effect benchmark.
 # Usage: Rscript bench/hidden_effects.R [--family F,F] --worlds N --seed S --out FILE [--workers N]
+#                                       [--rivals no]
 #
 # Worlds S, S+1, ... of each family named are drawn, scored and written as JSON: a row a world, with
 # its family, and for each family rates, means and what the attribution by itself said of each
@@ -9,8 +10,8 @@
 # the catalogue, which is the default; network, grey-box networks of a house; runoff, a catchment
 # with thresholds; wrong, base models that are wrong in structure besides. Each finished world is
 # kept in FILE.worlds/, so that a stopped run goes on where it was; worlds that failed are tried
-# again. Work goes through the user's future plan if --workers is not given. The random forest is
-# asked where the package ranger is installed.
+# again. Work goes through the user's future plan if --workers is not given. Rivals take two thirds of
+# the time; the random forest is asked where the package ranger is installed.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
@@ -19,6 +20,7 @@ worlds <- as.integer(option("worlds", "24", smallest = "1"))
 first <- as.integer(option("seed", "1"))
 out <- option("out", "hidden_effects.json")
 workers <- option("workers")
+rivals <- option("rivals", "yes") != "no"
 suppressPackageStartupMessages(library(amiss))
 
 parts <- c("worlds", "least_squares", "network", "runoff", "wrong", "families", "score", "figures")
@@ -36,12 +38,13 @@ tasks <- expand.grid(seed = first + seq_len(worlds) - 1L, family = unique(asked)
                      stringsAsFactors = FALSE)
 tasks$file <- file.path(keep, sprintf("%s-%09d.rds", tasks$family, tasks$seed))
 finished <- function(file) file.exists(file) && is.null(readRDS(file)$error)
-one_world <- function(seed, family, file, parts, total) {
+one_world <- function(seed, family, file, parts, rivals, total) {
   suppressPackageStartupMessages(library(amiss))
   scope <- new.env(parent = globalenv())
   for (part in parts) sys.source(part, scope)
   row <- tryCatch(
-    scope$score_world(scope$family_world(family, seed), rivals = scope$families[[family]]$rivals),
+    scope$score_world(scope$family_world(family, seed),
+                      rivals = rivals && scope$families[[family]]$rivals),
     error = function(e) list(seed = seed, family = family, error = conditionMessage(e)))
   part <- tempfile("part-", dirname(file))
   saveRDS(row, part)
@@ -55,12 +58,13 @@ one_world <- function(seed, family, file, parts, total) {
 
 if (!is.null(workers)) future::plan(future::multisession, workers = as.integer(workers))
 missing <- tasks[!vapply(tasks$file, finished, NA), ]
-if (!requireNamespace("ranger", quietly = TRUE)) {
+if (rivals && !requireNamespace("ranger", quietly = TRUE)) {
   message("ranger is not installed: no random forest among the rivals ",
           "(tools/install-dependencies --bench installs it)")
 }
 invisible(future.apply::future_mapply(one_world, missing$seed, missing$family, missing$file,
-                                      MoreArgs = list(parts = parts, total = nrow(tasks)),
+                                      MoreArgs = list(parts = parts, rivals = rivals,
+                                                      total = nrow(tasks)),
                                       future.seed = NULL, future.scheduling = Inf))
 rows <- lapply(tasks$file, readRDS)
 failed <- Filter(function(r) !is.null(r$error), rows)
