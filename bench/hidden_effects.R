@@ -10,8 +10,8 @@
 # the catalogue, which is the default; network, grey-box networks of a house; runoff, a catchment
 # with thresholds; wrong, base models that are wrong in structure besides. Each finished world is
 # kept in FILE.worlds/, so that a stopped run goes on where it was; worlds that failed are tried
-# again. Work goes through the user's future plan if --workers is not given. Rivals take two thirds of
-# the time; the random forest is asked where the package ranger is installed.
+# again. Work goes through the user's future plan if --workers is not given. Rivals take two thirds
+# of the time; the random forest is asked where the package ranger is installed.
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
