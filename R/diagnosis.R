@@ -178,8 +178,8 @@ cause_headline <- function(upgrade) {
     m <- adopted[[k]]
     switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
            likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
-           paste0("\"", m$mechanism, "\" fits", if (k > 1) " too", ", but data held out do not ",
-                  "gain by it: take it as a stand-in for something else."))
+           paste0("\"", m$mechanism, "\" fits", if (k > 1) " too", ", but held-out data do not ",
+                  "improve with it: take it as a stand-in for something else."))
   }, "")
   paste(told, collapse = " ")
 }

@@ -109,7 +109,7 @@ decision_words <- function(table, decisive) {
   words <- ifelse(table$judged_by == "trial", "not verified", "too uncertain")
   words[table$step %in% table$step[table$adopted]] <- "another one is better"
   words[is_refuted(table)] <- "refused: an unknown response does better"
-  words[keeps_error(table)] <- "refused: the error does not fall"
+  words[keeps_error(table)] <- "refused: the error does not fall by 1 %"
   words[table$log10_bf < decisive] <- "too weak"
   words[table$adopted] <- "adopted"
   words

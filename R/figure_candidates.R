@@ -55,8 +55,8 @@ figure_candidates <- function(upgrade) {
                                        "be adopted. The axis is compressed: 2 is 100 to 1, 10 is",
                                        "10^10 to 1. Lines: 95 %% intervals."),
                                  format(10^decisive, big.mark = ",")),
-                         if (any(refused)) " Refused: the error does not fall, or an unknown ",
-                         if (any(refused)) "response does better."),
+                         if (any(refused)) " Refused: the error does not fall by 1 %, or an ",
+                         if (any(refused)) "unknown response does better."),
                   x = "evidence for it (log10 Bayes factor)") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"),

@@ -356,8 +356,8 @@ tried_words <- function(driven) {
   tried <- unique(unlist(driven))
   several <- length(driven) > 1
   sprintf(paste("The error still responds to %s. Among the mechanisms that %s, %s %s tried but not",
-                "adopted: look for another way in which %s. Days on which %s changes and the other",
-                "conditions hardly do show that best."),
+                "adopted: look for another way in which %s. The best days for this are those on",
+                "which %s changes and the other conditions hardly change."),
           listed(names(driven)), if (several) "they drive" else "it drives", listed(tried),
           if (length(tried) > 1) "were" else "was",
           if (several) "they act" else paste(names(driven), "acts"),

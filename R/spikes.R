@@ -28,8 +28,8 @@ spike_inspection <- function(model, measurements) {
   at <- measurements$time[rows][apart[1]]
   c(spikes = sprintf(paste("%d of %d readings, the first at %s, %s apart from those before and",
                            "after: a sensor that fails now and then, or something that lasts a",
-                           "single step. What is the sensor's, mark as NA: a few such readings",
-                           "weigh like many good ones."),
+                           "single step. Mark readings that the sensor got wrong as NA: a few",
+                           "of them weigh as much as many good ones."),
                      length(apart), length(r), paste0(if (is.numeric(at)) "hour ", format(at)),
                      if (length(apart) > 1) "stand" else "stands"))
 }

@@ -206,8 +206,8 @@ why_not <- function(table, decisive, context) {
   highest <- seen[which.max(seen$log10_bf), ]
   if (keeps_error(highest) && highest$log10_bf >= decisive) {
     return(list(id = "keeps_error", words = sprintf(
-      paste("no mechanism lowers the error decisively (%s has a log10 Bayes factor of %.1f, but",
-            "does not lower it)"), highest$mechanism, highest$log10_bf)))
+      paste("no mechanism with decisive evidence lowers the error by 1 %% (%s has a log10 Bayes",
+            "factor of %.1f)"), highest$mechanism, highest$log10_bf)))
   }
   if (is_refuted(highest) && highest$log10_bf >= decisive) {
     return(list(id = "imitated",

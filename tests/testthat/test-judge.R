@@ -325,7 +325,7 @@ test_that("why nothing was adopted names the best, also where the error rises wi
   expect_identical(risen$id, "keeps_error")
   expect_match(
     risen$words,
-    "lowers the error decisively \\(sun has a log10 Bayes factor of 3.0, but does not lower it")
+    "with decisive evidence lowers the error by 1 % \\(sun has a log10 Bayes factor of 3.0")
   expect_identical(told(log10_bf = c(3, 4), lower95 = c(1, -1))$id, "uncertain")
   expect_match(told(log10_bf = c(3, 4), lower95 = c(1, -1))$words, "too uncertain \\(best: lag")
   imitated <- told(log10_bf = c(1, 4), beside_unknown = c(1, -5))
