@@ -72,7 +72,7 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' @param validation Matrix of outputs at the validation rows, one run a column, if `outputs` does
 #'   not hold them.
 #' @param time Times of the rows of `outputs`, and then of `validation`: anything that
-#'   [measurements()] reads, as in the data.
+#'   [measurements()] reads, at the end of each row; dates without a time of day are whole days.
 #' @return An object of class `amiss_ensemble`; `held_out` holds its runs at the validation rows.
 #' @seealso [read_calibro()]
 #' @examples
@@ -222,8 +222,8 @@ place_runs <- function(outputs, validation, measurements, time, call = rlang::ca
 }
 
 row_times <- function(time, rows, measurements, call) {
-  hours <- time_hours(read_time(time, "time", measurements$time_format,
-                                measurements$time_zone, call))
+  read <- read_time(time, "time", measurements$time_format, measurements$time_zone, call)
+  hours <- time_hours(interval_ends(read, time))
   if (length(hours) != rows) abort_input(paste("{.arg time} has {length(hours)} value{?s}, the",
                                                "runs have {rows} row{?s}."), call = call)
   hours

@@ -7,7 +7,9 @@
 #' * It is averaged to a coarser step if asked (blocks follow the UTC clock).
 #' * Each row is given its use: calibration, validation or warm-up.
 #'
-#' Time stamps mark the end of each interval. If yours mark the beginning, add a step first.
+#' A time stamp marks the end of its interval, so that 10:00 of an hourly record stands for 9:00 to
+#' 10:00. If yours mark the beginning, say `stamp = "start"`. A date without a time of day is that
+#' whole day.
 #'
 #' # Time
 #'
@@ -20,8 +22,7 @@
 #' * the stamps of EnergyPlus (` 01/21 24:00:00`, hours of a year that is not known);
 #' * numbers.
 #'
-#' Midnight may be `24:00:00`. A `Date` is its beginning, 00:00 UTC. For daily values that are dated
-#' by their day, give `date + 1`.
+#' Midnight may be `24:00:00`.
 #'
 #' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Other numbers are recognised,
 #' with a message, if they cannot be hours: Unix time, digits of a date such as 201308300010, and
@@ -104,8 +105,10 @@
 #'   condition are refused.
 #' @param range Lower and upper end of the range of the target's sensor. Rows at an end, or beyond,
 #'   are left out of the comparison.
+#' @param stamp What a time stamp marks of its interval: `"end"` or `"start"`. If it is not given,
+#'   the end; but dates without a time of day mark the start of their day.
 #' @return An object of class `amiss_measurements`:
-#'   * `time`, `hours`: of each row, after averaging.
+#'   * `time`, `hours`: of the end of each row, after averaging.
 #'   * `y`: the target in each row.
 #'   * `use`: `"calibrate"`, `"validate"`, `"warmup"` or `"none"`. The calibration rows are those
 #'     with `"calibrate"` whose `y` is not `NA`.
@@ -120,9 +123,10 @@
 #'
 #'   At least 20 rows must calibrate. Rows of neither use still drive the simulator.
 #'
-#'   In an expression the record's time may be called `time`. Texts in quotes are compared with
-#'   numbers as numbers, and with times as times (`"time >= '2013-09-02'"`). They are then read in
-#'   the format of their column or as ISO 8601, and in `time_zone`.
+#'   In an expression the record's time may be called `time`: its stamps as they were given. Texts
+#'   in quotes are compared with numbers as numbers, and with times as times (`"time >=
+#'   '2013-09-02'"`). They are then read in the format of their column or as ISO 8601, and in
+#'   `time_zone`.
 #' @examples
 #' table <- data.frame(hour = 1:48, Ti = 20 + sin(1:48 / 4), Te = 5 + 3 * sin(1:48 / 4))
 #' measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1, warmup = 6)
@@ -137,7 +141,7 @@
 measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, average = NULL,
                          calibrate = NULL, validate = NULL, warmup = 0, name = target, unit = "",
                          time_format = NULL, time_zone = NULL, fill_gaps = 0, missing = NULL,
-                         range = NULL) {
+                         range = NULL, stamp = NULL) {
   table <- time_table(data, time, time_format)
   data <- table$data
   time <- table$time
@@ -145,6 +149,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   check_input(checkmate::check_string(target), "target")
   check_input(checkmate::check_number(warmup, lower = 0, finite = TRUE), "warmup")
   check_input(checkmate::check_number(fill_gaps, lower = 0, finite = TRUE), "fill_gaps")
+  check_input(checkmate::check_choice(stamp, c("end", "start"), null.ok = TRUE), "stamp")
   terms <- boundary_terms(boundary)
   check_record(data, time, target, terms, name, unit)
   check_marks(missing, range)
@@ -183,6 +188,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                   i = "Validation rows must not be seen by the calibration."))
   }
   used_for <- ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none"))
+  stamps <- interval_ends(stamps, data[[time]], stamp)
   grid <- regular_grid(time_hours(stamps), fill_gaps, time)
   there <- !is.na(grid$row)
   use_given <- used_for
@@ -232,8 +238,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                  condition = x$condition, conditions = x$names,
                  labels = stats::setNames(terms$label, terms$name)[told],
                  units = stats::setNames(terms$unit, terms$name)[told],
-                 time_format = reading$format,
-                 time_zone = time_zone, constant = constant, findings = findings,
+                 time_format = reading$format, time_zone = time_zone, stamp = stamp,
+                 constant = constant, findings = findings,
                  faulty = faulty_steps(findings, target, coarse$block, grid$row), missing = missing,
                  range = range), class = "amiss_measurements")
 }

@@ -143,7 +143,8 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   data <- with_switches(data, terms$name)
   compared <- c(terms$name, intersect(m$target, names(data)))
   require_numeric(data, compared, call)
-  time <- read_time(data$time, "time", m$time_format, m$time_zone, call)
+  time <- interval_ends(read_time(data$time, "time", m$time_format, m$time_zone, call), data$time,
+                        m$stamp)
   hours <- time_hours(time)
   step <- m$raw$step_h
   if (length(hours) < 2 || any(abs(diff(hours) - step) > 0.01 * step)) {

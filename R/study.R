@@ -3,13 +3,13 @@ study_fields <- list(
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
   optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format",
-               "time_zone", "fill_gaps_h", "missing", "range", "separator", "decimal", "runs",
-               "seed", "control", "title", "records"))
+               "time_zone", "stamp", "fill_gaps_h", "missing", "range", "separator", "decimal",
+               "runs", "seed", "control", "title", "records"))
 
 # What each of several records may have of its own.
 record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h",
                    "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
-                   "fill_gaps_h", "missing", "range", "separator", "decimal")
+                   "stamp", "fill_gaps_h", "missing", "range", "separator", "decimal")
 
 # Fields that name a file. All but the data are R files.
 file_fields <- c("data", "model", "catalogue", "models", "truth")
@@ -38,7 +38,7 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   degrees. A condition may have a label and a unit, which people read in its place: `Gv: {label:
 #'   sun from the south, unit: W/m2}`, and `circular: true` for degrees.
 #' * `calibrate` and `validate`: conditions in the columns of the data.
-#' * `noise_sd`, `unit`, `time_format`, `time_zone`: as in [measurements()].
+#' * `noise_sd`, `unit`, `time_format`, `time_zone`, `stamp`: as in [measurements()].
 #' * `average_h` (the step of the data if it is not given), `warmup_h` and `fill_gaps_h` (0): in
 #'   hours.
 #' * `missing`: codes for a missing value, as `[-9999, 85]`, or `none`.
@@ -256,7 +256,7 @@ study_measurements <- function(study, files) {
     noise_sd = study$noise_sd, average = study$average_h,
     calibrate = rows("calibrate"), validate = rows("validate"),
     warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
-    time_format = study$time_format, time_zone = study$time_zone,
+    time_format = study$time_format, time_zone = study$time_zone, stamp = study$stamp,
     fill_gaps = study$fill_gaps_h %||% 0,
     missing = if (identical(study$missing, "none")) NA else unlist(study$missing),
     range = unlist(study$range))

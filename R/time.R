@@ -38,6 +38,21 @@ span_hours <- function(values) {
                                   weeks = 168)[[unit]]
 }
 
+# Whether times that were read from `values` are dates without a time of day.
+are_days <- function(values, time) {
+  if (inherits(values, "Date")) return(TRUE)
+  is.character(values) && inherits(time, "POSIXct") && !any(grepl(":", values, fixed = TRUE)) &&
+    all(format(time, "%H%M%S") == "000000", na.rm = TRUE)
+}
+
+# The ends of the intervals that stamps mark, `time` as read from `values`.
+interval_ends <- function(time, values, stamp = NULL) {
+  stamp <- stamp %||% if (are_days(values, time)) "start" else "end"
+  if (stamp == "end") return(time)
+  step_h <- stats::median(diff(time_hours(time)))
+  time + step_h * if (is.numeric(time)) 1 else 3600
+}
+
 utc <- function(seconds) as.POSIXct(seconds, origin = "1970-01-01", tz = "UTC")
 
 # With the clock of `zone`, else its own.

@@ -43,6 +43,47 @@ test_that("midnight, days alone and fractions of seconds are read", {
                c("2020-01-21 00:15:00.0", "2020-01-21 12:15:00.0"))
 })
 
+test_that("a stamp marks the end of its interval, the start if that is said, and a date its day", {
+  data <- linear_data(48)
+  hourly <- as.POSIXct("2024-03-01", tz = "UTC") + 3600 * 0:47
+  first <- function(time, ...) {
+    data$time <- time
+    m <- measurements(data, time = "time", target = "Ti", boundary = ~Te, noise_sd = 0.1, ...)
+    c(as_utc(m$time[1]), as_utc(m$raw$time[1]))
+  }
+  expect_identical(first(hourly), rep("2024-03-01 00:00:00.0", 2))
+  expect_identical(first(hourly, stamp = "start"), rep("2024-03-01 01:00:00.0", 2))
+  expect_identical(first(hourly, stamp = "start", average = 2)[1], "2024-03-01 02:00:00.0")
+  expect_identical(first(format(hourly, "%Y-%m-%d %H:%M"), stamp = "start")[1],
+                   "2024-03-01 01:00:00.0")
+  days <- as.Date("2024-03-01") + 0:47
+  for (dates in list(days, format(days), format(days, "%d.%m.%Y")))
+    expect_identical(first(dates)[1], "2024-03-02 00:00:00.0")
+  expect_identical(first(days, stamp = "end")[1], "2024-03-01 00:00:00.0")
+  expect_identical(first(as.POSIXct(format(days), tz = "UTC"))[1], "2024-03-01 00:00:00.0")
+  # Hours without a date.
+  data$hour <- 0:47
+  m <- measurements(data, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+                    stamp = "start")
+  expect_identical(m$hours[1:2], c(1, 2))
+})
+
+test_that("rows are chosen by the stamps as given, and new data have the same stamps", {
+  data <- linear_data(60)
+  data$day <- as.Date("2024-03-01") + 0:59
+  m <- measurements(data, time = "day", target = "Ti", boundary = ~Te, noise_sd = 0.1,
+                    validate = "day >= '2024-04-01'")
+  expect_identical(sum(m$use == "validate"), 29L)
+  expect_identical(as_utc(m$time[m$use == "validate"][1]), "2024-04-02 00:00:00.0")
+  new <- data.frame(time = as.Date("2024-05-01") + 0:9, Te = 1:10)
+  expect_identical(as_utc(amiss:::new_record(m, new)$time[1]), "2024-05-02 00:00:00.0")
+  started <- measurements(transform(data, at = 24 * 0:59), time = "at", target = "Ti",
+                          boundary = ~Te, noise_sd = 0.1, stamp = "start",
+                          time_format = "hours")
+  expect_identical(amiss:::new_record(started, data.frame(time = 24 * 60:61, Te = 1:2))$hours,
+                   24 * 61:62)
+})
+
 test_that("numbers are hours unless they are said, or too large, to be", {
   expect_identical(read(c("23", "24.5", "49")), c(23, 24.5, 49))
   expect_identical(read(as.difftime(c(30, 90), units = "mins")), c(0.5, 1.5))
