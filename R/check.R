@@ -75,8 +75,7 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
   rms <- sqrt(mean(error^2))
   ratio <- error_over_noise(fit, error)
   noise <- if (ratio > 0) rms / ratio else fit$measurements$noise_sd
-  border <- sum(
-    fit$weights[region_distance(fit$emulator$processes$region, posterior_unit(fit)) > 0.9])
+  border <- sum(fit$weights[in_border(fit$emulator$processes$region, posterior_unit(fit))])
   passed <- ratio <= rules$error_ratio && border <= rules$border
   told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by,
                   format(signif(ratio, 2)),

@@ -43,8 +43,6 @@ check_checkpoint <- function(folder, call) {
   check_folder_possible(folder, "checkpoint", call)
 }
 
-longest_path <- 4000
-
 # Whether a folder is there, or can be made, and written.
 check_folder_possible <- function(folder, name, call = rlang::caller_env()) {
   bytes <- nchar(folder, "bytes")

@@ -56,7 +56,8 @@ posterior_of <- function(model, context, ais = NULL, border = rules$border_inter
     outside <- border_share(model, fits)
     if (outside <= border || try == rules$region_tries) break
     model$region <- region_of_draws(joint_unit(model, fits), fits[[1]]$weights, model$parameters,
-                                    growth = if (outside > 0.2) 1.5 else 1.2)
+                                    growth = if (outside > rules$cut_share) rules$cut_growth
+                                             else rules$border_growth)
   }
   list(model = model, fits = fits)
 }
@@ -70,7 +71,7 @@ following <- function(found) {
 }
 
 border_share <- function(model, fits) {
-  sum(fits[[1]]$weights[region_distance(model$region, joint_unit(model, fits)) > 0.9])
+  sum(fits[[1]]$weights[in_border(model$region, joint_unit(model, fits))])
 }
 
 # Draws of all parameters in the unit cube; the calibrations of all records have the same draws.
@@ -89,7 +90,7 @@ fits_in_region <- function(model, context, ais) {
 # The posterior ends where the simulator fails: draws whose nearest run failed are impossible.
 without_failing <- function(model, fits) {
   failed <- !succeeded(model)
-  near <- straight_distance(model) <= 2
+  near <- straight_distance(model) <= rules$failing_radius
   if (!any(failed & near)) return(fits)
   scaled <- function(z) along_axes(model$region, model$space, z)
   draws <- scaled(from_unit(joint_unit(model, fits), model$space))
@@ -97,7 +98,7 @@ without_failing <- function(model, fits) {
   nearest <- apply(draws, 2, function(draw) which.min(colSums((runs - draw)^2)))
   possible <- !failed[near][nearest]
   weights <- fits[[1]]$weights * possible
-  if (sum(weights) < 1e-6) return(fits)
+  if (sum(weights) < rules$least_possible) return(fits)
   lapply(fits, function(fit) {
     fit$log_evidence <- fit$log_evidence + log(sum(weights))
     fit$interval <- fit$interval + log(sum(weights))
@@ -208,7 +209,7 @@ record_ensemble <- function(model, k, region) {
   ensemble
 }
 
-least_training <- function(own) max(6, length(own) + 3)
+least_training <- function(own) max(rules$training_runs, length(own) + rules$training_spare)
 
 # Runs at n draws of the posterior: list(model, fits) with the checks of the calibrations, whose
 # evidence they correct.
@@ -250,7 +251,7 @@ verify_model <- function(model, context, before = NULL,
     found <- list(model = model, fits = fits_in_region(model, context, model_ais(context)))
     filled <- sum(fills(found$model))
     # The region has moved away from its runs.
-    if (filled < least / 2 && round < rounds && !is_spent(before_check)) {
+    if (filled < rules$filled_share * least && round < rounds && !is_spent(before_check)) {
       model <- found$model
       least <- least_local(model)
       next
@@ -373,8 +374,7 @@ confirmed_modes <- function(model, modes, fits) {
   modes$agree <- modes$agree || sum(straight_distance(model)[modes$ends] <= 1) > 1
   z <- from_unit(joint_unit(model, fits)[fits[[1]]$weights > 0, , drop = FALSE], model$space)
   empty <- !mapply(function(at, covariance) {
-    apart <- forwardsolve(t(chol(covariance)), t(z) - model$runs$z[at, ])
-    any(colSums(apart^2) < 4 * (nrow(apart) + 4))
+    any(is_within_mode(forwardsolve(t(chol(covariance)), t(z) - model$runs$z[at, ])))
   }, modes$ends, modes$covariances)
   modes$lost <- sum(share_of_modes(model, fits, modes$ends[empty], modes$covariances[empty]) >
                       rules$lost_share)

@@ -127,7 +127,7 @@ held_out_inspection <- function(model, measurements) {
       paste("No data were held out, so that no change could fail a test. Measure %s more of %s and",
             "its conditions and hold them out (argument validate of measurements()), or keep a",
             "part of this record from calibration."),
-      calibrated_words(measurements, 1 / 3) %||% "some days", measurements$target)))
+      calibrated_words(measurements, rules$held_out_length) %||% "some days", measurements$target)))
   }
   excess <- held_out_excess(model, measurements)
   if (is.null(excess)) return(NULL)
@@ -151,11 +151,12 @@ held_out_inspection <- function(model, measurements) {
 held_out_excess <- function(model, measurements) {
   seen <- model$scores$calibrate[["rmse"]]
   held <- model$scores$validate[["rmse"]]
-  if (is.na(held) || held < 1.5 * max(seen, measurements$noise_sd)) NULL else held / seen
+  asked <- rules$held_out_error * max(seen, measurements$noise_sd)
+  if (is.na(held) || held < asked) NULL else held / seen
 }
 
 # Share of the held-out steps at which a condition that the model reads lies outside of its range in
-# calibration, if a tenth or more.
+# calibration, where that is much.
 uncovered_conditions <- function(measurements, fit) {
   if (is_several(measurements)) {
     each <- Map(uncovered_conditions, measurements$records,
@@ -175,7 +176,7 @@ uncovered_conditions <- function(measurements, fit) {
   read <- if (is.null(simulator)) names(share)
           else condition_label(measurements, driver_names(simulator))
   share <- stats::setNames(share, condition_label(measurements, names(share)))
-  share[share >= 0.1 & !turning & names(share) %in% read]
+  share[share >= rules$outside_share & !turning & names(share) %in% read]
 }
 
 # ---- the parameters
@@ -260,7 +261,7 @@ remainder_inspection <- function(model, measurements, sensor = "a second sensor"
   left <- lapply(views, function(view) remaining_error(view$model, view$measurements))
   large <- vapply(left, `[[`, NA, "large")
   pattern <- lengths(lapply(left, `[[`, "pattern")) > 0
-  small <- !large & vapply(left, `[[`, 0, "ratio") < 0.6
+  small <- !large & vapply(left, `[[`, 0, "ratio") < rules$small_remainder
   c(if (any(large & !pattern))
       c(noise = noise_words(views[large & !pattern], left[large & !pattern], sensor)),
     if (any(large & pattern)) pattern_inspections(left[large & pattern]),

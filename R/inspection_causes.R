@@ -44,15 +44,16 @@ step_inspection <- function(upgrade, adopted, last = NULL) {
 
 mends_words <- function(names) paste(listed(names), if (length(names) > 1) "mend" else "mends")
 
-# The times that a mechanism brings and that are at most two steps, if its parent's own steps could
-# not be tried.
+# The times that a mechanism brings and that are about a step or less, if its parent's own steps
+# could not be tried.
 short_times <- function(model, upgrade) {
   parent <- Filter(function(m) m$name == model$parent, upgrade$models)[[1]]
   if (is_several(upgrade$measurements) || !all(is.na(step_error(parent)))) return(NULL)
   brought <- upgrade$candidates[upgrade$candidates$from == model$parent &
                                 upgrade$candidates$mechanism == model$mechanism, "parameters"][[1]]
   hours <- c(s = 1 / 3600, min = 1 / 60, h = 1, d = 24)[brought$unit]
-  brought$name[!is.na(hours) & brought$median * hours <= 2 * upgrade$measurements$step_h]
+  longest <- rules$short_time * upgrade$measurements$step_h
+  brought$name[!is.na(hours) & brought$median * hours <= longest]
 }
 
 # ---- the mechanisms adopted and their rivals
@@ -240,11 +241,11 @@ near_trial <- function(upgrade) {
   if (NROW(best) && !unjudged(upgrade) && best$upper95 - best$lower95 <= rules$too_rough) best
 }
 
-# How much longer, if evidence grows with the length of the record; not said of more than three
-# times that length.
+# How much longer, if evidence grows with the length of the record; nothing if that is too much to
+# ask for.
 longer_words <- function(trial, upgrade) {
   times <- upgrade$control$decisive / trial$log10_bf - 1
-  more <- if (times > 0 && times <= 3) calibrated_words(upgrade$measurements, times)
+  more <- if (times > 0 && times <= rules$most_longer) calibrated_words(upgrade$measurements, times)
   if (is.null(more)) "" else sprintf(" (about %s more at this pace)", more)
 }
 

@@ -136,8 +136,8 @@ risen_words <- function(parent, model) {
 }
 
 # By how much the mean square of the error held out falls, and its standard error, from sums over
-# days (or eighths of a short record): errors within a day are correlated, those of several records
-# too. Of several the error is in units of each one's noise.
+# days (or equal blocks of a short record): errors within a day are correlated, those of several
+# records too. Of several the error is in units of each one's noise.
 held_out_gain <- function(parent, model) {
   before <- parent$prediction[parent$prediction$use == "validate", ]
   after <- model$prediction[model$prediction$use == "validate", ]
@@ -147,9 +147,10 @@ held_out_gain <- function(parent, model) {
   predicted <- Filter(function(fit) "validate" %in% predictable(fit), record_fits(model$fit))
   hours <- lapply(predicted,
                   function(fit) fit$measurements$hours[used_rows(fit$measurements, "validate")])
-  block <- floor((unlist(hours) - min(unlist(hours))) / 24)
-  if (length(unique(block)) < 8)
-    block <- unlist(lapply(lengths(hours), function(n) floor(8 * (seq_len(n) - 1) / n)))
+  block <- floor((unlist(hours) - min(unlist(hours))) / rules$held_out_block)
+  blocks <- rules$held_out_blocks
+  if (length(unique(block)) < blocks)
+    block <- unlist(lapply(lengths(hours), function(n) floor(blocks * (seq_len(n) - 1) / n)))
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n
   list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)

@@ -4,6 +4,7 @@
 largest_gb <- 4
 longest_h <- 24
 largest_failed_share <- 0.2  # of the runs at posterior draws, or of the values of a likelihood
+longest_path <- 4000  # bytes of the name of a folder
 
 # `option`: what asks for so much.
 check_size <- function(option, value, gb = 0, hours = 0, call = rlang::caller_env()) {

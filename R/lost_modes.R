@@ -28,19 +28,16 @@ with_lost_modes <- function(result, log_likelihood, seed) {
 # Starts from which a tenth of the way to the nearest of some draws leads down. If the logarithm of
 # a density is concave, only those do that lie higher than the draw.
 leads_elsewhere <- function(density, starts, result, seed) {
-  drawn <- with_seed(seed, sample.int(nrow(result$x), 50, replace = TRUE, prob = result$weights))
+  drawn <- with_seed(seed, sample.int(nrow(result$x), rules$aside_draws, replace = TRUE,
+                                      prob = result$weights))
   draws <- result$x[drawn, , drop = FALSE]
   squares <- outer(rowSums(starts^2), rowSums(draws^2), "+") - 2 * tcrossprod(starts, draws)
   values <- density(starts)
-  towards <- density(0.9 * starts + 0.1 * draws[max.col(-squares, "first"), , drop = FALSE])
-  down <- utils::head(which(is.finite(values) & towards < values), most_aside)
+  nearest <- draws[max.col(-squares, "first"), , drop = FALSE]
+  towards <- density((1 - rules$aside_way) * starts + rules$aside_way * nearest)
+  down <- utils::head(which(is.finite(values) & towards < values), rules$most_aside)
   list(x = starts[down, , drop = FALSE], values = values[down])
 }
-
-most_aside <- 1000  # their distances are a matrix
-climb_children <- 8
-mode_draws <- 1000
-mode_dof <- 8
 
 # Those that lie farthest from any better one: peaks, whatever their height (Rodriguez and Laio
 # 2014).
@@ -60,11 +57,11 @@ climb <- function(density, x, seed) {
   p <- ncol(x)
   n <- nrow(x)
   value <- density(x)
-  step <- rep(0.3, n)
-  generations <- 40 + 25 * p
-  random <- with_seed(seed + 1, array(stats::rnorm(generations * n * climb_children * p),
-                                      c(n * climb_children, p, generations)))
-  parent <- rep(seq_len(n), climb_children)
+  step <- rep(rules$climb_step, n)
+  generations <- rules$climb_generations + rules$climb_parameter * p
+  random <- with_seed(seed + 1, array(stats::rnorm(generations * n * rules$climb_children * p),
+                                      c(n * rules$climb_children, p, generations)))
+  parent <- rep(seq_len(n), rules$climb_children)
   for (g in seq_len(generations)) {
     children <- x[parent, , drop = FALSE] + step[parent] * random[, , g] / sqrt(p)
     found <- matrix(density(children), n)
@@ -73,22 +70,22 @@ climb <- function(density, x, seed) {
     better <- top > value
     x[better, ] <- children[cbind(which(better) + (best[better] - 1) * n), ]
     value[better] <- top[better]
-    step <- step * ifelse(better, 1.5, 0.85)
+    step <- step * ifelse(better, rules$climb_growth, rules$climb_shrinkage)
   }
-  list(x = x, value = value, evaluations = n * (1 + generations * climb_children))
+  list(x = x, value = value, evaluations = n * (1 + generations * rules$climb_children))
 }
 
 # The height, the curvature and the mass of a peak by differences, over ways on which the density
-# falls by half a nat; `converged` if its tangent promises no more.
+# falls by about half a nat; `converged` if its tangent promises no more.
 peak_at <- function(density, x, value) {
   p <- length(x)
   at <- function(ways) density(ways + rep(x, each = nrow(ways)))
   step <- rep(1, p)
   evaluations <- 0
-  for (half in 1:40) {
+  for (half in seq_len(rules$peak_halvings)) {
     fall <- value - at(diag(step, p))
     evaluations <- evaluations + p
-    long <- !is.finite(fall) | fall > 1
+    long <- !is.finite(fall) | fall > rules$peak_fall
     if (!any(long)) break
     step[long] <- step[long] / 2
   }
@@ -110,7 +107,8 @@ peak_at <- function(density, x, value) {
   }
   evaluations <- evaluations + 2 * p + 2 * (p > 1) * ncol(pairs)
   root <- if (all(is.finite(hessian))) tryCatch(chol(hessian), error = function(e) NULL)
-  converged <- !is.null(root) && sum(backsolve(root, gradient, transpose = TRUE)^2) < 1
+  converged <- !is.null(root) &&
+    sum(backsolve(root, gradient, transpose = TRUE)^2) / 2 < rules$peak_gain
   list(x = x, step = step, root = root, converged = converged, evaluations = evaluations,
        log_mass = if (converged)
                     value + 0.5 * p * log(2 * pi) + sum(log(step)) - sum(log(diag(root))))
@@ -120,24 +118,28 @@ peak_at <- function(density, x, value) {
 misses <- function(result, peak) {
   if (!peak$converged) return(FALSE)
   share <- min(1, exp(peak$log_mass - result$log_evidence))
-  share > rules$lost_share && sum(result$weights[is_at(peak, result$x)]) < share / 10
+  drawn <- sum(result$weights[is_at(peak, result$x)])
+  share > rules$lost_share && drawn < rules$lost_draws * share
 }
 
-# The ellipsoid of a peak, which holds all but a thousandth of a normal one.
-is_at <- function(peak, x)
-  colSums((peak$root %*% ((t(x) - peak$x) / peak$step))^2) < 4 * (ncol(x) + 4)
+# Whether points lie in the ellipsoid of a peak.
+is_at <- function(peak, x) is_within_mode(peak$root %*% ((t(x) - peak$x) / peak$step))
+
+# Of points in a mode's own standard deviations, one a column.
+is_within_mode <- function(apart) colSums(apart^2) < rules$mode_radius^2 * (nrow(apart) + 4)
 
 # The evidence inside the ellipsoid of the peak, by an importance sample from a Student t
 # distribution, beside that outside, of the draws there are.
 add_mode <- function(result, density, peak, seed) {
   p <- length(peak$x)
-  n <- mode_draws
+  n <- rules$mode_draws
+  dof <- rules$mode_dof
   way <- with_seed(seed, matrix(stats::rnorm(n * p), p) *
-                           rep(sqrt(mode_dof / stats::rchisq(n, mode_dof)), each = p))
+                           rep(sqrt(dof / stats::rchisq(n, dof)), each = p))
   x <- t(peak$x + peak$step * backsolve(peak$root, way))
-  log_t <- lgamma((mode_dof + p) / 2) - lgamma(mode_dof / 2) - 0.5 * p * log(mode_dof * pi) +
+  log_t <- lgamma((dof + p) / 2) - lgamma(dof / 2) - 0.5 * p * log(dof * pi) +
     sum(log(diag(peak$root))) - sum(log(peak$step)) -
-    0.5 * (mode_dof + p) * log1p(colSums(way^2) / mode_dof)
+    0.5 * (dof + p) * log1p(colSums(way^2) / dof)
   height <- density(x)
   log_weight <- ifelse(is_at(peak, x), height - log_t, -Inf)
   inside <- log_mean_exp(log_weight)
@@ -148,7 +150,8 @@ add_mode <- function(result, density, peak, seed) {
   # The ellipsoid of a curved ridge holds less than its curvature says, and a few draws all of the
   # weight.
   share <- min(1, exp(inside - result$log_evidence))
-  is_lost <- share > rules$lost_share && 1 - outside < share / 10 && 1 / sum(own^2) > n / 10
+  is_lost <- share > rules$lost_share && 1 - outside < rules$lost_draws * share &&
+    1 / sum(own^2) > rules$mode_effective * n
   if (!isTRUE(is_lost)) return(result)
   both <- c(log(outside) + result$log_evidence, inside)
   log_evidence <- log_mean_exp(both) + log(2)

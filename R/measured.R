@@ -34,7 +34,7 @@ predicted_record <- function(model, context) {
 predicting_runs <- function(model) {
   if (length(model$checked$at)) return(rep(model$checked$at, model$checked$times))
   distance <- ifelse(succeeded(model), straight_distance(model), Inf)
-  utils::head(order(distance), max(5, sum(distance <= 0.5)))
+  utils::head(order(distance), max(rules$middle_runs, sum(distance <= rules$middle_radius)))
 }
 
 prediction_by_runs <- function(model, fit, k) {

@@ -65,7 +65,7 @@ wanted_scouts <- function(model)
   model$scouts %||% (rules$scouts_base + rules$scouts_parameter * length(model$parameters))
 
 check_some_succeeded <- function(model, call = rlang::caller_env()) {
-  if (sum(succeeded(model)) >= min(3, nrow(model$runs$z))) return(invisible())
+  if (sum(succeeded(model)) >= min(rules$least_succeeded, nrow(model$runs$z))) return(invisible())
   n <- nrow(model$runs$z)
   failed <- which(!succeeded(model))
   unit <- to_unit(model$runs$z[failed[1], , drop = FALSE], model$space)
@@ -114,7 +114,8 @@ is_same_mode <- function(model, one, other, context) {
   if (one$value - other$value < rules$same_height) return(list(model = model, yes = TRUE))
   apart <- model$runs$z[other$at, ] - model$runs$z[one$at, ]
   distance <- function(covariance) sum(apart * solve(conditioned(covariance), apart))
-  if (max(distance(one$covariance), distance(other$covariance)) < 2 * length(apart)) {
+  farther <- max(distance(one$covariance), distance(other$covariance))
+  if (farther < rules$same_mode * length(apart)) {
     return(list(model = model, yes = TRUE))
   }
   if (one$value - other$value > rules$mode_depth) return(list(model = model, yes = FALSE))
@@ -126,8 +127,6 @@ is_same_mode <- function(model, one, other, context) {
 
 # ---- the region that holds them
 
-region_draws <- 600
-
 # Those that count beside the best.
 counting_modes <- function(modes) {
   value <- vapply(modes, function(mode) mode$value %||% 0, 0)
@@ -137,7 +136,7 @@ counting_modes <- function(modes) {
 # Equally many draws of each of them.
 region_of_modes <- function(model, modes, seed) {
   draws <- lapply(counting_modes(modes), function(mode) {
-    draws_within(mode$mean, mode$covariance, model$space, region_draws, seed)
+    draws_within(mode$mean, mode$covariance, model$space, rules$region_draws, seed)
   })
   unit <- to_unit(do.call(rbind, draws), model$space)
   region_of_draws(unit, rep(1, nrow(unit)), model$parameters)

@@ -23,7 +23,7 @@ suspect_case <- function(base, adopted, threads, runs) {
   fit <- base$model$fit
   m <- base$measurements
   error <- left_at_best(fit)
-  if (length(error) < 20 || !all(is.finite(error)) ||
+  if (length(error) < rules$suspect_rows || !all(is.finite(error)) ||
       mean(error^2) < rules$excess_error * m$noise_sd^2)
     return(NULL)
   case <- list(fit = fit, measurements = m, noise = m$noise_sd, y = m$y[fit$rows],
@@ -60,7 +60,7 @@ left_with <- function(case, simulated = case$simulated, slopes = case$slopes, ex
 error_gain <- function(before, left, more) {
   there <- is.finite(left) & is.finite(before)
   left <- left[there]
-  lag <- max(0, min(0.98, sum(left[-1] * left[-length(left)]) / sum(left^2)))
+  lag <- max(0, min(rules$most_correlated, sum(left[-1] * left[-length(left)]) / sum(left^2)))
   n <- length(left) * (1 - lag) / (1 + lag)
   (n / 2 * log(sum(before[there]^2) / sum(left^2)) - more / 2 * log(length(left))) / log(10)
 }
@@ -108,8 +108,9 @@ suspect <- function(id, column, found, more, ...)
 # Hours by which clocks differ: a few steps, halves and whole hours, half a day and a day.
 clock_lags <- function(case) {
   step <- case$measurements$step_h
-  lags <- unique(signif(c(step * 1:3, 0.5, 1, 2, 12, 24), 6))
-  lags <- lags[lags >= 0.4 * step & lags <= diff(range(case$hours)) / 4]
+  lags <- unique(signif(c(step * seq_len(rules$clock_steps), 0.5, 1, 2, 12, 24), 6))
+  longest <- rules$longest_lag * diff(range(case$hours))
+  lags <- lags[lags >= rules$least_lag * step & lags <= longest]
   c(lags, -lags)
 }
 
@@ -151,13 +152,14 @@ changed_clock <- function(case, lag, shifted) {
 }
 
 each_part <- function(case, f) {
-  parts <- expand.grid(at = places(case, 25), later = c(TRUE, FALSE))
+  parts <- expand.grid(at = places(case, rules$changed_places), later = c(TRUE, FALSE))
   Map(function(at, later) f((seq_along(case$y) >= at) == later, at, later), parts$at, parts$later)
 }
 
 places <- function(case, number) {
   n <- length(case$y)
-  unique(round(seq(0.08 * n, 0.92 * n, length.out = min(number, n))))
+  margin <- rules$place_margin
+  unique(round(seq(margin * n, (1 - margin) * n, length.out = min(number, n))))
 }
 
 # One driver: runs with it a step early and late show along what the error falls; if along none, a
@@ -220,7 +222,7 @@ is_unsettled <- function(case) {
     least <- max(least, rules$remains * excess(case$y - case$simulated))
   }
   length(moving_drivers(case)) > 0 && excess(left) > least &&
-    case$runs >= 8 * length(moving_drivers(case))
+    case$runs >= rules$driver_runs * length(moving_drivers(case))
 }
 
 # Drivers that the simulator reads and that vary.
@@ -252,16 +254,16 @@ start_suspects <- function(case) {
   begins <- c(TRUE, diff(case$segment) != 0)
   since <- case$hours - stats::ave(case$hours, case$segment, FUN = min)
   parts <- cumsum(begins)
-  long <- which(tabulate(parts) >= 20)
-  times <- case$measurements$step_h * 2^(0:8)
-  times <- times[times <= max(since) / 5]
-  if (!length(long) || length(long) > 5) return(NULL)
+  long <- which(tabulate(parts) >= rules$suspect_rows)
+  times <- case$measurements$step_h * 2^(0:rules$start_doublings)
+  times <- times[times <= max(since) / rules$start_times]
+  if (!length(long) || length(long) > rules$start_parts) return(NULL)
   lapply(times, function(time) {
     decay <- vapply(long, function(part) ifelse(parts == part, exp(-since / time), 0), case$y)
     found <- left_with(case, extra = decay)
     if (!is_clear_amount(found, case)) return(NULL)
     suspect("start", case$measurements$target, found, length(long) + 1, time = time,
-            amount = found$amounts)
+            warmup = rules$start_warmup * time, amount = found$amounts)
   })
 }
 
@@ -273,9 +275,9 @@ step_suspects <- function(case) {
     found <- left_with(case, extra = as.numeric(seq_along(case$y) >= at))
     suspect("step_change", case$measurements$target, found, 2, at = at, amount = found$amounts)
   }
-  places <- places(case, 50)
+  places <- places(case, rules$step_places)
   best <- places[which.min(vapply(places, function(at) sum(at_row(at)$left^2), 0))]
-  width <- ceiling(length(case$y) / 50)
+  width <- ceiling(length(case$y) / rules$step_places)
   tried <- lapply(union(places, intersect(best + (-width):width, seq_along(case$y)[-1])), at_row)
   Filter(function(s) is_clear_amount(list(amounts = s$amount), case), tried)
 }
@@ -296,7 +298,8 @@ range_suspects <- function(case) {
 
 range_suspect <- function(case, name, piled) {
   drivers <- case$measurements$raw$drivers[, name]
-  outwards <- (if (piled$end == max(drivers)) 0.1 else -0.1) * diff(range(drivers))
+  sign <- if (piled$end == max(drivers)) 1 else -1
+  outwards <- sign * rules$range_step * diff(range(drivers))
   change <- function(f) with_driver(case, name, f) - case$simulated
   level <- change(function(v, hours) v + outwards * (v == piled$end))
   arc <- change(function(v, hours) beyond_end(v, piled$end))
@@ -305,7 +308,7 @@ range_suspect <- function(case, name, piled) {
   parts <- lapply(unique(part), function(k) ifelse(part == k, 1, 0))
   extra <- do.call(cbind, c(lapply(parts, `*`, level), lapply(parts, `*`, arc)))
   extra <- extra[, colSums(extra^2) > 0, drop = FALSE]
-  if (!ncol(extra) || ncol(extra) > length(case$y) / 4) return(NULL)
+  if (!ncol(extra) || ncol(extra) > rules$range_amounts * length(case$y)) return(NULL)
   found <- left_with(case, extra = extra)
   suspect("range_end", name, found, ncol(extra), end = piled$end, rows = piled$rows)
 }
@@ -336,7 +339,8 @@ coarse_driver_suspects <- function(case) {
       case, name, function(v, hours) v + step * (with_seed(1, stats::runif(length(v))) - 0.5))
     moves <- rms(shaken - case$simulated)
     excess <- mean(case$before$left^2) - case$noise^2
-    if (moves < case$noise / 2 || excess < moves^2 / 2) return(NULL)
+    if (moves < rules$coarse_moves * case$noise || excess < rules$coarse_excess * moves^2)
+      return(NULL)
     data.frame(id = "quantised", column = name, says = sprintf(
       paste("%s comes in steps of %s, which moves the simulation by %s, with a noise of %s: use",
             "finer readings."), name, short(step), short(moves), short(case$noise)))
@@ -347,8 +351,8 @@ coarse_driver_suspects <- function(case) {
 coarse_value_step <- function(v) {
   step <- value_step(v)
   change <- abs(diff(v))
-  if (!is.null(step) && step >= 0.01 * diff(range(v)) &&
-      mean(change[change > 0] < 2.5 * step) > 0.5)
+  if (!is.null(step) && step >= rules$coarse_range * diff(range(v)) &&
+      mean(change[change > 0] < rules$coarse_change * step) > rules$coarse_changes)
     step
 }
 
@@ -377,7 +381,7 @@ suspect_sentences <- list(
   start = function(s, case) {
     sprintf(paste("The error decays from the first row (by half in %s h): the start is not",
                   "forgotten. Give a warmup of %s h or more."), short(log(2) * s$time),
-            short(4 * s$time))
+            short(s$warmup))
   },
   step_change = function(s, case) {
     sprintf(paste("From %s on, %s lies %s %s than before, as if a sensor was moved or exchanged:",

@@ -70,6 +70,8 @@ region_distance <- function(region, unit) {
 
 in_region <- function(region, unit) region_distance(region, unit) <= 1
 
+in_border <- function(region, unit) region_distance(region, unit) > 1 - rules$border_width
+
 # n points of the unit cube for the emulator of a region: a Latin hypercube of directions and
 # distances from the centre. Spread evenly over the volume they would nearly all lie at its end: of
 # seven parameters one run in a hundred would lie as near to the centre as the posterior does.

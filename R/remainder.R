@@ -65,16 +65,17 @@ clock_hour <- function(time) {
 
 # Share of the sum of squares about the mean that a parabola in time explains.
 drift_share <- function(r, hours) {
-  if (length(r) < 10) return(0)
+  if (length(r) < rules$drift_rows) return(0)
   left <- stats::residuals(stats::lm(r ~ stats::poly(hours, 2)))
   1 - sum(left^2) / sum((r - mean(r))^2)
 }
 
-# Share of the variance that a profile over the day explains, adjusted for its number of values;
-# three days at least.
+# Share of the variance that a profile over the day explains, adjusted for its number of values.
 daily_share <- function(r, hours, clock) {
   bin <- factor(clock)
-  if (diff(range(hours)) < 72 || nlevels(bin) < 4 || length(r) <= 2 * nlevels(bin)) return(0)
+  if (diff(range(hours)) < 24 * rules$daily_days || nlevels(bin) < rules$daily_times ||
+      length(r) <= rules$daily_rows * nlevels(bin))
+    return(0)
   summary(stats::lm(r ~ bin))$adj.r.squared
 }
 
@@ -112,7 +113,7 @@ acts_as_drift <- function(parent, fit, threads, left = function() Inf) {
 # Its log10 Bayes factor; NULL for a record too short to show one.
 drift_evidence <- function(base, threads) {
   hours <- base$measurements$hours[base$rows]
-  if (length(hours) < 10) return(NULL)
+  if (length(hours) < rules$drift_rows) return(NULL)
   parabola <- error_sd(base) * sqrt(length(hours)) * stats::poly(hours, 2)
   responses_factor(base, parabola, threads)$log10_bf
 }

@@ -3,7 +3,7 @@
 
 # Rows of the errors r that stand apart, beside rows of the same unbroken part.
 spikes <- function(r, hours, step_h) {
-  change <- ifelse(diff(hours) < 1.5 * step_h, diff(r), NA)
+  change <- ifelse(diff(hours) < rules$unbroken * step_h, diff(r), NA)
   usual <- stats::mad(change, na.rm = TRUE)
   before <- c(NA, change)
   after <- c(-change, NA)

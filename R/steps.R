@@ -31,7 +31,7 @@ step_change <- function(fit, threads, left) {
   settled <- function(amounts) {
     half <- change(2, amounts)
     quarter <- change(4, amounts)
-    settles <- rms(quarter - half) <= 0.75 * rms(half)  # a half in a scheme of first order
+    settles <- rms(quarter - half) <= rules$settling_change * rms(half)
     if (isTRUE(settles || rms(quarter) < rules$negligible_step * m$noise_sd)) quarter
   }
   at_once <- settled(character())
@@ -43,7 +43,7 @@ step_change <- function(fit, threads, left) {
 
 # Which drivers are amounts of a row, to be shared among shorter ones, and not what holds over it:
 # those with which the output changes least (`off`) of none, each and all, and of what then differs
-# by one where that at least halves it. NULL if there are no runs `left` to know it.
+# by one where that lowers it clearly. NULL if there are no runs `left` to know it.
 likely_amounts <- function(drivers, off, left = function() Inf) {
   tried <- c(list(character(), drivers), as.list(drivers))
   amounts <- NULL
@@ -51,7 +51,7 @@ likely_amounts <- function(drivers, off, left = function() Inf) {
   repeat {
     if (left() < length(tried)) return(NULL)
     each <- vapply(tried, off, 0)
-    if (!is.null(amounts) && min(each) >= 0.5 * least) return(amounts)
+    if (!is.null(amounts) && min(each) >= rules$amounts_fall * least) return(amounts)
     least <- min(each)
     amounts <- tried[[which.min(each)]]
     tried <- lapply(drivers, function(name) if (name %in% amounts) setdiff(amounts, name)
@@ -64,7 +64,7 @@ likely_amounts <- function(drivers, off, left = function() Inf) {
 emulated_slopes <- function(fit) {
   centre <- posterior_centre(fit)
   p <- length(centre)
-  by <- 0.05  # standard deviations of the prior
+  by <- rules$emulated_difference
   coefficients <- function(x) predict_emulator_(fit$emulator$processes, x)$mean
   around <- matrix(centre, p, p, byrow = TRUE)
   fit$emulator$basis$vectors %*% t(
