@@ -46,6 +46,12 @@ doubts <- list(
   }, "the true mechanism takes the response away"),
   only_beside = doubt(function(case) only_beside(case$models, case$confounded, case$candidates),
                       "two that imitate a third together look like this"),
+  alone = doubt(function(case) {
+    if (length(case$unsettled)) {
+      sprintf(paste("%s, adopted after it, may be the cause by itself: the numbers of its trial",
+                    "without it are not trusted"), listed(case$unsettled))
+    }
+  }, "what is adopted later may make it needless"),
   edge = doubt(function(case) {
     if (any(edge_of_prior(case$model$fit)[case$new]))
       "its value lies at the edge of what was thought possible"
@@ -98,7 +104,7 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads, l
   row <- trials[trials$mechanism == model$mechanism, ]
   new <- setdiff(names(drawn_parameters(model$fit)), names(drawn_parameters(parent$fit)))
   # What was adopted later is no other cause: with both, the evidence is decisively above that of
-  # either alone.
+  # either alone, if that of its own trial is known.
   later <- vapply(models[-seq_len(k)], `[[`, "", "mechanism")
   gain <- held_out_gain(parent, model)
   drift <- k == 2 && drift_rivals(models, control, threads)
@@ -106,6 +112,7 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads, l
        entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain,
        no_gain = isFALSE(gain$improves),
        others = 1 - row$probability - sum(trials$probability[trials$mechanism %in% later]),
+       unsettled = intersect(later, trials$mechanism[trials$trusted %in% FALSE]),
        confounded = confounded_parameters(model$fit, new),
        drift = drift, slow = drift && acts_as_drift(parent$fit, model$fit, threads, left))
 }
