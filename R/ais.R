@@ -64,6 +64,7 @@
 #'     list(mean = normal(0, 2)), seed = 1)
 #' @export
 ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = NULL) {
+  check_arguments()
   check_input(checkmate::check_function(log_likelihood), "log_likelihood")
   check_input(checkmate::check_list(priors, types = "amiss_prior", min.len = 1, names = "unique"),
               "priors", "For example {.code list(a = uniform(0, 1))}.")

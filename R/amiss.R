@@ -31,7 +31,7 @@
 #' @export
 amiss <- function(data, design, runs, parameters = NULL, noise_sd = NULL, control = NULL,
                   seed = NULL, threads = 1) {
-  check_present(data, design, runs)
+  check_arguments()
   m <- if (inherits(data, "amiss_measurements")) {
     if (!is.null(noise_sd))
       abort_input("{.arg noise_sd} is part of the {.cls amiss_measurements} given.")

@@ -97,8 +97,10 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' attribute_discrepancy(fit, list(surrogates = 19), seed = 1)
 #' @export
-attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1)
+attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
+  check_arguments()
   UseMethod("attribute_discrepancy")
+}
 
 #' @export
 attribute_discrepancy.default <- function(fit, control = NULL, seed = NULL, threads = 1) {

@@ -15,7 +15,6 @@
 #'              boundary = list(Te = condition("outdoor air", "degC")))
 #' @export
 condition <- function(label, unit = "", circular = FALSE) {
-  present(label)
   check_input(checkmate::check_string(label, min.chars = 1), "label",
               "Say in a few words what the condition is.")
   check_input(checkmate::check_string(unit), "unit")

@@ -27,6 +27,7 @@
 #' box_catalogue(c("Te", "Gv", "Ws", "Wd", "RHP"))
 #' @export
 box_catalogue <- function(columns = c("Te", "Gv", "Ws", "Wd", "RHP", "Lw", "Tn"), azimuth = 180) {
+  check_arguments()
   check_input(checkmate::check_character(columns, any.missing = FALSE), "columns")
   check_input(checkmate::check_number(azimuth, finite = TRUE), "azimuth")
   outer <- c("front", "back", "left", "right", "roof")

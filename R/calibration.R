@@ -101,6 +101,7 @@ calibration_control <- list(
 #' coef(fit)
 #' @export
 calibrate <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
+  check_arguments()
   calibrate_with_runs(emulator, measurements, control, seed, threads)$fit
 }
 

@@ -64,6 +64,7 @@
 #' @seealso [amiss()] calibrates what was read.
 #' @export
 read_calibro <- function(folder, parameters = NULL, relative = FALSE, step_h = 1, files = NULL) {
+  check_arguments()
   call <- rlang::current_env()
   check_input(checkmate::check_string(folder, min.chars = 1), "folder")
   check_input(checkmate::check_directory_exists(folder), "folder")

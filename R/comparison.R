@@ -94,6 +94,7 @@ comparison_control <- list(emulator = list(), calibration = list(), attribution 
 compare_models <- function(models, measurements, method = c("paper", "history"), runs = 150,
                            control = NULL, seed = NULL, threads = 1,
                            quiet = FALSE, checkpoint = NULL, truth = NULL) {
+  check_arguments()
   check_models(models)
   check_object(measurements, "amiss_measurements", "measurements")
   method <- if (missing(method)) comparison_methods[1] else method

@@ -12,10 +12,12 @@ abort_numerical <- function(message, call = rlang::caller_env(), .envir = parent
                  call = short_call(call), .envir = .envir)
 }
 
-# The call as name(): without its arguments, which do.call() would print fully.
+# The call as name(): without its arguments, which do.call() would print fully. A method has the
+# name of its generic, which is what was called.
 short_call <- function(call) {
+  generic <- if (is.environment(call)) call[[".Generic"]]
   if (is.environment(call)) call <- rlang::frame_call(call)
-  name <- if (is.call(call)) rlang::call_name(call)
+  name <- generic %||% if (is.call(call)) rlang::call_name(call)
   if (is.null(name)) NULL else rlang::call2(name)
 }
 
@@ -30,40 +32,20 @@ warn_result <- function(message, class = character(), .envir = parent.frame()) {
 # The verdict of a checkmate::check_...() (TRUE or a sentence) turned into the package's own
 # condition. The value that it checks, its first argument, is reported.
 check_input <- function(verdict, name, hint = NULL, call = rlang::caller_env()) {
+  force(call)
   check <- substitute(verdict)
   checks <- is.call(check) && is.call(check[[1]]) && identical(check[[1]][[2]], quote(checkmate))
   frame <- parent.frame()
-  value <- if (checks) present(eval(check[[2]], frame), call)
+  value <- if (checks) present(eval(check[[2]], frame), call, name, argument_code(name, call))
   if (checks && is.character(value)) check_readable(value, name, call)
   kind <- if (checks) as.character(check[[1]][[3]]) else ""
   if (isTRUE(verdict) && kind %in% number_checks)
     verdict <- plain_number(value, kind != "check_numeric")
   if (isTRUE(verdict)) return(invisible(TRUE))
-  told <- if (checks) value_words(value)
-  abort_input(c("{.arg {name}}{told} cannot be used: {verdict}", if (!is.null(hint)) c(i = hint)),
-              call = call)
-}
-
-# A value, or an error that names the argument that it needs and that was not given.
-present <- function(value, call = rlang::caller_env()) {
-  withCallingHandlers(value, error = function(e) {
-    name <- missing_argument(e)
-    if (!is.null(name)) abort_input("{.arg {name}} is missing: it has no default.", call = call)
-  })
-}
-
-# Arguments without a default, in the order of their function.
-check_present <- function(..., call = rlang::caller_env()) present(list(...), call)
-
-# Of R's own error, which has no class before version 4.3 and is in the session's language; NULL of
-# any other.
-missing_argument <- function(e) {
-  words <- strsplit(gettext("argument \"%s\" is missing, with no default", domain = "R"), "%s",
-                    fixed = TRUE)[[1]]
-  said <- conditionMessage(e)
-  if (startsWith(said, words[1]) && endsWith(said, words[2])) {
-    substr(said, nchar(words[1]) + 1, nchar(said) - nchar(words[2]))
-  }
+  told <- if (checks) verdict_words(verdict, value, kind) else paste(" cannot be used:", verdict)
+  if (is.null(hint) && is.function(value) && kind %in% text_checks)
+    hint <- string_hint(argument_code(name, call))
+  abort_input(c("{.arg {name}}{told}", if (!is.null(hint)) c(i = hint)), call = call)
 }
 
 # Text whose bytes are characters in its encoding.
@@ -82,6 +64,7 @@ check_readable <- function(text, name, call) {
 format_version <- 3L
 
 check_object <- function(x, classes, name, hint = NULL, call = rlang::caller_env()) {
+  force(call)
   check_input(checkmate::check_multi_class(x, classes), name, hint, call)
   check_whole(x, name, hint, call)
 }
@@ -117,6 +100,8 @@ note_checked <- function(x, check) assign(check, x, checked)
 # For checkmate dates, times, numbers with a unit or in other bits (integer64) and empty texts are
 # numbers, too.
 number_checks <- paste0("check_", c("number", "count", "int", "numeric"))
+
+text_checks <- paste0("check_", c("string", "character", "choice"))
 
 plain_number <- function(x, single) {
   if (single && !is.null(dim(x))) return("Must be a plain number, not an array")

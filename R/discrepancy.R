@@ -30,6 +30,7 @@
 #' plot(discrepancy(fit))
 #' @export
 discrepancy <- function(fit) {
+  check_arguments()
   check_object(fit, "amiss_fit", "fit")
   if (!knows_history(fit)) return(paper_discrepancy(fit))
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)

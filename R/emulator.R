@@ -106,7 +106,7 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 #' tidy(emulator)
 #' @export
 train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
-  check_present(ensemble, noise_sd)
+  check_arguments()
   check_object(ensemble, "amiss_ensemble", "ensemble")
   if (inherits(noise_sd, "amiss_measurements")) {
     check_ensemble_rows(ensemble, noise_sd)

@@ -23,6 +23,7 @@
 #' @export
 simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, threads = 1,
                             quiet = FALSE) {
+  check_arguments()
   hush(quiet)
   check_simulator(simulator)
   check_object(measurements, "amiss_measurements", "measurements")
@@ -89,7 +90,7 @@ simulate_design <- function(simulator, measurements, runs = 150, seed = NULL, th
 #' @export
 ensemble <- function(design, outputs, parameters = NULL, measurements = NULL, validation = NULL,
                      time = NULL) {
-  check_present(design, outputs)
+  check_arguments()
   design <- as_number_matrix(design)
   check_input(checkmate::check_matrix(design, "numeric", any.missing = FALSE, min.cols = 1,
                                       col.names = "unique"), "design")

@@ -44,6 +44,7 @@
 #' @export
 epw_weather <- function(template, columns, file = "weather.epw", instant = character(),
                         utc_offset = NULL) {
+  check_arguments()
   check_input(checkmate::check_string(template, min.chars = 1), "template",
               "Give the path of an EPW file.")
   check_input(checkmate::check_character(columns, any.missing = FALSE, min.chars = 1, min.len = 1,

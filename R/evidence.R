@@ -27,7 +27,7 @@
 #' bayes_factor(fit, other)
 #' @export
 bayes_factor <- function(model, reference) {
-  check_present(model, reference)
+  check_arguments()
   fits <- list(model = model, reference = reference)
   for (name in names(fits))
     check_object(fits[[name]], c("amiss_fit", "amiss_joint"), name)

@@ -77,7 +77,7 @@ fmu_simulator <- function(file, ..., output, inputs = character(), fixed = list(
                           steps_per_row = 1, start = 0, tolerance = NULL, time_limit = 600,
                           size_limit = 1000, retries = 0, cache = NULL, logging = FALSE,
                           name = NULL) {
-  check_present(file, output)
+  check_arguments()
   check_input(checkmate::check_string(file, min.chars = 1), "file")
   check_input(checkmate::check_string(output, min.chars = 1), "output",
               "Name the variable that was measured.")
@@ -131,6 +131,7 @@ fmu_simulator <- function(file, ..., output, inputs = character(), fixed = list(
 #' })
 #' @export
 with_fmu <- function(model, ..., inputs = character(), fixed = list(), name = model$name) {
+  check_arguments()
   check_object(model, "amiss_fmu_simulator", "model", "Make one with {.fun fmu_simulator}.")
   check_input(checkmate::check_string(name), "name")
   added <- if (...length()) named_parameters(list(...)) else list()

@@ -18,6 +18,7 @@
 #' fmu_variables(house)[c("name", "unit", "start", "use")]
 #' @export
 fmu_variables <- function(file) {
+  check_arguments()
   check_input(checkmate::check_string(file, min.chars = 1), "file")
   variables <- read_fmu(file)$variables
   uses <- vapply(fmu_uses, function(use) has_use(variables, use), logical(nrow(variables)))

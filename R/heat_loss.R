@@ -19,8 +19,8 @@
 #' @export
 heat_loss_coefficient <- function(simulator, values, drivers = numeric(), outside = 10,
                                   inside = 30) {
+  check_arguments()
   check_zone(simulator, "simulator")
-  check_present(values)
   if (is.numeric(values) && is.null(dim(values))) values <- t(values)
   values <- as_number_matrix(values)
   check_input(checkmate::check_matrix(values, "numeric", any.missing = FALSE, min.rows = 1),

@@ -63,6 +63,7 @@
 #' @export
 calibrate_jointly <- function(ensembles, measurements, rounds = rules$verify_rounds, runs = NULL,
                               control = NULL, seed = NULL, threads = 1, quiet = FALSE) {
+  check_arguments()
   hush(quiet)
   check_records(ensembles, measurements, "ensembles",
                 function(x) check_object(x, "amiss_ensemble", "ensembles"))
@@ -77,6 +78,7 @@ calibrate_jointly <- function(ensembles, measurements, rounds = rules$verify_rou
 #' @export
 simulate_jointly <- function(simulators, measurements, runs = 150, seed = NULL, threads = 1,
                              quiet = FALSE) {
+  check_arguments()
   hush(quiet)
   check_records(simulators, measurements, "simulators", check_simulator)
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")

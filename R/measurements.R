@@ -142,6 +142,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                          calibrate = NULL, validate = NULL, warmup = 0, name = target, unit = "",
                          time_format = NULL, time_zone = NULL, fill_gaps = 0, missing = NULL,
                          range = NULL, stamp = NULL) {
+  check_arguments()
   table <- time_table(data, time, time_format)
   data <- table$data
   time <- table$time
@@ -462,6 +463,7 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 #'   (1997), Bootstrap methods and their application.
 #' @export
 bootstrap_noise <- function(replicates = 1000, detrend = FALSE, seed = 1) {
+  check_arguments()
   check_input(checkmate::check_int(replicates, lower = 0, upper = 1e6), "replicates")
   if (replicates < 50) abort_input(paste("{.arg replicates} = {replicates} is too few for a",
                                          "standard deviation; give at least 50."))

@@ -41,7 +41,7 @@
 #' catalogue(sun, leaks)
 #' @export
 mechanism <- function(name, edit, boundary, sentence) {
-  check_present(name, edit, boundary, sentence)
+  check_arguments()
   check_input(checkmate::check_string(name, min.chars = 1), "name")
   if (!inherits(edit, "amiss_ensemble")) {
     check_input(checkmate::check_function(edit, nargs = if (knows_record(edit)) 2 else 1), "edit")
@@ -56,6 +56,7 @@ mechanism <- function(name, edit, boundary, sentence) {
 #' @param ... Mechanisms.
 #' @export
 catalogue <- function(...) {
+  check_arguments()
   mechanisms <- list(...)
   if (!all(vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))) {
     other <- which(!vapply(mechanisms, inherits, TRUE, "amiss_mechanism"))[1]

@@ -68,7 +68,7 @@
 #' @export
 network <- function(..., output, before = list(), hold = TRUE, interpolation = "constant",
                     output_at = "mean", start_hours = 24, name = "network") {
-  check_present(output)
+  check_arguments()
   check_input(checkmate::check_string(output, min.chars = 1), "output")
   check_input(checkmate::check_flag(hold), "hold")
   check_input(checkmate::check_choice(interpolation, c("constant", "linear")), "interpolation")

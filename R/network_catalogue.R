@@ -38,6 +38,7 @@
 network_catalogue <- function(network, air = network$output, envelope = NULL, outdoors = NULL,
                               sun = NULL, heating = NULL, wind = NULL, neighbour = NULL,
                               sun_factor = 1e-3) {
+  check_arguments()
   check_object(network, "amiss_network", "network", "Make one with {.fn network}.")
   check_node(air, network, "air")
   if (!is.null(envelope)) check_node(envelope, network, "envelope")

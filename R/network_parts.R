@@ -55,7 +55,6 @@ NULL
 
 new_part <- function(type, name, fields, call = rlang::caller_env()) {
   check_input(checkmate::check_string(name, min.chars = 1), "name", call = call)
-  present(fields, call)
   check_part(structure(c(list(type = type, name = name), fields), class = "amiss_network_part"),
              call)
 }
@@ -63,7 +62,7 @@ new_part <- function(type, name, fields, call = rlang::caller_env()) {
 #' @rdname network_parts
 #' @export
 network_node <- function(name, capacity, start = NULL) {
-  check_present(name, capacity)
+  check_arguments()
   new_part("node", name, list(capacity = capacity, start = start))
 }
 
@@ -71,7 +70,7 @@ network_node <- function(name, capacity, start = NULL) {
 #' @export
 network_link <- function(from, to, conductance = NULL, resistance = NULL, by = NULL,
                          name = paste0(from, "-", to)) {
-  check_present(from, to)
+  check_arguments()
   check_places(list(from = from, to = to))
   new_part("link", name,
            list(from = from, to = to, conductance = conductance, resistance = resistance, by = by))
@@ -81,7 +80,7 @@ network_link <- function(from, to, conductance = NULL, resistance = NULL, by = N
 #' @export
 network_flow <- function(from, to, rate, by = NULL,
                          name = paste0(from %||% "outside", "-", to %||% "outside")) {
-  check_present(from, to, rate)
+  check_arguments()
   check_places(list(from = from, to = to), optional = c("from", "to"))
   new_part("flow", name, list(from = from, to = to, rate = rate, by = by))
 }
@@ -90,7 +89,7 @@ network_flow <- function(from, to, rate, by = NULL,
 #' @export
 network_gain <- function(to, driver, factor = 1, by = NULL,
                          name = paste(driver %||% "constant", "to", to)) {
-  check_present(to, driver)
+  check_arguments()
   check_places(list(to = to, driver = driver), optional = "driver")
   new_part("gain", name, list(to = to, driver = driver, factor = factor, by = by))
 }

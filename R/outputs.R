@@ -20,6 +20,7 @@
 #' outputs_of(wall, c("Ti", "flux"))
 #' @export
 outputs_of <- function(simulator, outputs) {
+  check_arguments()
   check_object(simulator, "amiss_function_simulator", "simulator")
   check_input(checkmate::check_character(outputs, min.len = 1, any.missing = FALSE, unique = TRUE),
               "outputs")

@@ -93,6 +93,7 @@ paper_control <- list(confidence = NULL, shared_lambda = FALSE, alpha = c(1, 0.1
 #'   with high-dimensional outputs and boundary conditions.
 #' @export
 calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL, threads = 1) {
+  check_arguments()
   rows <- emulated_rows(emulator, measurements)
   check_target_varies(measurements, rows)
   seed <- pick_seed(seed)

@@ -29,6 +29,7 @@
 #' paper_box("M3")
 #' @export
 paper_box <- function(model = "M3", azimuth = 180) {
+  check_arguments()
   check_input(checkmate::check_choice(model, paste0("M", 1:6)), "model")
   check_input(checkmate::check_number(azimuth, finite = TRUE), "azimuth")
   inside <- 0.96

@@ -130,7 +130,7 @@ program_simulator <- function(command, ..., output, templates = list(), boundary
                               cache = tools::R_user_dir("amiss", "cache"), version = "",
                               name = "program", size_limit = 1000, files = NULL, width = NULL,
                               lead_in = 0, before = "record", keep = 0) {
-  check_present(command, output)
+  check_arguments()
   steps <- as_steps(command)
   output <- check_output(output)
   check_columns_named(boundary)
@@ -257,7 +257,7 @@ check_program <- function(simulator, call = rlang::caller_env()) {
 #' })
 #' @export
 with_template <- function(simulator, templates, ..., boundary = character()) {
-  check_present(simulator, templates)
+  check_arguments()
   check_object(simulator, "amiss_program_simulator", "simulator",
               "Make one with {.fun program_simulator}.")
   check_columns_named(boundary)

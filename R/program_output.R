@@ -66,6 +66,7 @@ program_output <- function(file, column, combine = NULL, time = NULL, time_forma
                            stamps = "end", utc_offset = NULL, skip = 0, comment = "#",
                            separator = NULL, decimal = ".", units_rows = 0, drop_first = 0,
                            drop_last = 0, transform = NULL) {
+  check_arguments()
   check_input(checkmate::check_string(file, min.chars = 1), "file")
   check_inside(c(file = file))
   check_output_columns(column, combine, time)
@@ -97,7 +98,6 @@ check_output_columns <- function(column, combine, time, call = rlang::caller_env
       else checkmate::check_character(x, min.chars = 1, any.missing = FALSE, ...),
       name, "Give names of columns, or their numbers in a table without names.", call = call)
   }
-  check_present(column, call = call)
   names(column, "column", min.len = 1, unique = TRUE)
   if (!is.null(time)) names(time, "time", min.len = 1, max.len = 2)
   if (!is.null(time) && is.numeric(time) != is.numeric(column)) {

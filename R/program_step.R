@@ -32,6 +32,7 @@
 #' @export
 program_step <- function(command, ..., input = NULL, stdout = NULL, folder = NULL, makes = NULL,
                          needs = NULL, fails_if = NULL, log = NULL, time_limit = NULL, status = 0) {
+  check_arguments()
   check_input(checkmate::check_string(command, min.chars = 1), "command", "Name the program.")
   arguments <- list(...)
   if (any(nzchar(rlang::names2(arguments)))) {

@@ -50,6 +50,7 @@
 #' @export
 calibrate_refined <- function(ensemble, measurements, rounds = rules$verify_rounds, runs = NULL,
                               control = NULL, seed = NULL, threads = 1, quiet = FALSE) {
+  check_arguments()
   hush(quiet)
   check_object(ensemble, "amiss_ensemble", "ensemble")
   check_object(measurements, "amiss_measurements", "measurements")
@@ -151,6 +152,7 @@ with_known_runs <- function(model, ensembles) {
 #' calibrate(train_emulator(near, room), room, quick, seed = 1)
 #' @export
 refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE) {
+  check_arguments()
   hush(quiet)
   check_object(ensemble, "amiss_ensemble", "ensemble")
   check_object(fit, "amiss_calibration", "fit")

@@ -18,6 +18,7 @@
 #' rename_parameters(linear, gain = "gain of O5")
 #' @export
 rename_parameters <- function(simulator, ...) {
+  check_arguments()
   check_simulator(simulator)
   to <- list(...)
   check_input(checkmate::check_list(to, names = "unique", min.len = 1), "...",

@@ -20,9 +20,9 @@
 #' readLines(file.path(folder, "model.awk"))
 #' @export
 render_run <- function(simulator, values = NULL, folder, measurements = NULL, segment = 1) {
+  check_arguments()
   check_object(simulator, "amiss_program_simulator", "simulator",
                "Make one with {.fun program_simulator}.")
-  check_present(folder)
   check_input(checkmate::check_string(folder, min.chars = 1), "folder")
   if (length(dir(folder, all.files = TRUE, no.. = TRUE))) {
     abort_input(c("{.arg folder} = {.file {folder}} is not empty.", i = "Give a new folder."))

@@ -45,6 +45,7 @@
 #' }
 #' @export
 report <- function(x, file, quiet = TRUE) {
+  check_arguments()
   check_input(checkmate::check_flag(quiet), "quiet")
   check_reported(x)
   kind <- report_kind(file)

@@ -64,6 +64,7 @@
 #' @export
 response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, time_constant = NULL,
                                reference = NULL, name = paste("response to", boundary)) {
+  check_arguments()
   check_input(checkmate::check_string(boundary, min.chars = 1), "boundary")
   check_object(measurements, "amiss_measurements", "measurements")
   check_input(checkmate::check_string(unit), "unit")
@@ -87,6 +88,7 @@ response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, t
 #' @rdname response_mechanism
 #' @export
 responses <- function(measurements, units = character()) {
+  check_arguments()
   check_object(measurements, "amiss_measurements", "measurements")
   check_input(checkmate::check_character(units, any.missing = FALSE,
                                          names = if (length(units)) "unique"), "units")

@@ -59,6 +59,7 @@
 #' sobol_indices(train_emulator(simulate_design(model, room, runs = 30, seed = 1), room), seed = 1)
 #' @export
 sobol_indices <- function(x, points = 256, replicates = 16, by_time = FALSE, seed = NULL) {
+  check_arguments()
   check_object(x, c("amiss_emulator", "amiss_fit"), "x",
               "It is made by {.fun train_emulator} or {.fun calibrate}.")
   check_input(checkmate::check_count(points), "points")

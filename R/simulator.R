@@ -72,6 +72,7 @@
 #' drift$edit(sun$edit(linear))
 #' @export
 function_simulator <- function(f, ..., boundary = character(), name = "simulator") {
+  check_arguments()
   check_run_function(f, "info")
   parameters <- named_parameters(list(...))
   check_columns_named(boundary)
@@ -85,6 +86,7 @@ function_simulator <- function(f, ..., boundary = character(), name = "simulator
 #' @param model The simulator to extend, made by `function_simulator()`.
 #' @export
 with_parameters <- function(model, ..., f = NULL, boundary = character(), name = model$name) {
+  check_arguments()
   check_object(model, "amiss_function_simulator", "model", "A {.fn zone} has edits of its own.")
   if (!is.null(f)) check_run_function(f, c("info", "base"))
   added <- named_parameters(list(...))
@@ -231,7 +233,7 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @keywords internal
 #' @export
 free_parameters <- function(simulator) {
-  present(simulator)
+  check_arguments()
   if (inherits(simulator, "amiss_ensemble")) check_whole(simulator, "simulator")
   else check_simulator(simulator)
   UseMethod("free_parameters")
@@ -370,7 +372,7 @@ check_run <- function(out, rows, simulator, point, m, call = rlang::caller_env()
 }
 
 check_simulator <- function(simulator, call = rlang::caller_env()) {
-  present(simulator, call)
+  present(simulator, call, "simulator", argument_code("simulator", call))
   if (was_checked(simulator, "simulator")) return(invisible(TRUE))
   known <- function(class) !is.null(utils::getS3method("simulate_runs", class, optional = TRUE))
   if (!any(vapply(class(simulator), known, NA))) {

@@ -140,6 +140,7 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
 #' @export
 run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE, trust = FALSE) {
+  check_arguments()
   hush(quiet)
   started <- elapsed()
   if (!is.null(out)) check_input(checkmate::check_string(out, min.chars = 1), "out")
@@ -177,6 +178,7 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
 #' @rdname run_study
 #' @export
 read_study <- function(path, quiet = TRUE, trust = FALSE) {
+  check_arguments()
   check_input(checkmate::check_string(path, min.chars = 1), "path")
   check_input(checkmate::check_file_exists(path, access = "r"), "path")
   check_input(checkmate::check_flag(quiet), "quiet")

@@ -43,6 +43,7 @@
 #' try_run(linear, room)
 #' @export
 try_run <- function(simulator, measurements, runs = 200, threads = 1, quiet = FALSE) {
+  check_arguments()
   check_simulator(simulator)
   check_object(measurements, "amiss_measurements", "measurements")
   check_input(checkmate::check_count(runs, positive = TRUE), "runs")

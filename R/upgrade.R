@@ -148,7 +148,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' @export
 upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, control = NULL,
                           seed = NULL, threads = 1, quiet = FALSE, checkpoint = NULL) {
-  check_present(simulator, measurements, catalogue)
+  check_arguments()
   started <- upgrade_start(simulator, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", "Make it with {.fun catalogue}.")
   check_given_models(started$simulator, catalogue, started$measurements)

@@ -42,6 +42,7 @@
 synthetic_weather <- function(days, step_h = 0.25, day_of_year = 100, latitude = 36.8,
                               temperature = 17, daily_range = 9, cloudiness = 0.3, wind = 3.5,
                               wind_direction = 240, azimuth = 180, seed = NULL) {
+  check_arguments()
   check_input(checkmate::check_number(days, lower = 1, finite = TRUE), "days")
   check_input(checkmate::check_number(step_h, lower = 1 / 60, upper = 6), "step_h")
   check_size("days", days, matrix_gb(24 * days / step_h, 30))
@@ -115,6 +116,7 @@ red_noise <- function(n, time_h, step_h) {
 #' @param lengths Lengths of the on and off periods, hours.
 #' @export
 rolbs <- function(n, step_h = 0.25, power = 100, lengths = c(1, 2, 4, 8, 16), seed = NULL) {
+  check_arguments()
   check_input(checkmate::check_count(n, positive = TRUE), "n")
   check_size("n", n, matrix_gb(n, 4))
   check_input(checkmate::check_number(step_h, lower = 1e-6, finite = TRUE), "step_h")

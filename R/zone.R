@@ -88,10 +88,10 @@
 NULL
 
 new_component <- function(type, name, fields, call = rlang::caller_env()) {
+  check_arguments(call)
   check_input(checkmate::check_string(name, min.chars = 1), "name", call = call)
   if (name == "zone")
     abort_input("A component cannot be named {.val zone}: that is the zone itself.", call = call)
-  present(fields, call)
   check_component(structure(c(list(type = type, name = name), fields), class = "amiss_component"),
                   call)
 }
@@ -99,7 +99,7 @@ new_component <- function(type, name, fields, call = rlang::caller_env()) {
 #' @rdname zone_components
 #' @export
 zone_layer <- function(thickness, conductivity, capacity) {
-  check_present(thickness, conductivity, capacity)
+  check_arguments()
   x <- structure(list(thickness = thickness, conductivity = conductivity, capacity = capacity),
                  class = "amiss_layer")
   check_fields(x, zone_fields$layer, "layer", rlang::current_env())
@@ -185,6 +185,7 @@ zone <- function(..., volume, air_capacity_factor = 1, initial_air = 20, initial
 }
 
 new_zone <- function(components, extra, call = rlang::caller_env()) {
+  check_arguments(call)
   if (!all(vapply(components, inherits, NA, "amiss_component"))) {
     abort_input(c("A zone is composed of components.",
                   i = "Give for example {.fn zone_wall}, {.fn zone_window}, {.fn zone_heater}."),
@@ -197,7 +198,7 @@ new_zone <- function(components, extra, call = rlang::caller_env()) {
     abort_input(c("Every component needs a name of its own; used more than once: {.val {twice}}."),
                 call = call)
   }
-  x <- c(list(components = components), present(extra, call))
+  x <- c(list(components = components), extra)
   check_fields(x, zone_fields$zone, "zone", call)
   structure(x, class = "amiss_zone")
 }

@@ -33,14 +33,14 @@ NULL
 #' @rdname zone_edits
 #' @export
 component <- function(model, name) {
-  check_present(model, name)
+  check_arguments()
   UseMethod("component")
 }
 
 #' @rdname zone_edits
 #' @export
 add_component <- function(model, ...) {
-  check_present(model, ...)
+  check_arguments()
   check_input(checkmate::check_list(list(...), min.len = 1), "...", "Give a component to add.")
   UseMethod("add_component")
 }
@@ -48,14 +48,14 @@ add_component <- function(model, ...) {
 #' @rdname zone_edits
 #' @export
 drop_component <- function(model, name) {
-  check_present(model, name)
+  check_arguments()
   UseMethod("drop_component")
 }
 
 #' @rdname zone_edits
 #' @export
 change_component <- function(model, name, ...) {
-  check_present(model, name)
+  check_arguments()
   UseMethod("change_component")
 }
 
@@ -84,7 +84,7 @@ component.amiss_zone <- function(model, name) {
 
 find_component <- function(zone, name, call) {
   known <- names(zone$components)
-  if (is.character(name)) check_readable(name, "name", call)
+  check_input(checkmate::check_string(name), "name", call = call)
   if (!checkmate::test_choice(name, known)) {
     abort_input(c("The zone has no component {.arg name} = {seen(name)}.",
                   i = "Known components: {.val {known}}."), call = call)

@@ -135,7 +135,7 @@ column_fields <- function(x) {
 }
 
 check_zone <- function(zone, name = "zone", call = rlang::caller_env()) {
-  present(zone, call)
+  present(zone, call, name, argument_code(name, call))
   if (was_checked(zone, "zone")) return(invisible(TRUE))
   check_object(zone, "amiss_zone", name, "Make one with {.fn zone}.", call = call)
   check_fields(zone, zone_fields$zone, "zone", call)

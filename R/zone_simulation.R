@@ -35,6 +35,7 @@ zone_control <- list(max_substep_s = 300, cells = 1, spinup = 0L, initial_hours 
 #' @export
 simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, threads = 1L,
                           control = list(), flux = NULL) {
+  check_arguments()
   runs <- zone_runs(zone, values, drivers, step_s, hold, threads, control, flux)
   read <- intersect(colnames(drivers), zone_boundary(zone))
   warn_findings(table_findings(lapply(stats::setNames(nm = read), function(name) drivers[, name])),
@@ -45,7 +46,6 @@ simulate_zone <- function(zone, values = NULL, drivers, step_s, hold = NULL, thr
 # The same of drivers that a record has checked.
 zone_runs <- function(zone, values, drivers, step_s, hold, threads, control = list(), flux = NULL,
                       call = rlang::caller_env()) {
-  check_present(zone, drivers, step_s, call = call)
   parameters <- names(zone_parameters(zone))
   if (is.null(values)) values <- matrix(0, 1, 0)
   check_input(checkmate::check_matrix(values, mode = "numeric", any.missing = FALSE, min.rows = 1),
@@ -78,8 +78,8 @@ zone_runs <- function(zone, values, drivers, step_s, hold, threads, control = li
 }
 
 check_drivers <- function(zone, drivers, call) {
-  verdict <- checkmate::check_matrix(drivers, mode = "numeric", min.rows = 1, col.names = "unique")
-  check_input(verdict, "drivers", call = call)
+  check_input(checkmate::check_matrix(drivers, mode = "numeric", min.rows = 1,
+                                      col.names = "unique"), "drivers", call = call)
   needed <- zone_boundary(zone)
   absent <- setdiff(needed, colnames(drivers))
   if (length(absent) > 0) {
@@ -161,6 +161,7 @@ simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = 
 #' zone_flux(room, "facade", air = "Ti")
 #' @export
 zone_flux <- function(zone, wall, air) {
+  check_arguments()
   check_object(zone, "amiss_zone", "zone")
   wall_number(zone, wall, "wall")
   check_input(checkmate::check_string(air, min.chars = 1), "air", "Give the name of one column.")

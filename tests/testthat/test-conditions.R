@@ -14,5 +14,5 @@ test_that("an object of another version is refused by its name, with both versio
                "`measurements` was made by another version", class = "amiss_error_input")
   # Functions and what has no format are judged by their class alone.
   expect_error(amiss:::check_object(mean, "amiss_fit", "fit"),
-               "Must inherit from class 'amiss_fit'")
+               "must be a calibration made by calibrate\\(\\); got a function")
 })
