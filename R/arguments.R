@@ -2,12 +2,13 @@
 # that is not there, as a string without its quotes does.
 
 # Begins an exported function: all that was given is evaluated, in the order of the arguments.
+# An argument may have the name of a function of R, as `missing` has.
 check_arguments <- function(call = rlang::caller_env()) {
   force(call)
   arguments <- formals(rlang::frame_fn(call))
   for (name in names(arguments)) {
     if (name == "...") check_dots(call)
-    else if (!eval(rlang::call2("missing", as.name(name)), call))
+    else if (!eval(rlang::call2(missing, as.name(name)), call))
       present(get(name, call), call, name, argument_code(name, call))
     else if (rlang::is_missing(arguments[[name]])) abort_missing(name, call)
   }
@@ -25,7 +26,7 @@ check_dots <- function(call) {
 # The argument of a function's frame as it was written.
 argument_code <- function(name, frame) {
   if (is.environment(frame) && name %in% names(formals(rlang::frame_fn(frame))))
-    eval(rlang::call2("substitute", as.name(name)), frame)
+    eval(rlang::call2(substitute, as.name(name)), frame)
 }
 
 # The value of the argument `name`, which was written as `code`.

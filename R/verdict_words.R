@@ -85,6 +85,11 @@ verdict_rules <- list(
   },
   "^Must be of type 'integerish', but element ([0-9]+) .*" = function(m, x, wanted)
     paste0(" must be whole numbers; number ", m[2], " is ", seen(x[[as.integer(m[2])]]), "."),
+  # Whole, but larger than R's integers.
+  "^Must be of type '(?:count|single integerish value)'.*" = function(m, x, wanted)
+    if (is.numeric(x) && length(x) == 1 && isTRUE(x == round(x)))
+      paste0(" is ", seen(x), "; it must be one whole number, at most 2147483647 in size.")
+    else wrong_kind(m, x, wanted),
   "^Must be (of type|a function).*|^Must have length 1$|^Must store numerics$" = wrong_kind,
   "^May not be (NA|NaN)$|^Must be a plain number.*" = wrong_kind,
   "^Must be finite$" = function(m, x, wanted)

@@ -5,7 +5,8 @@ test_that("an object of another version is refused by its name, with both versio
   expect_silent(amiss:::check_object(fit, "amiss_fit", "fit"))
   fit$format_version <- 1L
   for (use in list(attribute_discrepancy, discrepancy, predict,
-                   function(fit) bayes_factor(fit, fit), report)) {
+                   function(fit) bayes_factor(fit, fit),
+                   function(fit) report(fit, tempfile()))) {
     expect_error(use(fit), "another version.*1.*3", class = "amiss_error_input")
   }
   m <- small_upgrade()$measurements

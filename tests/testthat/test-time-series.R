@@ -35,9 +35,9 @@ test_that("a ts counts days where its cycle says so", {
 })
 
 test_that("a data frame needs its time named", {
-  expect_error(record(data.frame(when = stamps, values())), "time.*cannot be used",
+  expect_error(record(data.frame(when = stamps, values())), "time.*must be one string; got NULL",
                class = "amiss_error_input")
-  expect_error(record(values()), "data.*cannot be used", class = "amiss_error_input")
+  expect_error(record(values()), "data.*must be a data frame", class = "amiss_error_input")
 })
 
 test_that("columns that stand twice are refused, and those without a name get one", {
