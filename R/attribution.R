@@ -200,9 +200,10 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
 }
 
 # What is reported as significant: conditions, and each group of conditions that cannot be
-# distinguished as one.
+# distinguished as one. The paper's table has no groups.
 significant_conditions <- function(table) {
-  told <- ifelse(is.na(table$group), table$boundary, table$group)
+  group <- table$group %||% rep(NA, nrow(table))
+  told <- ifelse(is.na(group), table$boundary, group)
   unique(told[table$significant])
 }
 

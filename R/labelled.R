@@ -9,6 +9,9 @@ labelled <- function(x) {
   x$catalogue[] <- lapply(unclass(x$catalogue), labelled_entry, told)
   x$named_cause <- labelled_entry(x$named_cause, told)
   if (!is.null(x$responses)) x$responses$condition <- told(x$responses$condition)
+  # Only a comparison has it.
+  if (!is.null(x$tables$attribution))
+    x$tables$attribution <- labelled_conditions(x$tables$attribution, told)
   x$measurements <- labelled_measurements(x$measurements, told)
   x
 }
@@ -45,8 +48,10 @@ labelled_measurements <- function(measurements, told) {
   measurements
 }
 
+# The attribution of a compared model is a table alone.
 labelled_attribution <- function(attribution, told) {
   if (is.null(attribution)) return(NULL)
+  if (is.data.frame(attribution)) return(labelled_conditions(attribution, told))
   table <- attribution$table
   table$boundary <- told(table$boundary)
   attribution$groups <- lapply(attribution$groups, function(group) {
@@ -60,6 +65,16 @@ labelled_attribution <- function(attribution, told) {
   attribution$table <- table
   attribution$records <- lapply(attribution$records, labelled_attribution, told)
   attribution
+}
+
+# A table of conditions, in which groups stand as listed() names them.
+labelled_conditions <- function(table, told) {
+  table$boundary <- told(table$boundary)
+  if (is.null(table$group)) return(table)
+  grouped <- which(!is.na(table$group))
+  table$group[grouped] <- vapply(strsplit(table$group[grouped], ", | or "),
+                                 function(names) listed(told(names), "or"), "")
+  table
 }
 
 # One that stands alone knows the labels of its record.

@@ -218,3 +218,33 @@ test_that("what remains of each model is told with the conditions in a list", {
   expect_identical(told(TRUE, TRUE), "blind: the discrepancy responds to Te and Gv.")
   expect_identical(told(FALSE, FALSE), "blind: the discrepancy responds to no boundary condition.")
 })
+
+test_that("labelled conditions stand under their labels in all that people read", {
+  data <- sunny_data()
+  m <- linear_measurements(data, calibrate = data$hour <= 60, validate = data$hour > 60,
+                           boundary = list(Te = condition("outdoor air", "degC"),
+                                           Gv = condition("sun on the wall", "W/m2")))
+  labels <- c("outdoor air", "sun on the wall")
+  short <- list(surrogates = 19, ais = list(pilot_chains = 24, groups = 4))
+  for (x in list(compare_linear(list(blind = blind), m = m),
+                 compare_linear(list(blind = blind), "history", m, attribution = short))) {
+    told <- summary(x)
+    expect_output(print(x), "1 model")
+    expect_output(print(told), "blind: the discrepancy responds to sun on the wall")
+    expect_identical(names(told$attribution), c("model", labels))
+    expect_false(anyNA(told$attribution))
+    figure <- ggplot2::autoplot(x, "attribution")
+    expect_match(figure$labels$title, "responds to sun on the wall")
+    expect_setequal(levels(figure$data$boundary), labels)
+    for (which in figures_of(x)) expect_no_error(ggplot2::ggplot_build(ggplot2::autoplot(x, which)))
+    expect_setequal(tidy(x, "attribution")$boundary, c("Te", "Gv"))
+  }
+  table <- data.frame(boundary = c("Te", "Gv"), group = c("Te or Gv", NA))
+  expect_identical(amiss:::labelled_conditions(table, function(n) amiss:::condition_label(m, n)),
+                   data.frame(boundary = labels, group = c("outdoor air or sun on the wall", NA)))
+})
+
+test_that("what the paper's method finds significant is in the title of its figure", {
+  figure <- ggplot2::autoplot(compare_linear(list(blind = blind)), "attribution")
+  expect_match(figure$labels$title, "responds to Gv$")
+})
