@@ -11,7 +11,10 @@ upgrade_stages <- function(upgrade) {
 
 # One table for each stage, bound with a factor `stage` in front.
 stage_table <- function(stages, table_of) {
-  tables <- Map(function(s, name) cbind(stage = name, table_of(s)), stages, names(stages))
+  tables <- Map(function(s, name) {
+    table <- table_of(s)
+    cbind(stage = rep(name, nrow(table)), table)
+  }, stages, names(stages))
   table <- do.call(rbind, unname(tables))
   table$stage <- factor(table$stage, stage_names)
   droplevels(table)

@@ -51,6 +51,13 @@ test_that("a posterior of two modes says so, in the table and in words", {
   expect_equal(vapply(modes, `[[`, 0, "share"), c(sum(w[!upper]), sum(w[upper])))
 })
 
+test_that("the parameters are drawn if every one has several modes", {
+  parted <- fit
+  parted$values <- parted$values + 0.5 * (seq_len(nrow(fit$values)) %% 2 == 0)
+  expect_identical(tidy(parted)$modes, c(2L, 2L))
+  expect_no_error(ggplot2::ggplot_build(ggplot2::autoplot(parted)))
+})
+
 test_that("equal draws have the moments of the weighted ones, in an order that says nothing", {
   mean <- colSums(w * fit$values)
   sd <- sqrt(diag(vcov(fit)))
