@@ -21,6 +21,10 @@ figure_of_nothing <- function(title)
 # that they differ in grey too.
 stage_colours <- c("before" = "#E69F00", "after" = "#0072B2", "the model" = "#0072B2")
 
+# What time steps are used for: colours that no stage has.
+use_colours <- c("warm-up" = "#999999", "calibration" = "#333333", "held out" = "#009E73",
+                 "not used" = "#CCCCCC")
+
 stage_lines <- function() ggplot2::scale_linetype_manual(
   values = c("before" = "longdash", "after" = "solid", "the model" = "solid"))
 
@@ -40,8 +44,15 @@ figure_theme <- function() {
       legend.margin = ggplot2::margin(0, 0, 0, 0))
 }
 
+# A first word with a capital, unless it is a name such as x2 or Te.
+capital <- function(text) {
+  word <- regmatches(text, regexpr("^[[:lower:]-]{2,}(?=[ ,;:]|$)", text, perl = TRUE))
+  if (length(word)) substr(text, 1, 1) <- toupper(substr(text, 1, 1))
+  text
+}
+
 figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {
-  ggplot2::labs(title = title, subtitle = subtitle, x = x, y = y)
+  ggplot2::labs(title = capital(title), subtitle = subtitle, x = x, y = y)
 }
 
 stage_scales <- function()

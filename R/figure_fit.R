@@ -126,7 +126,7 @@ figure_measurements <- function(measurements) {
   m <- measurements
   series <- c(list(m$y), lapply(m$conditions, function(name) condition_values(m, name)))
   panels <- c(axis_label(m$target, level_unit(m$unit, m$y)), condition_titles(m))
-  uses <- c(warmup = "warm-up", use_names, none = "not used")
+  uses <- c(warmup = names(use_colours)[1], use_names, none = names(use_colours)[4])
   table <- data.frame(time = rep(m$time, length(panels)), value = unlist(series),
                       use = factor(uses[rep(m$use, length(panels))], uses),
                       panel = factor(rep(panels, each = length(m$y)), panels),
@@ -142,8 +142,7 @@ figure_measurements <- function(measurements) {
     ggplot2::geom_line(linewidth = 0.6) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y",
                         labeller = wrap_strips()) +
-    ggplot2::scale_colour_manual(
-      values = stats::setNames(c("#999999", "#0072B2", "#009E73", "#CCCCCC"), uses)) +
+    ggplot2::scale_colour_manual(values = use_colours) +
     figure_titles(title, "The target above, the boundary conditions below it.",
                   x = time_label(table$time)) + time_axis(table$time) + figure_theme()
   with_height(figure, 1.6 + 1.15 * length(panels))

@@ -30,17 +30,20 @@ figure_steps <- function(upgrade) {
                         if (length(drop) > 1) "brings most" else "lowers the error",
                         use[length(use)],
                         change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
+  noise <- if (any(table$rmse < m$noise_sd))
+             paste("the stated noise; errors left of it suggest that the measurements are less",
+                   "noisy than stated.")
+           else "the stated noise, about the smallest error that can be expected."
   figure <- ggplot2::ggplot(
     table, ggplot2::aes(.data$rmse, .data$step, colour = .data$use, shape = .data$use)) +
     ggplot2::geom_vline(xintercept = m$noise_sd, linetype = "dashed", colour = "grey20") +
     ggplot2::geom_path(ggplot2::aes(group = .data$use), linewidth = 0.8) +
     ggplot2::geom_point(size = 4) +
-    ggplot2::scale_colour_manual(values = stats::setNames(c("#0072B2", "#D55E00"), use_names)) +
-    ggplot2::scale_shape_manual(values = stats::setNames(c(19, 17), use_names)) +
+    ggplot2::scale_colour_manual(values = use_colours) +
+    ggplot2::scale_shape_manual(values = c("calibration" = 19, "held out" = 17)) +
     ggplot2::scale_x_continuous(limits = c(0, NA), guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.3)) +
-    figure_titles(title, paste("Each row adds one mechanism to the row above. Dashed: the stated",
-                               "noise; an error near it is as small as can be expected."),
+    figure_titles(title, paste("Each row adds one mechanism to the row above. Dashed:", noise),
                   x = axis_label("typical error, RMSE", m$unit)) +
     figure_theme()
   with_height(figure, 2.6 + 0.6 * nlevels(table$step))
