@@ -6,11 +6,22 @@ with_height <- function(figure, inches) {
   figure
 }
 
-# Inches; on a canvas narrower than usual, panels go below each other and titles take more lines.
+# Inches; on a canvas narrower than usual, panels go below each other, and titles take more lines.
 figure_height <- function(figure, width = canvas_width) {
   columns <- figure$facet$params$ncol %||% 1
   (attr(figure, "height_in") %||% 5) * columns / narrow_columns(columns, width) +
-    0.3 * max(0, canvas_width - width)
+    if (width < canvas_width)
+      0.4 * (canvas_width - width) + title_inches(figure, width) -
+        title_inches(figure, canvas_width)
+    else 0
+}
+
+# Height of title and subtitle, whose letters are about 0.6 times as wide as they are high.
+title_inches <- function(figure, width) {
+  size <- letter_points * letter_scale(width) * c(title_size, subtitle_size) / 72.27
+  letters <- vapply(figure$labels[c("title", "subtitle")],
+                    function(text) if (is.character(text)) sum(nchar(text)) else 0, 0)
+  sum(ceiling(letters * 0.6 * size / width) * 1.2 * size)
 }
 
 # Where there is nothing to draw, the title says so.
@@ -27,6 +38,9 @@ use_colours <- c("warm-up" = "#999999", "calibration" = "#333333", "held out" = 
 
 stage_lines <- function() ggplot2::scale_linetype_manual(
   values = c("before" = "longdash", "after" = "solid", "the model" = "solid"))
+
+# Where dashed and solid lines are to be told apart.
+wide_keys <- function() ggplot2::theme(legend.key.width = ggplot2::unit(36, "pt"))
 
 figure_theme <- function() {
   ggplot2::theme_minimal(base_size = letter_points, base_family = figure_family()) +
@@ -87,9 +101,9 @@ short_axis <- function(x) {
 time_label <- function(time) if (is.numeric(time)) "time [h]"
 
 time_axis <- function(time) {
-  if (!is.numeric(time))
-    ggplot2::scale_x_datetime(breaks = function(limits) pretty(limits, 6), date_labels = "%d %b",
-                              guide = apart)
+  if (is.numeric(time)) return(NULL)
+  few <- function(limits) pretty(limits, if (canvas_inches()[["width"]] < 6) 3 else 6)
+  ggplot2::scale_x_datetime(breaks = few, date_labels = "%d %b", guide = apart)
 }
 
 # Middle of the clock hour in which an interval lies that ends at `time`.

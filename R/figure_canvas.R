@@ -30,7 +30,8 @@ canvas_inches <- function() {
     height = grid::convertHeight(grid::unit(1, "npc"), "inches", valueOnly = TRUE))
 }
 
-letter_scale <- function() min(1, max(0.6, canvas_inches()[["width"]] / canvas_width))
+letter_scale <- function(width = canvas_inches()[["width"]])
+  min(1, max(0.75, width / canvas_width))
 
 figure_family <- function() getOption("amiss.font", "")
 
@@ -45,8 +46,8 @@ fit_to_canvas <- function(plot) {
   inside <- inches[["width"]] - 2 * margin_points / 72.27
   plot$labels["title"] <- list(wrap(plot$labels$title, inside, title_size, "bold"))
   plot$labels["subtitle"] <- list(wrap(plot$labels$subtitle, inside, subtitle_size))
-  plot$labels["x"] <- list(wrap(plot$labels$x, 0.55 * inside, 1))
-  plot$labels["y"] <- list(wrap(plot$labels$y, 0.5 * inches[["height"]], 1))
+  plot$labels["x"] <- list(wrap(plot$labels$x, 0.7 * inside, 1))
+  plot$labels["y"] <- list(wrap(plot$labels$y, 0.7 * inches[["height"]], 1))
   plot$layers <- lapply(plot$layers, fit_text_layer, scale, family)
   plot$facet <- fit_columns(plot$facet, inches[["width"]])
   right <- margin_points + 72.27 * end_label_width(plot, scale, family)
@@ -80,7 +81,7 @@ with_end_labels <- function(figure, labels) {
 
 end_label_width <- function(plot, scale, family) {
   labels <- attr(plot, "end_labels")
-  if (is.null(labels)) 0 else max(text_inches(labels, 4.6 * scale * 72.27 / 25.4, "plain", family))
+  if (!length(labels)) 0 else max(text_inches(labels, 4.6 * scale * 72.27 / 25.4, "plain", family))
 }
 
 # ---- measuring

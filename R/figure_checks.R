@@ -8,12 +8,23 @@ left_out_table <- function(fit) {
   data.frame(expected = stats::qnorm(u)[kept], seen = z[kept])
 }
 
+# Numbers with the stage that they are of, unless there is only one.
+by_stage <- function(told, stage) trimws(paste(told, ifelse(stage == "the model", "", stage)))
+
+left_out_title <- function(fits) {
+  beyond <- vapply(fits, function(fit) {
+    with(fit$emulator$left_out, mean(abs(error) > 2 * sqrt(variance)))
+  }, 0)
+  sprintf("Errors on runs left out beyond two standard deviations: %s; 5 %% are expected",
+          listed(by_stage(percent(beyond), names(fits))))
+}
+
 check_words <- function(fits) {
   checks <- Filter(Negate(is.null), lapply(fits, `[[`, "check"))
   ratio <- vapply(checks, `[[`, 0, "ratio")
-  if (!length(ratio)) return("The emulator was not checked by runs")
-  sprintf("Where the posterior lies, the emulator's error is %s of the noise: %s",
-          listed(unique(short(ratio))),
+  if (!length(ratio)) return("The emulator was not checked by runs where the posterior lies")
+  sprintf("Where the posterior lies, runs find the emulator's error to be %s of the noise: %s",
+          listed(by_stage(short(ratio), names(ratio))),
           if (all(ratio <= rules$error_ratio)) "good enough" else "too much, more runs are needed")
 }
 
@@ -25,12 +36,11 @@ figure_emulator <- function(fits) {
     ggplot2::geom_point(size = 1.8) +
     ggplot2::scale_shape_manual(values = c("before" = 4, "after" = 19, "the model" = 19)) +
     stage_scales() +
-    figure_titles(check_words(fits), paste("Errors on runs left out, each over its stated standard",
-                                           "deviation. On the line, the emulator knows its errors.",
-                                           "Ends steeper than the line: a few runs, mostly far",
-                                           "from the posterior, are worse than it says. The title",
-                                           "has the check that decides."),
-                  x = "expected of a normal error", y = "seen") +
+    figure_titles(left_out_title(fits),
+                  paste0("On the line, the emulator knows its errors. Ends steeper than the line: ",
+                         "a few runs, mostly far from the posterior, are worse than it says. ",
+                         check_words(fits), "."),
+                  x = "expected (standard normal)", y = "error seen / its stated sd") +
     figure_theme()
   with_height(figure, 5.4)
 }
@@ -73,7 +83,8 @@ figure_sampler <- function(results) {
     figure_titles(title, paste("From where the chains start (0) to the posterior (1). Low values:",
                                "chains that stand still, or few that carry the weight; more chains",
                                "or moves would help.",
-                               estimate_words(results)), x = "inverse temperature") +
-    figure_theme()
+                               estimate_words(results)),
+                  x = "inverse temperature, axis compressed") +
+    figure_theme() + wide_keys()
   with_height(figure, 4.8)
 }

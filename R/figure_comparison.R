@@ -144,7 +144,7 @@ figure_dropped <- function(comparison) {
     figure_titles(attribution_words(comparison),
                   paste("Each boundary condition, present and past: how much worse the",
                         "discrepancy is explained without it."),
-                  x = "evidence lost when it is ignored (log10 Bayes factor)")
+                  x = "evidence lost without it (log10 Bayes factor, axis compressed)")
   with_height(figure, panel_height(comparison))
 }
 
@@ -167,7 +167,7 @@ figure_models_in_time <- function(comparison, use) {
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, group = .data$part)) +
     ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95,
                                       fill = .data$standing), alpha = 0.25) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$observed), colour = "grey15", linewidth = 0.9) +
+    ggplot2::geom_point(ggplot2::aes(y = .data$observed), colour = "grey45", size = 0.9) +
     ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$standing),
                        linewidth = 0.7) +
     ggplot2::facet_grid(ggplot2::vars(.data$model),
@@ -175,7 +175,7 @@ figure_models_in_time <- function(comparison, use) {
                           lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
     model_scales() +
     figure_titles(title,
-                  paste("Black: measured. Coloured: simulated, with the band that should hold 95 %",
+                  paste("Grey: measured. Coloured: simulated, with the band that should hold 95 %",
                         "of the measurements. At the right: root mean squared error."),
                   x = time_label(table$time),
                   y = axis_label(m$target, level_unit(m$unit, table$observed))) +
@@ -196,16 +196,12 @@ figure_discrepancies <- function(comparison) {
   labels <- stats::setNames(paste0(names(size), "\n", with_unit(short(size), m$unit)), names(size))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time, group = .data$part)) +
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
-    ggplot2::geom_line(ggplot2::aes(y = .data$residual), colour = "grey65", linewidth = 0.5) +
-    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95,
-                                      fill = .data$standing), alpha = 0.3) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$discrepancy, colour = .data$standing),
-                       linewidth = 0.9) +
+    discrepancy_layers("standing") +
     ggplot2::facet_grid(ggplot2::vars(.data$model),
                         labeller = function(strip)
                           lapply(strip, function(x) wrap_labels(0.2)(labels[x]))) +
     model_scales() +
-    figure_titles(title, paste("Grey: measured - simulated. Coloured: the discrepancy that",
+    figure_titles(title, paste("Points: measured - simulated. Coloured: the discrepancy that",
                                "responds to boundary conditions, with its 95 % band; at the right",
                                "its root mean square."),
                   x = time_label(table$time), y = axis_label("error", m$unit)) +

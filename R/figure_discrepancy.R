@@ -10,34 +10,49 @@ discrepancy_title <- function(table) {
              change_words(size[1], size[2], unit))
 }
 
+# Residuals as points, below the discrepancy with its band.
+discrepancy_layers <- function(colour) list(
+  ggplot2::geom_point(ggplot2::aes(y = .data$residual), colour = "grey20", size = 0.4),
+  ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95,
+                                    fill = .data[[colour]], colour = .data[[colour]],
+                                    group = .data$part), alpha = 0.35, linewidth = 0.25),
+  ggplot2::geom_line(ggplot2::aes(y = .data$discrepancy, colour = .data[[colour]],
+                                  group = .data$part), linewidth = 0.5))
+
+# A constant between residual and discrepancy that can be seen.
+constant_words <- function(table, unit, reach) {
+  constant <- vapply(split(table$residual - table$discrepancy, table$stage), mean, 0)
+  seen <- constant[abs(constant) > 0.05 * diff(reach)]
+  if (!length(seen)) return(NULL)
+  told <- paste0(with_unit(short(seen), unit),
+                 ifelse(names(seen) == "the model", "", paste0(" ", names(seen))))
+  paste0(" It varies about zero: the constant part of the error (", listed(told),
+         ") lies between it and the points.")
+}
+
 # Discrepancies over time, one panel each on a common scale, and the leading boundary condition
 # below them.
 figure_discrepancy <- function(discrepancies, leading = NULL) {
   unit <- discrepancies[[1]]$unit
-  table <- stage_table(discrepancies, function(d) cbind(d$series, segment = d$segment))
+  table <- stage_table(discrepancies, function(d) cbind(d$series, part = d$segment))
   attr(table, "unit") <- unit
   stage_panel <- paste0(ifelse(levels(table$stage) == "the model", "error", levels(table$stage)),
                         if (nzchar(unit)) paste0(" [", pretty_unit(unit), "]"))
-  panels <- c(stage_panel, leading$name)
+  panels <- c(stage_panel, leading$title)
   table$panel <- factor(stage_panel[as.integer(table$stage)], panels)
   reach <- range(table$residual, table$lower95, table$upper95)
   corners <- expand.grid(time = table$time[1], y = reach, panel = factor(stage_panel, panels))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time)) +
     ggplot2::geom_blank(ggplot2::aes(y = .data$y), corners) +
     ggplot2::geom_hline(ggplot2::aes(yintercept = 0), corners, colour = "grey40") +
-    ggplot2::geom_line(ggplot2::aes(y = .data$residual, group = .data$segment), colour = "grey60",
-                       linewidth = 0.6) +
-    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$lower95, ymax = .data$upper95,
-                                      fill = .data$stage, group = .data$segment), alpha = 0.3) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$discrepancy, colour = .data$stage,
-                                    group = .data$segment), linewidth = 0.9) +
+    discrepancy_layers("stage") +
     leading_layer(leading, table, panels) +
     ggplot2::facet_grid(panel ~ ., scales = "free_y", switch = "y",
                         labeller = wrap_turned(length(panels))) + stage_scales() +
     figure_titles(discrepancy_title(table),
-                  paste0("Grey: measured - simulated, at the posterior mean of the parameters. ",
-                         "Coloured: the discrepancy, which responds to boundary conditions, with ",
-                         "95 % band.",
+                  paste0("Points: measured - simulated, at the posterior mean of the parameters. ",
+                         "Coloured: the discrepancy, the part that responds to boundary ",
+                         "conditions, with 95 % band.", constant_words(table, unit, reach),
                          if (!is.null(leading))
                            paste0(" Below: ", leading$name, ", which leads.")),
                   x = time_label(table$time)) +
@@ -50,7 +65,7 @@ leading_layer <- function(leading, table, panels) {
   time <- leading$time
   shown <- time %in% table$time
   series <- data.frame(time = time[shown], value = leading$value[shown],
-                       panel = factor(leading$name, panels))
+                       panel = factor(leading$title, panels))
   series$part <- cumsum(
     c(TRUE, diff(as.numeric(series$time)) > 1.5 * stats::median(diff(as.numeric(series$time)))))
   ggplot2::geom_line(ggplot2::aes(y = .data$value, group = .data$part), series, colour = "grey25",
@@ -59,7 +74,8 @@ leading_layer <- function(leading, table, panels) {
 
 response_title <- function(binned, name, noise) {
   swing <- vapply(split(binned$residual, binned$stage), function(r) diff(range(r)), 0)
-  if (all(swing < 2 * noise)) return(paste("The error hardly depends on", name))
+  if (all(swing < 2 * noise))
+    return(sprintf("The error hardly depends on the present value of %s; its past may count", name))
   if (length(swing) < 2) return(paste("How the error changes with", name))
   if (swing[2] < 0.7 * swing[1])
     paste("The error depends on", name, "before the change, and less after it")
@@ -86,21 +102,30 @@ figure_response <- function(upgrade, classes = 10) {
     figure_titles(response_title(binned, leading$name, m$noise_sd),
                   paste0("Small points: every time step. Large points: means over classes ",
                          "of ", leading$name, "."),
-                  x = condition_titles(m, leading$name),
+                  x = leading$title,
                   y = axis_label("measured - simulated", m$unit)) +
     figure_theme()
   with_height(figure, 5)
 }
 
+missing_title <- function(size, name, stage, unit) {
+  words <- if (isTRUE(size[[name]]^2 > 0.5 * sum(size^2)))
+             "what the model lacks is mostly a response to"
+           else if (size[[name]] == max(size)) "the largest response that the model lacks is to"
+           else "the largest significant response that the model lacks is to"
+  sprintf("%s%s %s, typically %s", if (stage == "before") "before the change, " else "", words,
+          name, with_unit(short(size[[name]]), unit))
+}
+
 # The response that the model lacks, of each of the leading conditions, in the unit of the target:
 # first of those that are significant in the `attribution`, if there is one. What is below a
-# hundredth of the largest is a flat line, and left out.
+# twentieth of the largest is a flat line, and left out.
 figure_missing <- function(discrepancy, attribution = NULL, stage = "the model", most = 4) {
   responses <- discrepancy$responses
   size <- sqrt(colMeans(responses^2))
   first <- names(size) %in% if (!is.null(attribution)) significant_conditions(attribution$table)
   shown <- utils::head(names(size)[order(!first, -size)], most)
-  shown <- shown[size[shown] >= 0.01 * max(size)]
+  shown <- shown[size[shown] >= 0.05 * max(size[shown])]
   table <- data.frame(time = rep(discrepancy$series$time, length(shown)),
                       value = as.numeric(responses[, shown]),
                       panel = factor(rep(shown, each = nrow(responses)), shown),
@@ -109,11 +134,9 @@ figure_missing <- function(discrepancy, attribution = NULL, stage = "the model",
     ggplot2::geom_hline(yintercept = 0, colour = "grey40") +
     ggplot2::geom_line(colour = stage_colours[[stage]], linewidth = 0.9) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, labeller = wrap_strips()) +
+    ggplot2::scale_y_continuous(n.breaks = 4, guide = apart) +
     figure_titles(
-      sprintf("%s is mostly a response to %s, typically %s",
-              if (stage == "before") "What the model lacks before the change"
-              else "What the model lacks", shown[1],
-              with_unit(short(size[[shown[1]]]), discrepancy$unit)),
+      missing_title(size, shown[1], stage, discrepancy$unit),
       paste("How the target responds to each boundary condition, present and past, beyond what",
             "the model says. Above zero the model is too low, below it too high."),
       x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +

@@ -25,34 +25,47 @@ figure_explained <- function(upgrade) {
   table$panel <- factor(panels, unique(panels))
   table$row <- explained_rows(table, upgrade$candidates)
   # Ten powers of ten are as dark as it gets.
-  table$evidence <- pmin(1, log1p(pmax(table$left, 0)) / log1p(10))
+  darkness <- function(x) pmin(1, log1p(pmax(x, 0)) / log1p(10))
+  alone <- table[table$mechanism == "no change", ]
+  together <- unique(table[table$mechanism != "no change", c("panel", "row", "before", "left")])
+  together$label <- sprintf("   %s -> %s", decades_label(together$before),
+                            decades_label(together$left))
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$condition, .data$row)) +
-    ggplot2::geom_tile(ggplot2::aes(fill = .data$evidence), colour = "white", linewidth = 1) +
-    ggplot2::geom_text(ggplot2::aes(label = decades_label(.data$left)), size = 4.2,
-                       colour = ifelse(table$evidence > 0.6, "white", "grey20")) +
-    ggplot2::scale_fill_gradient(low = "grey92", high = stage_colours[["after"]], limits = c(0, 1),
-                                 guide = "none") +
+    ggplot2::geom_tile(ggplot2::aes(fill = darkness(.data$left)), colour = "white", linewidth = 1) +
+    ggplot2::geom_text(ggplot2::aes(label = decades_label(.data$left)), alone, size = 3.8,
+                       colour = ifelse(darkness(alone$left) > 0.85, "white", "black")) +
+    ggplot2::geom_text(ggplot2::aes(x = Inf, label = .data$label), together, hjust = 0,
+                       size = 4.2) +
+    ggplot2::scale_fill_gradient(
+      "evidence left", low = "grey92", high = stage_colours[["after"]], limits = c(0, 1),
+      breaks = darkness(c(0, 1, 3, 10)), labels = c("0", "1", "3", "10+"),
+      guide = ggplot2::guide_colourbar(barwidth = 7, barheight = 0.7, direction = "horizontal")) +
     ggplot2::scale_x_discrete(position = "top", limits = unique(table$condition),
-                              labels = wrap_labels(1.1 / length(unique(table$condition)))) +
-    ggplot2::scale_y_discrete(labels = function(x) wrap_labels(0.3)(sub("^[0-9]+ ", "", x))) +
+                              labels = wrap_labels(0.7)) +
+    ggplot2::scale_y_discrete(labels = function(x) wrap_labels(0.36)(sub("^[0-9]+ ", "", x))) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y",
                         labeller = wrap_strips()) +
+    ggplot2::coord_cartesian(clip = "off") +
     figure_titles(explained_title(table, adopted),
-                  paste("Evidence that the error responds to a boundary condition, in powers of",
-                        "ten: without a change, and with each mechanism for the conditions that",
-                        "drive it (together). Light: the mechanism explains the response, or there",
-                        "was none."), x = NULL, y = NULL) +
-    figure_theme() + ggplot2::theme(panel.grid.major.x = ggplot2::element_blank())
-  with_height(figure, 2.4 + 0.36 * length(unique(paste(table$panel, table$row))) +
-                0.6 * nlevels(table$panel))
+                  paste("Evidence that the error responds to boundary conditions, in powers of",
+                        "ten. First row: to each by itself, without a change. Below: to all that",
+                        "drive a mechanism together, without -> with it."),
+                  x = NULL, y = NULL) +
+    figure_theme() +
+    ggplot2::theme(panel.grid.major.x = ggplot2::element_blank(),
+                   legend.title = ggplot2::element_text(size = ggplot2::rel(0.8), vjust = 1),
+                   axis.text.x.top = ggplot2::element_text(angle = 90, hjust = 0, vjust = 0.5))
+  figure <- with_end_labels(figure, together$label)
+  with_height(figure, 2.8 + 0.09 * min(30, max(nchar(table$condition))) +
+                0.42 * length(unique(paste(table$panel, table$row))) + 0.6 * nlevels(table$panel))
 }
 
-# No change on top, then the mechanisms by their standing.
+# No change on top, then the mechanisms by their evidence, as where the candidates are drawn.
 explained_rows <- function(table, candidates) {
   key <- paste(table$from, table$mechanism)
-  standing <- candidates$standing[match(key, paste(candidates$from, candidates$mechanism))]
-  standing[table$mechanism == "no change"] <- Inf
-  standing[is.na(standing)] <- -Inf
-  paste(formatC(as.integer(factor(standing, sort(unique(standing)))), width = 4, flag = "0"),
+  evidence <- candidates$log10_bf[match(key, paste(candidates$from, candidates$mechanism))]
+  evidence[table$mechanism == "no change"] <- Inf
+  evidence[is.na(evidence)] <- -Inf
+  paste(formatC(as.integer(factor(evidence, sort(unique(evidence)))), width = 4, flag = "0"),
         table$mechanism)
 }

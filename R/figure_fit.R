@@ -27,8 +27,8 @@ figure_fit <- function(upgrade) {
                                       fill = .data$stage,
                                       group = interaction(.data$stage, .data$part)),
                          in_panel(1, table), alpha = 0.18) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$observed, group = .data$part), in_panel(1, measured),
-                       colour = "grey15", linewidth = 1.5) +
+    ggplot2::geom_point(ggplot2::aes(y = .data$observed), in_panel(1, measured),
+                        colour = "grey45", size = 0.9) +
     ggplot2::geom_line(ggplot2::aes(y = .data$simulated, colour = .data$stage,
                                     group = interaction(.data$stage, .data$part)),
                        in_panel(1, table), linewidth = 0.7) +
@@ -39,7 +39,7 @@ figure_fit <- function(upgrade) {
                         labeller = ggplot2::labeller(panel = wrap_turned(2))) +
     stage_scales() +
     figure_titles(fit_title(upgrade),
-                  paste("Above, black: measured; coloured: simulated, with the band that should",
+                  paste("Above, grey: measured; coloured: simulated, with the band that should",
                         "hold 95 % of the measurements. Below: error = measured - simulated."),
                   x = time_label(table$time)) + time_axis(table$time) + figure_theme() +
     ggplot2::theme(panel.spacing.x = ggplot2::unit(30, "pt"))
@@ -81,7 +81,7 @@ figure_gain <- function(upgrade) {
     ggplot2::scale_fill_manual(values = stage_colours) +
     figure_titles(gain_title(upgrade), paste("Lower is better for the two errors; the third should",
                                              "come near 95.")) + figure_theme() +
-    ggplot2::theme(panel.grid.major.x = ggplot2::element_blank(),
+    ggplot2::theme(panel.grid.major = ggplot2::element_blank(),
                    strip.text = ggplot2::element_text(vjust = 1))
   with_height(figure, 5)
 }
@@ -89,7 +89,9 @@ figure_gain <- function(upgrade) {
 mean_day_title <- function(binned, unit, noise) {
   stages <- split(binned[binned$use == "calibration", ], binned$stage[binned$use == "calibration"])
   worst <- stages[[1]][which.max(abs(stages[[1]]$residual)), ]
-  if (abs(worst$residual) < noise) return("No time of day stands out from the noise")
+  # Of 24 means of noise, hardly one lies beyond three of its standard deviations.
+  if (abs(worst$residual) < 3 * noise / sqrt(worst$n))
+    return("No time of day stands out from the noise")
   told <- function(r) paste(with_unit(short(abs(r)), unit), if (r > 0) "too low" else "too high")
   title <- sprintf("In calibration, around %02d:30, the simulation is on average %s",
                    floor(worst$hour), told(worst$residual))
@@ -103,6 +105,7 @@ figure_mean_day <- function(upgrade) {
   table <- stage_table(upgrade_stages(upgrade), prediction_rows)
   table$hour <- hour_of_day(table$time, m$step_h)
   binned <- stats::aggregate(residual ~ hour + use + stage, table, mean)
+  binned$n <- stats::aggregate(residual ~ hour + use + stage, table, length)$residual
   spread <- stats::aggregate(residual ~ hour + use + stage, table, stats::quantile,
                              probs = c(0.1, 0.9))
   binned[c("low", "high")] <- spread$residual
@@ -142,6 +145,7 @@ figure_measurements <- function(measurements) {
     ggplot2::geom_line(linewidth = 0.6) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y",
                         labeller = wrap_strips()) +
+    ggplot2::scale_y_continuous(n.breaks = 4, guide = apart) +
     ggplot2::scale_colour_manual(values = use_colours) +
     figure_titles(title, "The target above, the boundary conditions below it.",
                   x = time_label(table$time)) + time_axis(table$time) + figure_theme()

@@ -5,9 +5,15 @@ prior_points <- function(prior, from, to) {
   data.frame(value = value, density = prior_density(prior, value))
 }
 
-posterior_points <- function(values, weights, from, to) {
-  d <- stats::density(values, weights = weights / sum(weights), from = from, to = to, n = 128,
-                      bw = max(stats::bw.nrd0(values), (to - from) / 200))
+# Where a prior ends abruptly, values are mirrored, so that the density does not fall to its end.
+posterior_points <- function(values, weights, prior) {
+  ends <- range(prior$value)
+  abrupt <- ends[prior$density[c(1, nrow(prior))] > 0.05 * max(prior$density)]
+  mirrored <- lapply(abrupt, function(end) 2 * end - values)
+  weights <- rep(weights, 1 + length(abrupt))
+  d <- stats::density(c(values, unlist(mirrored)), weights = weights / sum(weights),
+                      from = ends[1], to = ends[2], n = 128,
+                      bw = max(stats::bw.nrd0(values), diff(ends) / 200))
   data.frame(value = d$x, density = d$y)
 }
 
@@ -19,8 +25,7 @@ density_table <- function(fit) {
     name <- rows$name[k]
     prior <- prior_points(drawn_parameters(fit)[[name]]$prior, rows$prior_lower[k],
                           rows$prior_upper[k])
-    posterior <- posterior_points(fit$values[, name], fit$weights, rows$prior_lower[k],
-                                  rows$prior_upper[k])
+    posterior <- posterior_points(fit$values[, name], fit$weights, prior)
     data.frame(panel = axis_label(rows$label[k], rows$unit[k]), value = prior$value,
                prior = prior$density / max(prior$density),
                posterior = posterior$density / max(posterior$density))
@@ -45,7 +50,7 @@ figure_priors <- function(fits) {
                         labeller = wrap_strips(3)) + stage_scales() + stage_lines() +
     figure_titles(title, paste("Grey: what was thought possible (prior). Lines: what the",
                                "measurements leave of it; each at its own height.")) +
-    figure_theme() +
+    figure_theme() + wide_keys() +
     ggplot2::theme(axis.text.y = ggplot2::element_blank(),
                    panel.grid.major.y = ggplot2::element_blank(),
                    strip.text = ggplot2::element_text(size = ggplot2::rel(0.83)))

@@ -20,8 +20,8 @@ figure_sobol <- function(indices) {
     ggplot2::scale_colour_manual(values = sobol_colours, labels = sobol_orders) +
     ggplot2::scale_shape_manual(values = c(first = 19, total = 21), labels = sobol_orders) +
     ggplot2::scale_y_continuous(
-      NULL, breaks = seq_along(ranked),
-      labels = function(y) wrap_labels(0.3)(indices$table$label[ranked][y])) +
+      NULL, breaks = seq_along(ranked), expand = ggplot2::expansion(add = 0.5),
+      labels = function(y) wrap_labels(0.43)(indices$table$label[ranked][y])) +
     ggplot2::scale_x_continuous(guide = apart) +
     figure_titles(sobol_title(indices$table),
                   "Sobol indices over the priors, all steps together, with 95 % intervals.",

@@ -55,6 +55,52 @@ test_that("titles tell of a change what the numbers beside them say", {
   expect_match(with_errors(0.1, 0.12)[["gain"]], "the error rises by 20 %;", fixed = TRUE)
 })
 
+test_that("a stand-in is not called for", {
+  upgrade <- small_upgrade()
+  title <- function() ggplot2::autoplot(upgrade, "candidates")$labels$title
+  upgrade$models[[2]]$verdict <- "named"
+  expect_identical(title(), "The measurements call for sun")
+  upgrade$models[[2]]$verdict <- "stand-in"
+  expect_identical(title(), "Adopted, but only as a stand-in: sun")
+})
+
+test_that("no error is less than can be expected", {
+  upgrade <- small_upgrade()
+  subtitle <- function() ggplot2::autoplot(upgrade, "steps")$labels$subtitle
+  upgrade$measurements$noise_sd <- 1e-6
+  expect_match(subtitle(), "about the smallest error that can be expected")
+  upgrade$measurements$noise_sd <- 10
+  expect_match(subtitle(), "less noisy than stated")
+  expect_no_match(subtitle(), "smallest")
+})
+
+test_that("most of what is missing is more than half", {
+  expect_identical(missing_title(c(sun = 3, wind = 1), "sun", "the model", "K"),
+                   "what the model lacks is mostly a response to sun, typically 3.0 K")
+  even <- c(sun = 3, wind = 2.9, sky = 2)
+  expect_match(missing_title(even, "sun", "before", "K"), "^before the change, the largest response")
+  expect_match(missing_title(even, "wind", "before", "K"), "the largest significant response")
+})
+
+test_that("the density of a posterior does not fall to the end of a flat prior", {
+  flat <- data.frame(value = seq(0, 1, length.out = 128), density = 1)
+  density <- posterior_points(stats::ppoints(500), rep(1, 500), flat)$density
+  expect_gt(min(density), 0.9 * max(density))
+})
+
+test_that("a constant between residual and discrepancy is explained", {
+  table <- data.frame(residual = c(1, 2, 1, 2), discrepancy = c(-0.5, 0.5, 1, 2),
+                      stage = rep(c("before", "after"), each = 2))
+  expect_match(constant_words(table, "K", c(-1, 2)), "(1.5 K before)", fixed = TRUE)
+  expect_null(constant_words(table[3:4, ], "K", c(-1, 2)))
+})
+
+test_that("titles begin with a capital, but not if the first word is a name", {
+  expect_identical(vapply(c("sun moves", "Te moves", "x2 moves", "u_south moves", "sun"), capital, "",
+                          USE.NAMES = FALSE),
+                   c("Sun moves", "Te moves", "x2 moves", "u_south moves", "Sun"))
+})
+
 test_that("stages have figures of their own", {
   grDevices::pdf(NULL)
   withr::defer(grDevices::dev.off())
