@@ -28,10 +28,15 @@ more_modes <- function(model, modes, starts, context, begin = begun_from) {
   list(model = model, modes = modes, agree = agree)
 }
 
-# What is remembered of searches: whether they agree, how many there were, and where they ended.
+# What is remembered of searches: whether they agree, how many there were, where they ended, and the
+# log posterior there (NA if there was nothing to compare it with).
 told_modes <- function(found) {
-  list(agree = found$agree, searches = length(found$modes),
-       ends = vapply(found$modes, `[[`, 0, "at"),
+  ends <- vapply(found$modes, `[[`, 0, "at")
+  model <- found$model
+  list(agree = found$agree, searches = length(found$modes), ends = ends,
+       heights = vapply(found$modes, function(mode) mode$value %||% NA_real_, 0),
+       points = unit_to_values(to_unit(model$runs$z[ends, , drop = FALSE], model$space),
+                               model$parameters),
        covariances = lapply(found$modes, `[[`, "covariance"))
 }
 

@@ -1,10 +1,12 @@
 figure_names <- c("fit", "attribution", "candidates", "explained", "parameters", "discrepancy",
                   "response", "gain", "mean_day", "priors", "moved", "steps", "missing", "emulator",
-                  "sampler")
+                  "residuals", "sampler", "modes")
 
 # Of several records each has its own.
 record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_day", "missing",
-                         "emulator")
+                         "emulator", "residuals")
+
+calibration_figures <- c("parameters", "residuals", "modes")
 
 #' Figures
 #'
@@ -14,7 +16,7 @@ record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_
 #' @param x,object [measurements()]; a calibration ([calibrate()], not [calibrate_paper()]); or the
 #'   result of [attribute_discrepancy()], [discrepancy()], [sobol_indices()], [ais()],
 #'   [compare_models()] or [upgrade_model()]. If there are several records, plot one of `records`.
-#' @param which Which figure of an upgrade or a comparison, see below.
+#' @param which Which figure of an upgrade, a comparison or a calibration, see below.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A ggplot.
 #' @section Figures of an upgrade:
@@ -32,7 +34,9 @@ record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_
 #'   * `"steps"`: what each mechanism brought.
 #'   * `"missing"`: the response that the first model lacks, by boundary condition.
 #'   * `"emulator"`: the emulator's errors on runs left out.
+#'   * `"residuals"`: whether the last model's error is as the error model says, see *Residuals*.
 #'   * `"sampler"`: how the annealing went.
+#'   * `"modes"`: the modes of the last model's posterior, and where searches ended.
 #'
 #'   If an upgrade has several records, figures that show a series are of one record: `"fit of
 #'   NAME"`. `"fit"` then shows the first record.
@@ -45,6 +49,23 @@ record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_
 #'   * `"parameters"`: their estimates.
 #'   * `"heat_loss"`: the heat loss coefficients of zones.
 #'   * `"held_out"`: the held-out rows, if rows validate.
+#' @section Figures of a calibration:
+#'   * `"parameters"`: their estimates.
+#'   * `"residuals"`: whether the error is as the error model says.
+#'   * `"modes"`: the modes of the posterior, and where searches ended.
+#' @section Residuals:
+#'   A residual is what a measurement does beyond what the calibrated model expects of it, given all
+#'   measurements before, in standard deviations. The model is that of one draw of the posterior:
+#'   simulation, discrepancy and autocorrelated error. If it is right, the residuals are independent
+#'   and N(0, 1) (Johnson 2007). The figure shows them over time and against the two boundary
+#'   conditions that they depend on most, their normal quantiles, their autocorrelation and their
+#'   cumulated periodogram. The bands hold 95 %: each quantile is that of a beta distribution, the
+#'   autocorrelation within 1.96 / sqrt(n), and the whole periodogram (Kolmogorov and Smirnov). The
+#'   title tells of the first check that fails at a level of 1 %. Of a record with more than 20,000
+#'   rows the first 20,000 are shown.
+#' @source Johnson (2007), Bayesian model assessment using pivotal quantities, Bayesian Analysis 2,
+#'   719-734. Durbin and Koopman (2012), Time series analysis by state space methods, 2nd edition,
+#'   for the prediction errors.
 #' @examples
 #' table <- data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4))
 #' plot(measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,
@@ -77,10 +98,9 @@ plot.amiss_discrepancy <- function(x, ...) {
 
 #' @rdname figures
 #' @export
-plot.amiss_calibration <- function(x, ...) {
-  check_whole(x, "x")
+plot.amiss_calibration <- function(x, which = "parameters", ...) {
   rlang::check_dots_empty()
-  draw(figure_parameters(list("the model" = x)))
+  draw(calibration_figure(x, which))
 }
 
 #' @rdname figures
@@ -124,10 +144,9 @@ autoplot.amiss_discrepancy <- function(object, ...) {
 
 #' @rdname figures
 #' @export
-autoplot.amiss_calibration <- function(object, ...) {
+autoplot.amiss_calibration <- function(object, which = "parameters", ...) {
   rlang::check_dots_empty()
-  check_whole(object, "object")
-  figure_parameters(list("the model" = object))
+  calibration_figure(object, which)
 }
 
 #' @rdname figures
@@ -149,6 +168,15 @@ autoplot.amiss_measurements <- function(object, ...) {
 draw <- function(figure) {
   print(figure)
   invisible(figure)
+}
+
+calibration_figure <- function(fit, which, call = rlang::caller_env()) {
+  check_whole(fit, "object", call = call)
+  check_input(checkmate::check_choice(which, calibration_figures), "which", call = call)
+  switch(which,
+         parameters = figure_parameters(list("the model" = fit)),
+         residuals = figure_residuals(fit),
+         modes = figure_modes(fit))
 }
 
 upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
@@ -183,7 +211,9 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
          missing = figure_missing(discrepancy(stages[[1]]$fit), stages[[1]]$attribution,
                              names(stages)[1]),
          emulator = figure_emulator(lapply(stages, `[[`, "fit")),
-         sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)))
+         residuals = figure_residuals(stages[[length(stages)]]$fit),
+         sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)),
+         modes = figure_modes(stages[[length(stages)]]$fit))
 }
 
 # Names of the figures that an object has.

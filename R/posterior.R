@@ -232,6 +232,14 @@ say_parameters <- function(fit, most) {
 # share) each. A gap counts if it is a quarter of the 95 % interval or more, with a twentieth of the
 # posterior on either side.
 parameter_modes <- function(fit, name) {
+  lapply(draws_of_modes(fit, name), function(own) {
+    q <- weighted_quantile(own$x, own$w, c(0.5, 0.025, 0.975))
+    list(median = q[1], lower95 = q[2], upper95 = q[3], share = sum(own$w))
+  })
+}
+
+# The draws of each mode in their order, list(x, w) each; the weights of all sum to one.
+draws_of_modes <- function(fit, name) {
   x <- fit$values[, name]
   keep <- fit$weights > 0
   order <- order(x[keep])
@@ -241,10 +249,7 @@ parameter_modes <- function(fit, name) {
   below <- cumsum(w)[-length(w)]
   gap <- which(diff(x) > 0.25 * width & below > 0.05 & below < 0.95)
   part <- findInterval(seq_along(x), gap + 1)
-  lapply(unname(split(seq_along(x), part)), function(own) {
-    q <- weighted_quantile(x[own], w[own], c(0.5, 0.025, 0.975))
-    list(median = q[1], lower95 = q[2], upper95 = q[3], share = sum(w[own]))
-  })
+  lapply(unname(split(seq_along(x), part)), function(own) list(x = x[own], w = w[own]))
 }
 
 # A row for each mode of each parameter.

@@ -1,0 +1,75 @@
+# What a record does at each row beyond what the fitted model expects of it, given all rows before.
+# If the model is right, these innovations at a draw of its posterior are independent and N(0, 1).
+
+longest_filtered <- 20000  # rows; of a longer record the first ones
+
+# A draw of the posterior is distributed as the true parameters are (Johnson 2007, Bayesian model
+# assessment using pivotal quantities), so that no degree of freedom is lost to what was fitted.
+innovations <- function(fit, draw = systematic_draws(fit$weights, 1), most = longest_filtered) {
+  parts <- covariance_parts(fit, draw)
+  m <- fit$measurements
+  steps <- c(Inf, diff(m$hours[fit$rows]))
+  steps[segment_starts(m, fit$rows)] <- Inf
+  kept <- exp(-outer(steps, 1 / fit$control$error_times))
+  shown <- seq_len(min(length(fit$rows), most))
+  found <- filter_rows(parts$left[shown], parts$columns[shown, , drop = FALSE], parts$spread,
+                       kept[shown, , drop = FALSE], parts$slow, parts$white)
+  data.frame(row = fit$rows[shown], time = m$time[fit$rows][shown],
+             innovation = found$error / found$sd, sd = found$sd)
+}
+
+# list(left, columns, spread, slow, white): what a draw leaves of the record is columns %*% b, each
+# b normal with the variance `spread`, plus autocorrelated errors of the variances `slow` and a
+# white one. The columns are the responses to conditions within the draw's reach and, for what the
+# emulator does not know of the run at this draw, its basis.
+covariance_parts <- function(fit, draw) {
+  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  emulated <- emulated_coefficients(fit$emulator, posterior_unit(fit)[draw, , drop = FALSE])
+  responses <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
+  of_condition <- data$condition + 1
+  amount <- fit$posterior$t[draw, ] / tabulate(of_condition, ncol(fit$posterior$t))
+  variance <- fit$posterior$variance[draw]
+  settings <- length(fit$control$error_ratios)^length(fit$control$error_times)
+  reach <- fit$control$reach[fit$posterior$setting[draw] %/% settings + 1]
+  columns <- cbind(within_reach(responses, data$moves, reach * fit$measurements$noise_sd^2),
+                   data$basis)
+  spread <- c(amount[of_condition], emulated$variance)
+  list(left = data$y - as.numeric(data$basis %*% emulated$mean[1, ]),
+       columns = columns[, spread > 0, drop = FALSE], spread = spread[spread > 0],
+       slow = variance * error_ratios_of(fit, draw)[1, ], white = variance)
+}
+
+# The responses without the directions in which the simulator moves by more than the square root of
+# `limit`, a sum over the record: (I + (E E' / limit)^2)^-1 of them, E the moves.
+within_reach <- function(responses, moves, limit) {
+  if (is.infinite(limit)) return(responses)
+  along <- svd(moves, nv = 0)
+  withheld <- 1 / (1 + (limit / along$d^2)^2)
+  responses - along$u %*% (withheld * crossprod(along$u, responses))
+}
+
+# Kalman filter (Durbin and Koopman 2012, chapter 4): list(error, sd) of each row, predicted from
+# those before it. The states are the coefficients of the columns, which stay, and the
+# autocorrelated errors; `kept` is what each of these keeps of the row before.
+filter_rows <- function(left, columns, spread, kept, slow, white) {
+  steady <- seq_along(spread)
+  moving <- length(spread) + seq_along(slow)
+  state <- numeric(length(spread) + length(slow))
+  covariance <- diag(c(spread, slow), length(state))
+  error <- sd <- numeric(length(left))
+  for (i in seq_along(left)) {
+    keeps <- c(rep(1, length(steady)), kept[i, ])
+    state <- keeps * state
+    covariance <- covariance * tcrossprod(keeps)
+    at <- cbind(moving, moving)
+    covariance[at] <- covariance[at] + slow * (1 - kept[i, ]^2)
+    h <- c(columns[i, ], rep(1, length(moving)))
+    shared <- as.numeric(covariance %*% h)
+    variance <- sum(h * shared) + white
+    error[i] <- left[i] - sum(h * state)
+    sd[i] <- sqrt(variance)
+    state <- state + shared * (error[i] / variance)
+    covariance <- covariance - tcrossprod(shared) / variance
+  }
+  list(error = error, sd = sd)
+}
