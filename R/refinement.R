@@ -31,6 +31,7 @@
 #'   * `rounds`: how many checks were made.
 #'   * `runs_made`: how many runs of the simulator were made here.
 #'   * `modes`: how many searches there were (`searches`) and whether two of them agreed (`agree`).
+#'     `points` are the parameters where searches ended, `heights` the log posterior there.
 #' @source `vignette("algorithm", "amiss")`, *The simulator first*. The search follows Powell
 #'   (2004), Least Frobenius norm updating of quadratic models that satisfy interpolation
 #'   conditions, Mathematical Programming 100, 183-215. It also follows Moré (1978), The

@@ -337,7 +337,7 @@ test_that("a report of one calibration has its tables in Word, too", {
   rows <- table_with(word_tables(body), c("parameter", "unit", "median"))
   expect_identical(rows[, 1], c("offset", "gain"))
   expect_identical(rows[, 3], short(tidy(fit)$estimate, 3))
-  expect_length(xml2::xml_find_all(body, "//pic:pic"), 9)
+  expect_length(xml2::xml_find_all(body, "//pic:pic"), 11)
 })
 
 test_that("a new file from the template works at once", {
