@@ -219,13 +219,15 @@ print.amiss_attribution <- function(x, ...) on_stdout(x, {
                      ">" = "next: {.fun upgrade_model} with a {.fun catalogue}"))
 })
 
-# Which conditions cannot be distinguished, and what would distinguish them.
+# Which conditions cannot be distinguished, by what rule, and what would distinguish them. The
+# largest correlation between two of them is often far below 1, and not the reason.
 group_words <- function(attribution) {
   vapply(Filter(function(g) g$significant, attribution$groups), function(g) {
-    sprintf("In this record %s cannot be distinguished%s: measure while %s differ",
-            listed(g$conditions), if (go_together(g)) sprintf(" (correlation %.3f)", g$correlation)
-                                  else "",
-            if (length(g$conditions) == 2) "the two" else "they")
+    two <- length(g$conditions) == 2
+    sprintf(paste("In this record %s cannot be distinguished (the discrepancy can do without %s,",
+                  "but not without %s): measure while %s differ"), listed(g$conditions),
+            if (two) "either one" else "some of them", if (two) "both" else "all of them",
+            if (two) "the two" else "they")
   }, "")
 }
 

@@ -128,7 +128,13 @@ condition_values <- function(measurements, name) {
 
 # Labels of boundary conditions, of a record or of several; of those without one the name.
 condition_label <- function(measurements, names) {
-  labels <- unlist(lapply(unname(each_record(measurements)), `[[`, "labels"))
+  told_condition(record_labels(measurements), names)
+}
+
+record_labels <- function(measurements)
+  unlist(lapply(unname(each_record(measurements)), `[[`, "labels"))
+
+told_condition <- function(labels, names) {
   at <- match(names, names(labels))
   unname(ifelse(is.na(at), names, labels[at]))
 }

@@ -257,16 +257,20 @@ print.amiss_calibration <- function(x, ...) on_stdout(x, {
   if (isTRUE(x$part)) {
     cli::cli_text("one of several records that were calibrated together, {x$trust$verdict}")
   } else {
-    cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)}",
-                        "[{round(x$interval[1] / log(10), 2)},",
-                        "{round(x$interval[2] / log(10), 2)}], {x$trust$verdict}"))
+    cli::cli_text("log10 evidence {evidence_words(x)}, {x$trust$verdict}")
   }
+  cli::cli_text("{error_sentence(x)}")
   say_parameters(x, 6)
   cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
   cli::cli_bullets(
     c(">" = if (isTRUE(x$part)) "next: {.fun discrepancy} or {.fun predict}"
             else "next: {.fun attribute_discrepancy}, {.fun discrepancy} or {.fun upgrade_model}"))
 })
+
+evidence_words <- function(fit, sign = "") {
+  decades <- c(fit$log_evidence, fit$interval) / log(10)
+  with_limits(decades[1], decades[2], decades[3], sign)
+}
 
 free_probability <- function(fit) sum(fit$reach[is.infinite(fit$control$reach)])
 

@@ -351,12 +351,11 @@ evidence_sentences <- function(comparison) {
   table <- comparison$tables$evidence
   best <- table[which.min(table$rank), ]
   if (nrow(table) < 2)
-    return(sprintf("log10 evidence of %s: %s [%s, %s].", best$model, signed(best$log10_evidence),
-                   signed(best$lower95), signed(best$upper95)))
-  sprintf(paste("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s [%s,",
-                "%s]; it holds %s of the probability."),
-          best$model, best$against,
-          best$word, signed(best$log10_bf), signed(best$bf_lower95), signed(best$bf_upper95),
+    return(sprintf("log10 evidence of %s: %s.", best$model,
+                   with_limits(best$log10_evidence, best$lower95, best$upper95, "+")))
+  sprintf(paste("The evidence for %s over the next best, %s, is %s: log10 Bayes factor %s; it",
+                "holds %s of the probability."), best$model, best$against, best$word,
+          with_limits(best$log10_bf, best$bf_lower95, best$bf_upper95, "+"),
           percent(best$probability))
 }
 
@@ -366,8 +365,8 @@ print.amiss_comparison <- function(x, ...) on_stdout(x, {
   evidence <- x$tables$evidence
   criteria <- x$tables$criteria
   held_out <- !all(is.na(criteria$rmse_validation))
-  interval <- sprintf("%.1f [%.1f, %.1f]%s", evidence$log10_evidence, evidence$lower95,
-                      evidence$upper95, ifelse(evidence$trusted, "", " ?"))
+  interval <- paste0(with_limits(evidence$log10_evidence, evidence$lower95, evidence$upper95),
+                     ifelse(evidence$trusted, "", " ?"))
   table <- data.frame(model = evidence$model, log10_L = interval,
                       P = sprintf("%.3f", evidence$probability),
                       RMSE = short(criteria$rmse_calibration, 3))

@@ -455,8 +455,6 @@ narrow_words <- function(upgrade) {
 remaining_sentences <- function(upgrade) {
   answers <- significant_conditions(last_attribution(upgrade))
   model <- upgrade$models[[length(upgrade$models)]]
-  rows <- parameter_rows(model$fit)
-  edge <- rows$label[rows$at_edge]
   moved <- step_moved_words(model)
   last <- remaining_error(model, upgrade$measurements)
   c(if (length(answers)) sprintf("The remaining error responds to %s.", listed(answers))
@@ -473,13 +471,7 @@ remaining_sentences <- function(upgrade) {
               if (length(step_moved(model)) > 1) "these values are" else "this value is"),
     vapply(group_words(model$attribution), paste0, "", "."),
     mode_words(model$fit),
-    if (length(edge)) {
-      sprintf("At the edge of what was thought possible: %s. %s for something else.", listed(edge),
-              if (length(edge) == 1)
-                "Widen this range, or suspect that the parameter makes up"
-              else "Widen these ranges, or suspect that these parameters make up")
-    }
-    else "No parameter is at the edge of its range.",
+    edge_sentence(model$fit) %||% no_edge,
     sprintf("The search stopped because %s%s.",
             upgrade$stopped_reason,
             if (upgrade$stopped_id == "steps") "; further causes were not looked for" else ""))
@@ -497,7 +489,7 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
     row <- x$candidates[x$candidates$from == model$parent &
                         x$candidates$mechanism == model$mechanism, ]
     boundary <- x$catalogue[[model$mechanism]]$boundary
-    driven <- if (length(boundary)) sprintf(" (%s)", listed(boundary)) else ""
+    driven <- driver_words(model$mechanism, boundary)
     cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}{driven}, log10",
                                    "Bayes factor {round(row$log10_bf, 1)}")))
   }

@@ -91,9 +91,10 @@ candidates_words <- function(upgrade) {
   drives <- vapply(table$mechanism,
                    function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
   decision <- decision_words(table, upgrade$control$decisive)
+  factor <- same_decimals(table$log10_bf, table$lower95, table$upper95, "+")
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
-             "log10 Bayes factor" = signed(table$log10_bf),
-             "95 % interval" = paste(signed(table$lower95), "to", signed(table$upper95)),
+             "log10 Bayes factor" = factor$estimate,
+             "95 % interval" = paste(factor$lower, "to", factor$upper),
              evidence = table$word,
              "beside an unknown response" = signed(table$beside_unknown),
              "with no unknown response" = signed(table$standing),
@@ -136,8 +137,7 @@ method_table <- function(upgrade) {
     unit <- fit$measurements$unit
     c(length(fit$rows), ncol(fit$emulator$basis$vectors), nrow(fit$emulator$processes$inputs),
       with_unit(short(c(fit$measurements$noise_sd, fit$emulator$basis$discarded_rms)), unit),
-      paste0(signed(fit$log_evidence / log(10)), " (", signed(fit$interval[1] / log(10)), " to ",
-             signed(fit$interval[2] / log(10)), ")"),
+      evidence_words(fit, "+"),
       fit$check$verdict %||% "not checked", fit$trust$verdict)
   }
   columns <- unlist(lapply(upgrade$models, function(model) {
@@ -148,6 +148,6 @@ method_table <- function(upgrade) {
   cbind(quantity = c("calibration steps, N", "vectors of the simulation space, Q",
                      "runs of the simulator, M", "stated measurement noise",
                      "part of the runs that the Q vectors leave out (RMS)",
-                     "log10 evidence (95 % interval)", "emulator", "trust"),
+                     "log10 evidence [95 % interval]", "emulator", "trust"),
         as.data.frame(columns, optional = TRUE))
 }

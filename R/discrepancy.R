@@ -75,8 +75,9 @@ paper_discrepancy <- function(fit, draws = 24) {
 #' @export
 print.amiss_discrepancy <- function(x, ...) on_stdout(x, {
   cli::cli_text(paste("{.strong Discrepancy} of {.field {x$target}} over {nrow(x$series)} steps:",
-                      "residual RMS {signif(sqrt(mean(x$series$residual^2)), 3)} {x$unit}, of",
-                      "which {signif(sqrt(mean(x$series$discrepancy^2)), 3)} responds to boundary",
+                      "residual RMS {signif(sqrt(mean(x$series$residual^2)), 3)}",
+                      "{pretty_unit(x$unit)}, of which",
+                      "{signif(sqrt(mean(x$series$discrepancy^2)), 3)} responds to boundary",
                       "conditions"))
   cli::cli_bullets(c(">" = "next: {.fun plot} or {.fun attribute_discrepancy}"))
 })

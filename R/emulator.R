@@ -108,7 +108,9 @@ emulator_control <- list(explained = 0.99, noise_fraction = 0.05, max_vectors = 
 train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
   check_arguments()
   check_object(ensemble, "amiss_ensemble", "ensemble")
+  target_unit <- ""
   if (inherits(noise_sd, "amiss_measurements")) {
+    target_unit <- noise_sd$unit
     check_ensemble_rows(ensemble, noise_sd)
     noise_sd <- noise_sd$noise_sd
   }
@@ -143,7 +145,8 @@ train_emulator <- function(ensemble, noise_sd, control = NULL, threads = 1) {
          diagnostics = diagnostics, trust = emulator_trust(basis, diagnostics, noise_sd, ensemble),
          control = control, hours = ensemble$hours,
          given = if (is.null(ensemble$simulator)) ensemble,
-         noise_sd = noise_sd, evaluations = trained$evaluations), class = "amiss_emulator")
+         noise_sd = noise_sd, target_unit = target_unit, evaluations = trained$evaluations),
+    class = "amiss_emulator")
   warn_coarse_basis(emulator, "control$max_vectors")
   emulator
 }
@@ -298,13 +301,14 @@ emulator_trust <- function(basis, diagnostics, noise_sd, ensemble) {
 #' @export
 print.amiss_emulator <- function(x, ...) on_stdout(x, {
   d <- x$diagnostics
+  unit <- x$target_unit %||% ""
+  told <- with_unit(short(c(x$basis$discarded_rms, x$noise_sd, d$series_rmse)), unit)
   cli::cli_text(paste("{.strong Emulator} of {nrow(x$processes$inputs)} runs:",
                       "{ncol(x$basis$vectors)} basis vectors explain",
                       "{round(100 * x$basis$explained, 3)} %; {x$trust$verdict}"))
-  cli::cli_bullets(c("*" = paste("left out: {signif(x$basis$discarded_rms, 2)} RMS beside a noise",
-                                 "of {signif(x$noise_sd, 2)}"),
+  cli::cli_bullets(c("*" = "left out: {told[1]} RMS beside a noise of {told[2]}",
                      "*" = paste("leave-one-out: series R2 {round(d$series_r2, 5)}, RMSE",
-                                 "{signif(d$series_rmse, 2)}; 95 % intervals hold",
+                                 "{told[3]}; 95 % intervals hold",
                                  "{round(100 * d$coverage95, 1)} % of the coefficients,",
                                  "{round(100 * d$series_coverage95, 1)} % of the series")))
   if (x$control$selection == "forward") {

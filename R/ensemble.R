@@ -426,7 +426,7 @@ print.amiss_ensemble <- function(x, ...) on_stdout(x, {
   cli::cli_text(paste("{.strong Ensemble}: {ncol(x$outputs)} runs of {nrow(x$outputs)} steps over",
                       "{length(x$parameters)}",
                       "parameter{?s}{if (x$failed) paste0(' (', x$failed, ' failed)') else ''}"))
-  cli::cli_bullets(c("*" = "parameters {.field {names(x$parameters)}}",
+  cli::cli_bullets(c("*" = "parameters {.field {parameter_titles(x$parameters)}}",
                      if (!is.null(x$region)) c("*" = "in the region where a posterior lies"),
                      if (!is.null(x$held_out))
                        c("*" = "and at {nrow(x$held_out$outputs)} validation steps"),

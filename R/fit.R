@@ -158,8 +158,8 @@ augment_prediction <- function(fit, prediction) {
 #' @param object A calibration ([calibrate()], [calibrate_paper()]).
 #' @param x Its summary.
 #' @param ... Not used: an argument that is not known is an error.
-#' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), `reach`,
-#'   `check` and `trust` in words.
+#' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), and in words
+#'   `error`, `evidence`, `modes`, `edge`, `reach`, `check` and `trust`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -178,6 +178,8 @@ summary.amiss_fit <- function(object, ...) {
   rlang::check_dots_empty()
   structure(list(name = object$measurements$name, unit = object$measurements$unit,
                  parameters = generics::tidy(object), glance = generics::glance(object),
+                 error = error_sentence(object), evidence = evidence_words(object),
+                 modes = mode_words(object), edge = edge_sentence(object),
                  reach = if (!is.null(object$reach)) reach_words(object),
                  check = object$check$verdict, trust = object$trust$verdict),
             class = "summary.amiss_fit")
@@ -186,17 +188,29 @@ summary.amiss_fit <- function(object, ...) {
 #' @rdname summary.amiss_fit
 #' @export
 print.summary.amiss_fit <- function(x, ...) {
-  shown <- utils::head(x$parameters[names(x$parameters) != "label"], 6)
   on_stdout(x, {
-    cli::cli_text("{.strong Calibration} on {x$glance$nobs} rows of {.val {x$name}}, ",
-                  "residual {signif(x$glance$sigma, 3)} {x$unit}")
-    cli::cli_text("log10 evidence {round(x$glance$log10_evidence, 2)}, {x$trust}")
-    say_table(shown)
-    more <- nrow(x$parameters) - nrow(shown)
-    if (more) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
+    cli::cli_text("{.strong Calibration} on {x$glance$nobs} rows of {.val {x$name}}")
+    cli::cli_text("log10 evidence {x$evidence}, {x$trust}")
+    cli::cli_text("{x$error}")
+    say_first(tidy_words(x$parameters), 6)
+    say_bullets(c(x$modes, x$edge), "!")
     then <- if (is.null(x$reach)) "its {.code index} of the boundary conditions"
             else "{.fun attribute_discrepancy}"
     cli::cli_bullets(c("*" = as_said(x$reach), "*" = as_said(x$check),
                        ">" = paste("next: {.fun predict}, {.fun confint} or", then)))
   })
+}
+
+# The table of tidy() as people read it: physical values and modes only if they say something.
+tidy_words <- function(table) {
+  told <- same_decimals(table$estimate, table$conf.low, table$conf.high)
+  physical <- same_decimals(table$estimate, table$physical.low, table$physical.high)
+  words <- data.frame(parameter = labels_with_names(table$label, table$term),
+                      unit = pretty_unit(table$unit), estimate = told$estimate,
+                      std.error = short(table$std.error), conf.low = told$lower,
+                      conf.high = told$upper)
+  if (!anyNA(table$physical.low))
+    words[c("physical.low", "physical.high")] <- physical[c("lower", "upper")]
+  if (any(table$modes > 1)) words$modes <- table$modes
+  words
 }

@@ -26,7 +26,7 @@ further_inspections <- function(told) utils::tail(told, -inspections_first)
 
 # The last part of a printed summary: the first sentences, how many more there are, where to go on.
 say_inspections <- function(told) {
-  cli::cli_text("{.strong What to inspect next}:")
+  if (length(told)) cli::cli_text("{.strong What to inspect next}:")
   say_bullets(first_inspections(told))
   more <- length(further_inspections(told))
   cli::cli_bullets(c(

@@ -126,9 +126,7 @@ check_records <- function(x, measurements, name, check_one, least = 2, call = rl
 print.amiss_joint <- function(x, ...) on_stdout(x, {
   cli::cli_text(
     "{.strong Joint calibration} of {length(x$records)} records: {.val {names(x$records)}}")
-  cli::cli_text(paste("log10 evidence {round(x$log_evidence / log(10), 2)}",
-                      "[{round(x$interval[1] / log(10), 2)}, {round(x$interval[2] / log(10), 2)}],",
-                      "{x$trust$verdict}"))
+  cli::cli_text("log10 evidence {evidence_words(x)}, {x$trust$verdict}")
   say_parameters(x, 4)
   for (name in names(x$records)) {
     fit <- x$records[[name]]
@@ -314,6 +312,7 @@ attributed_together <- function(fits, each, control, seed, threads) {
 
 #' @export
 print.amiss_joint_attribution <- function(x, ...) on_stdout(x, {
+  x <- told_attribution(x)
   cli::cli_text(
     "{.strong Attribution} of the discrepancies of {.val {names(x$records)}}, together:")
   say_table(x$table[c("boundary", "log10_bf_dropped", "p_value", "significant", "records")])

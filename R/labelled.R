@@ -77,9 +77,10 @@ labelled_conditions <- function(table, told) {
   table
 }
 
-# One that stands alone knows the labels of its record.
+# One that stands alone knows the labels of its record, or of each of several.
 told_attribution <- function(attribution) {
-  labelled_attribution(attribution, function(names) condition_label(attribution, names))
+  each <- attribution$records %||% list(attribution)
+  labelled_attribution(attribution, function(names) condition_label(each, names))
 }
 
 # That of a model, under the labels of its records.

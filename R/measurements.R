@@ -229,6 +229,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   noise <- noise_level(noise_sd, coarse, raw$y)
   findings <- record_findings(list(columns = c(data[target], data[numeric_columns]),
                                    target = target, conditions = terms$name, circular = circular,
+                                   labels = stats::setNames(terms$label, terms$name),
                                    use = use_given, noise_sd = noise$sd * sqrt(coarse$per_step),
                                    per_step = coarse$per_step))
   structure(list(format_version = format_version, name = name, target = target, unit = unit,
@@ -510,7 +511,7 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
     `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
     sprintf(" (%s, %d an average, %d times)", x$noise$method, x$noise$readings, x$noise$replicates))
   cli::cli_bullets(c("*" = paste("target {.field {x$target}}, noise standard deviation",
-                                 "{signif(x$noise_sd, 3)} {x$unit}{origin}"),
+                                 "{signif(x$noise_sd, 3)} {pretty_unit(x$unit)}{origin}"),
                      "*" = paste("{n[['calibrate']]} calibrate, {n[['validate']]} validate,",
                                  "{n[['warmup']]} warm up"),
                      "*" = if (any(lost)) "{sum(lost)} without a measurement, left out",

@@ -79,7 +79,7 @@ catalogue <- function(...) {
     abort_input(c("There is no mechanism {.val {setdiff(i, names(x))}} in the catalogue.",
                   i = "Its mechanisms: {.val {names(x)}}."))
   }
-  structure(unclass(x)[i], class = "amiss_catalogue")
+  structure(unclass(x)[i], labels = attr(x, "labels"), class = "amiss_catalogue")
 }
 
 #' @export
@@ -92,12 +92,19 @@ print.amiss_mechanism <- function(x, ...) on_stdout(x, {
 print.amiss_catalogue <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong Catalogue} of {length(x)} mechanism{?s}")
   shown <- utils::head(x, 10)
-  for (entry in shown)
-    cli::cli_bullets(c("*" = "{.strong {entry$name}} ({entry$boundary}): {entry$sentence}"))
+  for (entry in shown) {
+    driven <- driver_words(entry$name, told_condition(attr(x, "labels"), entry$boundary))
+    cli::cli_bullets(c("*" = "{.strong {entry$name}}{driven}: {entry$sentence}"))
+  }
   if (length(x) > length(shown))
     cli::cli_bullets(c("*" = "{length(x) - length(shown)} more: {names(x)[-seq_along(shown)]}"))
   cli::cli_bullets(c(">" = "next: {.fun upgrade_model}"))
 })
+
+# In brackets behind the name of a mechanism; not if there is none or the name says it.
+driver_words <- function(name, boundary) {
+  if (!length(boundary) || identical(boundary, name)) "" else sprintf(" (%s)", listed(boundary))
+}
 
 # Whether an edit asks for the name of the record beside the model.
 knows_record <- function(edit)

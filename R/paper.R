@@ -185,16 +185,22 @@ index_table <- function(index, conditions) {
 
 #' @export
 print.amiss_paper_calibration <- function(x, ...) on_stdout(x, {
-  ten <- log(10)
+  decades <- c(x$interval, x$evidence$log_evidence[1:2]) / log(10)
+  parts <- same_decimals(decades[3:4], decades[1], decades[2])$estimate
   cli::cli_text(paste("{.strong Calibration as in the paper} on {length(x$rows)} rows of",
                       "{.val {x$measurements$name}}"))
-  cli::cli_text(paste("log10 evidence {round(x$log_evidence / ten, 2)}",
-                      "[{round(x$interval[1] / ten, 2)}, {round(x$interval[2] / ten, 2)}] =",
-                      "{round(x$evidence$log_evidence[1] / ten, 2)} (5) +",
-                      "{round(x$evidence$log_evidence[2] / ten, 2)} (6), {x$trust$verdict}"))
+  cli::cli_text(paste("log10 evidence {evidence_words(x)} = {parts[1]} (5) + {parts[2]} (6),",
+                      "{x$trust$verdict}"))
+  cli::cli_text("{error_sentence(x)}")
   say_parameters(x, 3)
   cli::cli_text("variance index of the boundary conditions over that of white noise")
-  say_table(utils::head(x$index, 4))
+  index <- utils::head(x$index, 4)
+  index$boundary <- condition_label(x$measurements, index$boundary)
+  mean <- same_decimals(index$mean, index$lower95, index$upper95)$estimate
+  index[c("difference", "lower95", "upper95")] <- same_decimals(index$difference, index$lower95,
+                                                                index$upper95)
+  index$mean <- mean
+  say_table(index)
   cli::cli_bullets(c(">" = paste("next: {.fun calibrate} and {.fun attribute_discrepancy}, which",
                                  "know the history of the conditions")))
 })

@@ -219,13 +219,43 @@ edge_of_prior <- function(fit) {
 
 posterior_centre <- function(fit) colSums(fit$weights * to_normal(posterior_unit(fit)))
 
-# The first parameters of a fit, and how many there are besides; and those whose posterior has
-# several modes.
+# The first parameters of a fit, how many there are besides, and what makes their values doubtful.
 say_parameters <- function(fit, most) {
   table <- parameter_table(fit)
+  say_first(data.frame(parameter = parameter_titles(drawn_parameters(fit)),
+                       unit = pretty_unit(table$unit),
+                       stats::setNames(same_decimals(table$median, table$lower95, table$upper95),
+                                       c("median", "lower95", "upper95"))), most)
+  say_bullets(c(mode_words(fit), edge_sentence(fit)), "!")
+}
+
+# The first rows of a table of parameters, without a column of units if there is none.
+say_first <- function(table, most) {
+  if (!any(nzchar(table$unit))) table$unit <- NULL
   say_table(utils::head(table, most))
-  if (nrow(table) > most) cli::cli_text("{nrow(table) - most} more parameter{?s}: see {.fun tidy}")
-  say_bullets(mode_words(fit), "!")
+  more <- nrow(table) - most
+  if (more > 0) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
+}
+
+# The parameters at the edge of their priors, and what to do about them; NULL if there is none.
+edge_sentence <- function(fit) {
+  rows <- parameter_rows(fit)
+  edge <- rows$label[rows$at_edge]
+  if (length(edge)) {
+    sprintf("At the edge of what was thought possible: %s. %s for something else.", listed(edge),
+            if (length(edge) == 1) "Widen this range, or suspect that the parameter makes up"
+            else "Widen these ranges, or suspect that these parameters make up")
+  }
+}
+
+no_edge <- "No parameter is at the edge of its range."
+
+# What the calibrated simulation leaves of the record.
+error_sentence <- function(fit) {
+  error <- error_sd(fit)
+  sprintf("The calibrated model's typical error is %s, %s times the stated noise.",
+          with_unit(short(error), fit$measurements$unit),
+          short(error / fit$measurements$noise_sd))
 }
 
 # Modes of a parameter: parts of its draws that a gap keeps apart, list(median, lower95, upper95,

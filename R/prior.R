@@ -223,4 +223,13 @@ distinct_labels <- function(parameters) {
   stats::setNames(make.unique(label, " "), name)
 }
 
+# Such labels with the names that code takes.
+labels_with_names <- function(label, name) {
+  known <- label == name | endsWith(label, paste0(" (", name, ")"))
+  unname(ifelse(known, label, sprintf("%s (%s)", label, name)))
+}
+
+parameter_titles <- function(parameters)
+  labels_with_names(distinct_labels(parameters), names(parameters))
+
 to_normal <- function(unit) stats::qnorm(pmin(pmax(unit, 1e-15), 1 - 1e-15))

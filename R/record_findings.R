@@ -24,8 +24,8 @@ record_checks <- list(
 
 # `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of
 # a table by name, the use of each row, the noise of a single reading, and how many rows an average
-# takes. Returns a data frame with a row for each finding: its `id`, the `column`, its `rows` (all,
-# if none is listed), the `value`, and what it `says`.
+# takes; `labels` of columns may be left out. Returns a data frame with a row for each finding: its
+# `id`, the `column`, its `rows` (all, if none is listed), the `value`, and what it `says`.
 record_findings <- function(record) {
   found <- lapply(names(record$columns),
                   function(name) column_findings(record_column(record, name)))
@@ -44,6 +44,9 @@ record_column <- function(record, name) {
             is_condition = name %in% record$conditions, is_circular = name %in% record$circular)
   # A target that is not compared does no harm.
   if (x$is_target) v[!record$use %in% c("calibrate", "validate")] <- NA
+  label <- record$labels[name]
+  # For sentences: whoever mends the record needs the name of its column too.
+  x$told <- if (length(label) && !is.na(label)) labels_with_names(label, name) else name
   c(list(v = v), x, record[c("use", "noise_sd", "per_step")])
 }
 
@@ -90,7 +93,7 @@ code_finding <- function(x) {
   if (!length(rows)) return(NULL)
   codes <- unique(x$v[rows])
   list(rows = rows, value = codes[1],
-       says = sprintf("%s is %s in %s: a code for a missing value. Give missing = %s.", x$name,
+       says = sprintf("%s is %s in %s: a code for a missing value. Give missing = %s.", x$told,
                       listed(format_each(codes), "or"), rows_words(rows), value_code(codes)))
 }
 
@@ -109,7 +112,7 @@ far_finding <- function(x) {
   list(rows = rows, value = values[1],
        says = sprintf(paste("%s is %s in %s, far outside all other values (%s to %s): correct",
                             "these rows, or set them to NA."),
-                      x$name, told, rows_words(rows), usual[1], usual[2]))
+                      x$told, told, rows_words(rows), usual[1], usual[2]))
 }
 
 usual_ends <- function(values) format_each(signif(range(values), 4))
@@ -164,7 +167,7 @@ range_finding <- function(x) {
   list(rows = rows, value = unname(at[1]),
        says = sprintf(paste("%s is %s, %s, in %d of %d rows: the range of its sensor seems to end",
                             "there. Give range = c(%s, %s) to leave these rows out of the",
-                            "comparison."), x$name,
+                            "comparison."), x$told,
                       listed(format_each(at), "or"), extreme, length(rows), sum(!is.na(x$v)),
                       limits[["lower"]], limits[["upper"]]))
 }
@@ -193,7 +196,7 @@ stuck_finding <- function(x) {
   rows <- unlist(Map(function(first, n) seq(first, length.out = n), runs$first[long],
                      runs$length[long]))
   list(rows = rows, value = runs$value[long][1], says = sprintf(
-    "%s is %s in all of %s: its sensor seems to be stuck. Set these readings to NA.", x$name,
+    "%s is %s in all of %s: its sensor seems to be stuck. Set these readings to NA.", x$told,
     listed(format_each(unique(runs$value[long]))), rows_words(rows)))
 }
 
@@ -205,7 +208,7 @@ repeated_finding <- function(x) {
   if (times < 2 || x$per_step %% times == 0) return(NULL)
   list(value = times, says = sprintf(paste("%s changes every %d rows at most: each value stands in",
                                            "%d rows. Give average as long as these, or readings of",
-                                           "every row."), x$name, times, times))
+                                           "every row."), x$told, times, times))
 }
 
 # The largest spacing that nineteen in twenty of the places share.
@@ -232,7 +235,7 @@ quantised_finding <- function(x) {
   if (is.null(step) || step <= rules$coarse_step * x$noise_sd) return(NULL)
   list(value = step, says = sprintf(paste("%s comes in steps of %s, coarse for a noise of %s: use",
                                           "finer readings, or state a noise of %s at least."),
-                                    x$name, short(step), short(x$noise_sd), short(step / sqrt(12))))
+                                    x$told, short(step), short(x$noise_sd), short(step / sqrt(12))))
 }
 
 # ---- what is no quantity of its own
@@ -248,7 +251,7 @@ direction_finding <- function(x) {
   if (jumps < 2 && !(is_named && diff(range(v)) > 90)) return(NULL)
   list(value = jumps,
        says = sprintf(
-         "%s looks like a direction in degrees (%s): write circular(%s) in boundary.", x$name,
+         "%s looks like a direction in degrees (%s): write circular(%s) in boundary.", x$told,
          if (jumps) sprintf("it jumps %d times from one end of the circle to the other", jumps)
          else sprintf("its name, and values from %s to %s", short(min(v)), short(max(v))), x$name))
 }
@@ -276,7 +279,7 @@ counter_finding <- function(x) {
   if (!all(resets)) return(NULL)
   list(value = length(fall), says = sprintf(
     paste("%s only rises, and is reset %s: it is a counter. Give its change over each row."),
-    x$name, if (length(fall) > 1) paste(length(fall), "times") else "once"))
+    x$told, if (length(fall) > 1) paste(length(fall), "times") else "once"))
 }
 
 # What calibration cannot show, though the held-out rows have it.
@@ -286,7 +289,7 @@ constant_finding <- function(x) {
   if (!x$is_condition || length(seen) != 1 || all(values("validate") == seen)) return(NULL)
   list(value = seen, says = sprintf(paste("%s is %s in all rows that calibrate, but not in those",
                                           "held out: what it does cannot be learned. Calibrate on",
-                                          "rows in which it varies."), x$name, format(seen)))
+                                          "rows in which it varies."), x$told, format(seen)))
 }
 
 # Row numbers as ranges, the first few of them.

@@ -29,6 +29,6 @@ print.amiss_records <- function(x, ...) on_stdout(x, {
     count <- function(use) sum(m$use == use & !is.na(m$y))
     cli::cli_bullets(c("*" = paste("{name}: {.field {m$target}}, {count('calibrate')} steps to",
                                    "calibrate, {count('validate')} held out, noise",
-                                   "{signif(m$noise_sd, 3)} {m$unit}")))
+                                   "{signif(m$noise_sd, 3)} {pretty_unit(m$unit)}")))
   }
 })

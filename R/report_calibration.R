@@ -15,22 +15,17 @@ predictable_rows <- function(fit) {
 calibration_words <- function(fit, only) {
   trusted <- fit$trust$trusted
   model <- only$models[[1]]
-  rows <- parameter_rows(fit)
-  edge <- rows$label[rows$at_edge]
   left <- remaining_error(model, fit$measurements)
   list(title = fit$measurements$name, verdict = if (trusted) "named" else "likely",
        tag = if (trusted) "Calibration" else "Calibration that is not to be trusted",
-       headline = sprintf("The calibrated model's typical error is %s, %s times the stated noise.",
-                          with_unit(short(model$scores$calibrate[["rmse"]]), fit$measurements$unit),
-                          short(left$ratio)),
+       headline = error_sentence(fit),
        sure = c(sprintf("Sampler: %s.", sampler_said(fit)$verdict),
                 if (!is.null(fit$check)) sprintf("Emulator: %s.", fit$check$verdict)),
        gain = gain_sentences(only), remains = c(
          if (!is.null(left$pattern))
            sprintf("The error that remains has a pattern: %s.", left$pattern$what),
          if (!is.null(fit$reach)) sub("^(.)(.*)$", "\\U\\1\\E\\2.", reach_words(fit), perl = TRUE),
-         if (length(edge)) sprintf("At the edge of what was thought possible: %s.", listed(edge))
-         else "No parameter is at the edge of its range."),
+         mode_words(fit), edge_sentence(fit) %||% no_edge),
        inspect = calibration_inspections(fit, model), parameters = parameters_words(fit),
        method = method_table(only), seed = fit$seed)
 }

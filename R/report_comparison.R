@@ -117,11 +117,11 @@ bracketed <- function(lower, upper) paste0("[", interval_words(lower, upper, 3, 
 # Table 3a of the paper, in two: evidence, and attribution with a column for each condition.
 models_words <- function(comparison) {
   evidence <- comparison$tables$evidence
-  factor <- sprintf("%s [%s, %s] against %s", signed(evidence$log10_bf),
-                    signed(evidence$bf_lower95), signed(evidence$bf_upper95), evidence$against)
+  factor <- paste(with_limits(evidence$log10_bf, evidence$bf_lower95, evidence$bf_upper95, "+"),
+                  "against", evidence$against)
   data.frame(model = evidence$model,
-             "log10 L [95 %]" = sprintf("%.1f [%.1f, %.1f]", evidence$log10_evidence,
-                                        evidence$lower95, evidence$upper95),
+             "log10 L [95 %]" = with_limits(evidence$log10_evidence, evidence$lower95,
+                                               evidence$upper95),
              estimate = ifelse(evidence$trusted, "sound", "rough"),
              "log10 Bayes factor" = ifelse(is.na(evidence$log10_bf), "", factor),
              evidence = ifelse(is.na(evidence$word), "", evidence$word),

@@ -181,8 +181,8 @@ print.amiss_sobol <- function(x, ...) {
   rounded <- function(values) format(round(values, 3), nsmall = 3)
   index <- function(order)
     paste(rounded(x$table[[order]]), "+-", rounded(index_error(x$table, order)))
-  table <- data.frame(parameter = x$table$parameter, first = index("first"),
-                      total = index("total"))[shown, ]
+  table <- data.frame(parameter = labels_with_names(x$table$label, x$table$parameter),
+                      first = index("first"), total = index("total"))[shown, ]
   on_stdout(x, {
     cli::cli_text(paste("{.strong Sobol indices} of {nrow(table)} parameter{?s} over the priors,",
                         "with standard errors"))

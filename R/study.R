@@ -381,6 +381,7 @@ upgrade_pieces <- function(files, measurements, call = rlang::caller_env()) {
     if (!inherits(one, "amiss_ensemble")) check_simulator(one, call)
   catalogue <- source_value(files[[1]][["catalogue"]], "catalogue", call, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", call = call)
+  attr(catalogue, "labels") <- record_labels(measurements)  # for people who print it
   list(model = model, catalogue = catalogue)
 }
 

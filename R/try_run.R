@@ -27,7 +27,7 @@
 #'   * `seconds`: of a run.
 #'   * `rows`: number of rows.
 #'   * `failed`: why the first run failed, or `NULL`.
-#'   * `parameters`: a data frame of `name`, `low`, `high`, `change` in the target's unit,
+#'   * `parameters`: a data frame of `name`, `label`, `low`, `high`, `change` in the target's unit,
 #'     `over_noise` and `acts`.
 #'   * `start`: `rows` until a later start is forgotten (`NA` if it is not), `hours`, `warmup` in
 #'     hours, `settled`.
@@ -116,9 +116,10 @@ parameters_act <- function(simulator, parameters, centre, measurements, threads)
     sqrt(mean((runs[, 2 * k] - runs[, 2 * k - 1])^2))
   }, 0)
   over_noise <- change / measurements$noise_sd
-  data.frame(name = names(parameters), low = unname(low), high = unname(high), change = change,
-             over_noise = over_noise,
-             acts = ifelse(is.finite(change), over_noise >= rules$off_change, NA))
+  data.frame(name = names(parameters), label = distinct_labels(parameters),
+             low = unname(low), high = unname(high), change = change, over_noise = over_noise,
+             acts = ifelse(is.finite(change), over_noise >= rules$off_change, NA),
+             row.names = NULL)
 }
 
 # How long a start is remembered: list(rows, hours, warmup, settled), by a run over the longest
@@ -164,10 +165,11 @@ print.amiss_first_look <- function(x, ...) on_stdout(x, {
 
 say_acting <- function(x) {
   table <- x$parameters
-  inert <- table$name[table$acts %in% FALSE]
-  lost <- table$name[is.na(table$acts)]
+  table$parameter <- labels_with_names(table$label, table$name)
+  inert <- table$parameter[table$acts %in% FALSE]
+  lost <- table$parameter[is.na(table$acts)]
   shown <- utils::head(
-    table[order(-table$over_noise), c("name", "low", "high", "change", "over_noise")], 6)
+    table[order(-table$over_noise), c("parameter", "low", "high", "change", "over_noise")], 6)
   say_table(shown)
   if (length(inert))
     cli::cli_bullets(c("!" = paste("{.val {inert}} {?does/do} not act: the output stays within",

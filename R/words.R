@@ -50,8 +50,9 @@ percent <- function(x) {
   ifelse(is.na(x), "\u2013", text)
 }
 
-# Powers of metres and seconds, not m0.5 and not CO2.
+# As people write them: degrees, powers of metres and seconds, but not m0.5 and not CO2.
 pretty_unit <- function(unit) {
+  unit <- sub("^deg(C?)$", "\u00b0\\1", unit)
   squared <- gsub("([ms])2(?![0-9.])", "\\1\u00b2", unit, perl = TRUE)
   gsub("([ms])3(?![0-9.])", "\\1\u00b3", squared, perl = TRUE)
 }
@@ -71,6 +72,34 @@ short_ends <- function(lower, upper, digits = 2) {
 interval_words <- function(lower, upper, digits = 2, between = " to ") {
   mapply(function(l, u) paste(short_ends(l, u, digits), collapse = between), lower, upper,
          USE.NAMES = FALSE)
+}
+
+# Estimates and the ends of their intervals as text (a data frame), each row with the same decimals:
+# as many as show two digits of the interval's width.
+same_decimals <- function(estimate, lower, upper, sign = "") {
+  size <- pmax(abs(estimate), abs(lower), abs(upper))
+  width <- ifelse(upper - lower > 1e-12 * size, upper - lower, size / 10)
+  needed <- 1 - floor(log10(signif(width, 2)))
+  decimals <- bounded_digits(needed)
+  powers <- is.finite(size) & size > 0 & (size >= 1e7 | size < 1e-4)
+  digits <- bounded_digits(floor(log10(size)) + needed)
+  text <- function(x) {
+    x <- rep_len(x, length(size))
+    plain <- sprintf(paste0("%", sign, ".*f"), decimals, x)
+    text <- ifelse(powers, sprintf(paste0("%", sign, ".*e"), digits, x), plain)
+    # What rounds to zero has no sign.
+    text <- ifelse(grepl("^[-+][0.]+$", text), substring(text, 2), text)
+    ifelse(is.na(x), NA, text)
+  }
+  data.frame(estimate = text(estimate), lower = text(lower), upper = text(upper))
+}
+
+bounded_digits <- function(x) as.integer(ifelse(is.finite(x), pmin(pmax(x, 0), 15), 0))
+
+# An estimate with its interval in brackets.
+with_limits <- function(estimate, lower, upper, sign = "") {
+  told <- same_decimals(estimate, lower, upper, sign)
+  sprintf("%s [%s, %s]", told$estimate, told$lower, told$upper)
 }
 
 # A length of time, as people round it.

@@ -229,7 +229,7 @@ print.amiss_zone <- function(x, ...) {
   for (one in shown) cat("  ", format(one), "\n", sep = "")
   if (length(x$components) > length(shown))
     cat("  ... and", length(x$components) - length(shown), "more\n")
-  parameters <- names(zone_parameters(x))
+  parameters <- parameter_titles(zone_parameters(x))
   cat("Free parameters: ",
       if (length(parameters) > 0) paste(parameters, collapse = ", ") else "none", "\n", sep = "")
   cat("Needs columns: ", paste(zone_boundary(x), collapse = ", "), "\n", sep = "")

@@ -15,9 +15,9 @@ test_that("labels and units change nothing but what people read", {
   expect_length(plain$labels, 0)
   rest <- function(m) m[setdiff(names(m), c("labels", "units"))]
   expect_identical(rest(labelled), rest(plain))
-  expect_match(printed(labelled), "conditions outdoor air \\[degC\\] and sun on the wall \\[W/m")
+  expect_match(printed(labelled), "conditions outdoor air \\[\u00b0C\\] and sun on the wall \\[W/m")
   expect_setequal(levels(plot(labelled)$data$panel),
-                  c("Ti", "outdoor air [degC]", "sun on the wall [W/m\u00b2]"))
+                  c("Ti", "outdoor air [\u00b0C]", "sun on the wall [W/m\u00b2]"))
 })
 
 test_that("names and conditions stand beside each other, directions by either", {

@@ -289,9 +289,10 @@ test_that("a report says what result.json says", {
   trials <- table_with(tables, c("step", "mechanism"))
   for (trial in told$candidates) {
     row <- trials[trials[, 2] == trial$mechanism, ]
+    ends <- unlist(trial$interval)
+    factor <- amiss:::same_decimals(trial$log10_bf, ends[[1]], ends[[2]], "+")
     expect_identical(row[c(4, 5, 7, 8, 9, 10, 11)],
-                     c(signed(trial$log10_bf),
-                       paste(signed(unlist(trial$interval)), collapse = " to "),
+                     c(factor$estimate, paste(factor$lower, "to", factor$upper),
                        signed(trial$beside_unknown), signed(trial$standing),
                        if (startsWith(row[12], "refused")) "" else percent(trial$probability),
                        if (is.null(trial$error_ratio)) ""
