@@ -109,8 +109,10 @@ object_shapes <- list(
   amiss_attribution = c(table = "table", groups = "list", surrogates = "real[1]", control = "list",
                         labels = "?text"),
   amiss_joint_attribution = c(records = "each:amiss_attribution", table = "table", groups = "list"),
-  amiss_discrepancy = c(series = "table", responses = "real[n,b]", segment = "real[n]",
-                        target = "text[1]", unit = "text[1]"),
+  amiss_discrepancy = c(series = "table", responses = "?real[n,b]", record = "?table",
+                        rows = "?real[n]", segment = "real[n]", target = "text[1]",
+                        unit = "text[1]"),
+  amiss_study = c(study = "text[1]", title = "text[1]", measurements = "list", control = "?list"),
   amiss_sobol = c(table = "table", unexplained = "?number[1]", points = "?real[1]",
                   replicates = "?real[1]", by_time = "?any"))
 

@@ -121,7 +121,8 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   read: both can do whatever you can. If not, such a study is refused, or you are asked at a
 #'   terminal. Studies that ship with the package need no trust.
 #' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], with `study`,
-#'   `title` and `wall_s`, invisibly. `read_study()`: a list of
+#'   `title` and `wall_s`, invisibly. `read_study()`: a list of class
+#'   `amiss_study`, which prints itself as a person reads a study, of
 #'   * `study`, `title`, `seed`, `runs`, `control`;
 #'   * `measurements`: for several records a named list;
 #'   * `model` and `catalogue`, or `models`, `method` and `truth`.
@@ -137,7 +138,9 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #' @seealso `help("amiss-package")` for options that a batch job may set, and for the classes of
 #'   conditions.
 #' @examples
-#' read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))$measurements
+#' study <- read_study(system.file("studies", "twinhouse_O5.yml", package = "amiss"))
+#' study
+#' study$measurements
 #' @export
 run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE, trust = FALSE) {
   check_arguments()
@@ -197,10 +200,82 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
   if (is.null(study$records)) measured <- measured[[1]]
   pieces <- if (is.null(study$models)) upgrade_pieces(of_each, measured)
             else comparison_pieces(files, study$method)
-  c(list(study = study$study, title = study$title %||% study$study, seed = study$seed,
-         runs = study$runs, control = study$control),
-    pieces,
-    list(measurements = measured, code = content_hash(lapply(files[is_code(files)], study_code))))
+  code <- content_hash(lapply(files[is_code(files)], study_code))
+  structure(c(list(study = study$study, title = study$title %||% study$study, seed = study$seed,
+                   runs = study$runs, control = study$control),
+              pieces, list(measurements = measured, code = code)), class = "amiss_study")
+}
+
+#' @rdname run_study
+#' @param x A study that was read.
+#' @param ... Not used.
+#' @export
+print.amiss_study <- function(x, ...) on_stdout(x, {
+  compares <- !is.null(x[["models"]])
+  about <- if (x$title != x$study) paste0(": ", as_said(x$title))
+  cli::cli_text("{.strong Study} {.val {x$study}}", about)
+  say_bullets(if (compares) {
+    sprintf("asked: which of %d models is the most probable (method \"%s\")", length(x$models),
+            x$method)
+  } else "asked: which mechanisms of the catalogue the model lacks, and what it gains by them")
+  records <- in_list(x$measurements)
+  say_bullets(unlist(Map(record_lines, records, rlang::names2(records))))
+  models <- if (compares) x$models else in_list(x$model)
+  say_bullets(sub("model : ", "model: ", paste("model", model_lines(models)), fixed = TRUE))
+  if (!compares)
+    cli::cli_bullets(c("*" = "{length(x$catalogue)} mechanism{?s}: {names(x$catalogue)}"))
+  defaults <- if (compares) c(runs = 150, comparison_control) else upgrade_control
+  options <- option_words(changed_options(c(x[c("runs", "seed")], x$control), defaults))
+  say_bullets(c(if (length(options)) paste("options:", paste(options, collapse = ", ")),
+                if (!is.null(x$truth)) "the truth is known"))
+  piece <- if (compares) "compare_models" else "upgrade_model"
+  cli::cli_bullets(c(">" = "next: {.fun run_study} of its file, or {.fun {piece}} of its pieces"))
+})
+
+# A record in a few lines; `name` is "" if there is only one.
+record_lines <- function(m, name) {
+  count <- function(use) sum(m$use == use & !is.na(m$y))
+  held_out <- count("validate")
+  of <- if (nzchar(name)) paste0(name, ": ") else ""
+  at <- paste0(if (is.numeric(m$time)) "hour ", format(m$time[c(1, length(m$time))], trim = TRUE))
+  c(sprintf("%srecord of %d rows of %s h, from %s to %s: %d calibrate, %s", of, length(m$y),
+            format(m$step_h, digits = 3), at[1], at[2], count("calibrate"),
+            if (held_out) paste(held_out, "validate") else "none held out"),
+    sprintf("%starget %s, noise %s; boundary conditions %s", of, axis_label(m$target, m$unit),
+            trimws(paste(signif(m$noise_sd, 3), pretty_unit(m$unit))), listed(condition_titles(m))))
+}
+
+# A model, or several by their names, each in a line.
+model_lines <- function(models) {
+  what <- vapply(models, function(model) {
+    kind <- switch(class(model)[1], amiss_zone = "a zone", amiss_network = "a network",
+                   amiss_function_simulator = "an R function",
+                   amiss_program_simulator = "a program", amiss_fmu_simulator = "an FMU",
+                   amiss_ensemble = "given runs", class(model)[1])
+    free <- if (inherits(model, "amiss_ensemble")) model$parameters else free_parameters(model)
+    sprintf("%s with %d free parameter%s", kind, length(free), if (length(free) == 1) "" else "s")
+  }, "")
+  paste0(rlang::names2(models), ": ", what)
+}
+
+# Options given that are not what they would be anyway. Defaults of the stages may depend on the
+# record; what is given of them is shown as it is.
+changed_options <- function(options, defaults) {
+  same <- vapply(names(options), function(name) {
+    name %in% names(defaults) && isTRUE(all.equal(options[[name]], defaults[[name]]))
+  }, NA)
+  options[!same]
+}
+
+# Options as a person writes them, one in another by its path: `calibration$ais$groups = 4`.
+option_words <- function(options, path = "") {
+  unlist(lapply(names(options), function(name) {
+    value <- options[[name]]
+    if (rlang::is_bare_list(value) && rlang::is_named(value))
+      return(option_words(value, paste0(path, name, "$")))
+    if (is.integer(value)) value <- as.numeric(value)  # without an L
+    if (!is.null(value)) paste0(path, name, " = ", deparse1(value))
+  }))
 }
 
 # The fields of each record, checked; of a study without `records` its own.

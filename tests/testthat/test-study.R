@@ -389,3 +389,28 @@ test_that("a study says which values are missing and where a sensor ends", {
                class = "amiss_error_input")
   expect_error(written("missing: broken"), "missing", class = "amiss_error_input")
 })
+
+test_that("a study prints as a person reads it, and is a list still", {
+  shipped <- function(name) read_study(system.file("studies", name, package = "amiss"))
+  study <- shipped("twinhouse_O5.yml")
+  expect_s3_class(study, "amiss_study")
+  expect_type(study, "list")
+  expect_lte(length(capture.output(print(study))), 15)
+  told <- printed(study)
+  for (part in c("twinhouse_O5.*Twin House O5, living-room", "mechanisms of the catalogue",
+                 "624 rows of 1 h, from 2013-08-30 01:00:00 to 2013-10-01.* 336 calibrate, 240 val",
+                 "target Ti \\[K\\], noise 0.1 K", "sun from the south \\[W/m",
+                 "model: a zone with 9", "8 mechanisms: south solar aperture", "options: seed = 1",
+                 "next: .*run_study")) {
+    expect_match(told, part)
+  }
+  # Options that are what they would be anyway are not shown.
+  study$control <- list(max_steps = 1L, decisive = 2, calibration = list(ais = list(groups = 4L)))
+  expect_match(printed(study), "seed = 1, max_steps = 1, calibration$ais$groups = 4 ", fixed = TRUE)
+  study$measurements <- list(a = study$measurements, b = study$measurements)
+  study$model <- list(a = study$model, b = study$model)
+  expect_match(printed(study), "a: record.*b: record.*model a: a zone.*model b: a zone")
+  compared <- printed(shipped("paper_synthetic.yml"))
+  expect_match(compared, "3 models.*none held out.*model M1: a zone with 3.*compare_models")
+  expect_match(compared, "options: seed = 1 ", fixed = TRUE)
+})
