@@ -128,11 +128,16 @@ vcov.amiss_fit <- function(object, ...) {
 #'
 #' Gives the draws of a calibration as one chain of equal weights, as `posterior` and `bayesplot`
 #' take them. The draws of a calibration carry importance weights. Here they are resampled to equal
-#' weights by a systematic rule. Their order has no meaning.
+#' weights by a systematic rule.
 #'
-#' Do not judge the sampler by these draws: `trust` of the fit says whether it can be trusted. Draws
-#' of more weight than one of `draws` are repeated. The effective number of draws that `posterior`
-#' states is therefore too large, and R-hat means nothing.
+#' A draw of more weight than one of `draws` is repeated. Its repeats stand next to each other, as
+#' in a Markov chain that stays where it is; apart from that the order is random. The effective
+#' number of draws that `posterior` states (`ess_bulk`, `ess_tail`) therefore counts repeats only
+#' once: it is about the effective number of the weighted draws, however large `draws` is, and not
+#' above the number of distinct draws by more than the error of its estimate.
+#'
+#' Do not judge the sampler by these draws: `trust` of the fit says whether it can be trusted. R-hat
+#' compares two halves of one chain and says nothing about it.
 #'
 #' @param x A calibration ([calibrate()], [calibrate_paper()]) or an upgrade ([upgrade_model()]),
 #'   whose last model is taken.
@@ -188,11 +193,14 @@ as_draws_df.amiss_fit <- function(x, draws = nrow(x$values), ...) {
 #' @exportS3Method posterior::as_draws
 as_draws.amiss_fit <- as_draws_df.amiss_fit
 
-# Halves of a chain that stood in the order of a parameter would disagree.
+# Repeats of a draw stand together, so that the autocorrelation of the rows says how few they are.
+# All else is in random order: halves of a chain in the order of a parameter would disagree.
 equal_draws <- function(fit, n, call = rlang::caller_env()) {
   check_input(checkmate::check_count(n, positive = TRUE), "draws", call = call)
   check_run_number(n, ncol(fit$values), "draws", call)
-  fit$values[even_draws(fit, n)[with_seed(fit$seed, sample.int(n))], , drop = FALSE]
+  drawn <- even_draws(fit, n)
+  place <- with_seed(fit$seed, sample.int(nrow(fit$values)))
+  fit$values[drawn[order(place[drawn])], , drop = FALSE]
 }
 
 # Parameters of a calibration with their priors; `at_edge` as edge_of_prior() has it.

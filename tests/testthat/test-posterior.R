@@ -58,7 +58,7 @@ test_that("the parameters are drawn if every one has several modes", {
   expect_no_error(ggplot2::ggplot_build(ggplot2::autoplot(parted)))
 })
 
-test_that("equal draws have the moments of the weighted ones, in an order that says nothing", {
+test_that("equal draws have the moments of the weighted ones, each beside its repeats", {
   mean <- colSums(w * fit$values)
   sd <- sqrt(diag(vcov(fit)))
   draws <- as.matrix(fit, draws = 2000)
@@ -66,8 +66,12 @@ test_that("equal draws have the moments of the weighted ones, in an order that s
   # sqrt(2000) = 0.022 sd.
   expect_lt(max(abs(colMeans(draws) - mean) / sd), 0.022)
   expect_equal(apply(draws, 2, stats::sd), sd, tolerance = 0.05)
-  # Of 2000 values in random order: five standard errors.
-  expect_lt(abs(cor(draws[-1, "offset"], draws[-2000, "offset"])), 5 / sqrt(2000))
+  same <- match(draws[, "offset"], draws[, "offset"])
+  expect_length(rle(same)$lengths, length(unique(same)))
+  # The others are in random order: five standard errors.
+  apart <- draws[!duplicated(same), "offset"]
+  n <- length(apart)
+  expect_lt(abs(cor(apart[-1], apart[-n])), 5 / sqrt(n))
   expect_identical(as.matrix(fit, draws = 2000), draws)
   expect_identical(as.data.frame(fit), as.data.frame(as.matrix(fit)))
   expect_identical(dim(as.data.frame(fit, draws = 7)), c(7L, 2L))
@@ -86,6 +90,24 @@ test_that("posterior takes the draws", {
   expect_lt(max(abs(told$mean - colSums(w * fit$values)) / sqrt(diag(vcov(fit)))), 0.022)
   expect_lt(max(told$rhat), 1.05)
   expect_error(posterior::as_draws_df(fit, chains = 2), class = "rlib_error_dots_nonempty")
+})
+
+test_that("the effective number of draws that posterior states is that of the weighted ones", {
+  skip_if_not_installed("posterior")
+  # A few draws of much weight, as those of a hard calibration.
+  uneven <- fit
+  uneven$weights <- with_seed(1, stats::rexp(nrow(fit$values)))^3
+  share <- uneven$weights / sum(uneven$weights)
+  for (n in c(nrow(fit$values), 4000)) {
+    draws <- posterior::as_draws_df(uneven, draws = n)
+    told <- posterior::summarise_draws(draws, "ess_bulk", "ess_tail")
+    distinct <- length(unique(draws$offset))
+    # An autocorrelation time summed over m lags of n rows is off by a share of sqrt(4 m / n). Runs
+    # of repeats need m of a few times their mean length, n / distinct: a share of about
+    # sqrt(10 / distinct).
+    expect_lte(max(told$ess_bulk), distinct * (1 + 3 * sqrt(10 / distinct)))
+    expect_lt(max(told$ess_bulk), 2 / sum(share^2))
+  }
 })
 
 test_that("a mode of one draw is one", {
