@@ -62,6 +62,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #'   * `level`: largest p-value that is significant (0.05).
 #'   * `least_log10_bf`: evidence that a condition must earn besides its p-value (0.5).
 #'   * `ais`: options of [ais()].
+#' @param seed Seed of the random numbers. It is that of the calibration if none is given, so that
+#'   two calls say the same. `NULL` draws one.
 #' @inheritParams calibrate
 #' @return An object of class `amiss_attribution` with
 #'
@@ -97,18 +99,19 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' attribute_discrepancy(fit, list(surrogates = 19), seed = 1)
 #' @export
-attribute_discrepancy <- function(fit, control = NULL, seed = NULL, threads = 1) {
+attribute_discrepancy <- function(fit, control = NULL, seed = fit$seed, threads = 1) {
   check_arguments()
   UseMethod("attribute_discrepancy")
 }
 
 #' @export
-attribute_discrepancy.default <- function(fit, control = NULL, seed = NULL, threads = 1) {
+attribute_discrepancy.default <- function(fit, control = NULL, seed = fit$seed, threads = 1) {
   check_object(fit, c("amiss_calibration", "amiss_joint"), "fit")
 }
 
 #' @export
-attribute_discrepancy.amiss_calibration <- function(fit, control = NULL, seed = NULL, threads = 1) {
+attribute_discrepancy.amiss_calibration <- function(fit, control = NULL, seed = fit$seed,
+                                                    threads = 1) {
   check_object(fit, "amiss_calibration", "fit")
   check_not_part(fit)
   attribute_record(list(fit), 1, control, pick_seed(seed), check_threads(threads))

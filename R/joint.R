@@ -254,7 +254,7 @@ calibrated_record.amiss_joint <- function(fit) lapply(fit$records, calibrated_re
 # Which conditions drive the discrepancies: of each record, and the same conditions in all that have
 # them.
 #' @export
-attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = NULL, threads = 1) {
+attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = fit$seed, threads = 1) {
   check_whole(fit, "fit")
   seed <- pick_seed(seed)
   threads <- check_threads(threads)

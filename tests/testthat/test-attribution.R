@@ -134,3 +134,12 @@ test_that("evidence lost is the posterior over the prior odds of a condition tha
   expect_true(all(abs(again$log10_bf_dropped - table$log10_bf_dropped) < 4 * error))
   expect_gt(diff(range(table$log10_bf_dropped)), 0.1)  # the two conditions do differ
 })
+
+test_that("without a seed an attribution takes that of the calibration, and says the same again", {
+  fit <- plain_linear_fit()
+  few <- list(surrogates = 9)
+  found <- attribute_discrepancy(fit, few)
+  expect_identical(found, attribute_discrepancy(fit, few))
+  expect_identical(found, attribute_discrepancy(fit, few, seed = fit$seed))
+  expect_false(attribute_discrepancy(fit, few, seed = NULL)$seed == fit$seed)
+})
