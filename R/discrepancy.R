@@ -15,6 +15,17 @@
 #'     `discrepancy`, `lower95` and `upper95`.
 #'   * `responses`: one column for each condition. `NULL` for [calibrate_paper()], which has no sum
 #'     of responses.
+#'
+#'   `as.data.frame()` gives one row for each row of the record:
+#'   * `time`, and `use`: `"calibrate"`, `"validate"`, `"warmup"` or `"none"`.
+#'   * `measured`: the target, `NA` if it was not measured.
+#'   * `mean`, `lower95`, `upper95`: the discrepancy and its 95 % band.
+#'   * `residual`: the measurement less the simulation.
+#'   * `response_` and the name of a condition: what of `mean` responds to this condition; if there
+#'     are `responses`.
+#'
+#'   All but `time` and `use` are in the unit of the target. What the discrepancy has no value for,
+#'   as for rows held out, is `NA`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -27,6 +38,7 @@
 #' quick <- list(ais = list(pilot_chains = 48, groups = 4))  # a coarse sampler, for speed
 #' fit <- calibrate(train_emulator(runs, room), room, quick, seed = 1)
 #' head(discrepancy(fit)$series)
+#' tail(as.data.frame(discrepancy(fit)))
 #' plot(discrepancy(fit))
 #' @export
 discrepancy <- function(fit) {
@@ -55,8 +67,30 @@ new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
                        residual = m$y[fit$rows] - simulated, discrepancy = mean, lower95 = lower95,
                        upper95 = upper95)
   structure(list(format_version = format_version, series = series, responses = responses,
+                 record = data.frame(time = m$time, use = m$use, measured = m$y), rows = fit$rows,
                  segment = m$segment[fit$rows], target = m$target, unit = m$unit),
             class = "amiss_discrepancy")
+}
+
+#' @rdname discrepancy
+#' @param x A discrepancy.
+#' @param row.names,optional As [as.data.frame()] has them; `optional` is not used.
+#' @param ... Not used: an argument that is not known is an error.
+#' @export
+as.data.frame.amiss_discrepancy <- function(x, row.names = NULL, optional = FALSE, ...) {
+  check_whole(x, "x")
+  rlang::check_dots_empty()
+  known <- data.frame(mean = x$series$discrepancy, x$series[c("lower95", "upper95", "residual")])
+  if (!is.null(x$responses)) {
+    colnames(x$responses) <- paste0("response_", colnames(x$responses))
+    known <- data.frame(known, x$responses, check.names = FALSE)
+  }
+  # An earlier version kept the rows of the series alone.
+  record <- x$record %||% data.frame(time = x$series$time, use = "calibrate",
+                                     measured = x$series$observed)
+  at <- match(seq_len(nrow(record)), x$rows %||% seq_len(nrow(known)))  # NA for other rows
+  out <- data.frame(record, known[at, ], row.names = NULL, check.names = FALSE)
+  if (is.null(row.names)) out else as.data.frame(out, row.names = row.names)
 }
 
 # Mean and variance over posterior draws of the hyper-parameters, by the law of total variance.

@@ -42,6 +42,7 @@ parameter_table <- function(fit) {
 #'   ([upgrade_model()]).
 #' @param parm Names or numbers of parameters; all by default.
 #' @param level,conf.level Probability that the intervals hold; their ends cut off equal tails.
+#' @param what Which table of an upgrade: `"parameters"`, or the mechanisms tried, `"candidates"`.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return
 #'   * `coef()`: the posterior medians.
@@ -59,6 +60,10 @@ parameter_table <- function(fit) {
 #'   makes up for it. `physical.low` and `physical.high` count this too: between them lies the value
 #'   of the quantity itself (Brynjarsdottir and O'Hagan 2014). They are `NA` after [calibrate()] and
 #'   [calibrate_paper()], which know no slopes of the simulator.
+#'
+#'   `tidy(upgrade, "candidates")` has one row for each mechanism tried. Its columns are those of
+#'   `candidates` ([upgrade_model()], *Candidates*) without the estimates, with `conf.low` and
+#'   `conf.high` for the 95 % interval of `log10_bf`. `conf.level` does not change them.
 #' @source Brynjarsdottir and O'Hagan (2014), Learning about physical parameters: the importance of
 #'   model discrepancy, Inverse Problems 30, 114007.
 #' @seealso [as_draws][as.data.frame.amiss_fit] for the draws themselves.

@@ -133,7 +133,9 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' })
 #' quick <- list(calibration = list(ais = list(pilot_chains = 48, groups = 4)),
 #'               attribution = list(surrogates = 19))
-#' upgrade_model(linear, house, catalogue(sun), control = quick, seed = 1, quiet = TRUE)
+#' upgrade <- upgrade_model(linear, house, catalogue(sun), control = quick, seed = 1, quiet = TRUE)
+#' upgrade
+#' tidy(upgrade, "candidates")
 #'
 #' # The same of runs that were made elsewhere, over all rows.
 #' design <- cbind(gain = lhs::randomLHS(40, 1)[, 1], sun = 0.1 * lhs::randomLHS(40, 1)[, 1])

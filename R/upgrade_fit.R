@@ -20,8 +20,30 @@ vcov.amiss_upgrade <- function(object, ...) stats::vcov(last_fit(object), ...)
 
 #' @rdname posterior
 #' @export
-tidy.amiss_upgrade <- function(x, conf.level = 0.95, ...)
-  generics::tidy(last_fit(x), conf.level, ...)
+tidy.amiss_upgrade <- function(x, what = "parameters", conf.level = 0.95, ...) {
+  rlang::check_dots_empty()
+  if (is.numeric(what)) {
+    abort_input(c("{.arg what} is the name of a table, not a number.",
+                  i = "The probability of intervals is {.code conf.level = {what}}."))
+  }
+  check_input(checkmate::check_choice(what, c("parameters", "candidates")), "what")
+  if (what == "parameters") return(generics::tidy(last_fit(x), conf.level))
+  check_whole(x, "x")
+  if (!identical(conf.level, 0.95)) {
+    abort_input(c("{.arg conf.level} of {.val candidates} is 0.95.",
+                  i = "Their intervals are part of the upgrade."))
+  }
+  tidy_candidates(x)
+}
+
+# The estimates are left out: a table in a cell is no plain column.
+tidy_candidates <- function(upgrade) {
+  none <- empty_row("", upgrade$models[[1]], "none")[0, ]
+  table <- upgrade$candidates %||% cbind(none, probability = numeric())
+  table <- table[names(table) != "parameters"]
+  names(table)[match(c("lower95", "upper95"), names(table))] <- c("conf.low", "conf.high")
+  table
+}
 
 #' @rdname fit
 #' @export

@@ -80,6 +80,50 @@ test_that("an upgrade answers by its last model", {
   expect_identical(posterior::as_draws_df(upgrade), posterior::as_draws_df(last))
 })
 
+test_that("the mechanisms that an upgrade tried are a plain table", {
+  table <- tidy(upgrade, "candidates")
+  expect_identical(table, tidy(upgrade, what = "candidates", conf.level = 0.95))
+  expect_identical(table$mechanism, upgrade$candidates$mechanism)
+  same <- c("from", "log10_bf", "standing", "beside_unknown", "probability", "trusted")
+  expect_identical(table[same], upgrade$candidates[same])
+  expect_identical(table$conf.low, upgrade$candidates$lower95)
+  expect_identical(table$conf.high, upgrade$candidates$upper95)
+  expect_true(all(vapply(table, is.atomic, NA)))
+  expect_identical(tidy(upgrade, "parameters"), tidy(last))
+  untried <- upgrade
+  untried["candidates"] <- list(NULL)
+  expect_identical(tidy(untried, "candidates"), table[0, ])
+})
+
+test_that("a table that an upgrade does not have, and what was its second argument, are errors", {
+  expect_error(tidy(upgrade, "nonsense"), "what", class = "amiss_error_input")
+  expect_error(tidy(upgrade, 0.9), "conf.level = 0.9", class = "amiss_error_input")
+  expect_error(tidy(upgrade, "candidates", 0.9), "conf.level", class = "amiss_error_input")
+})
+
+test_that("a discrepancy is a table with a row for each row of the record", {
+  found <- discrepancy(last)
+  m <- last$measurements
+  table <- as.data.frame(found)
+  expect_identical(table[c("time", "use", "measured")],
+                   data.frame(time = m$time, use = m$use, measured = m$y))
+  own <- table[last$rows, ]
+  expect_true(all(own$use == "calibrate"))
+  expect_identical(own$mean, found$series$discrepancy)
+  expect_identical(own$upper95, found$series$upper95)
+  expect_identical(own$residual, unname(residuals(last)))
+  expect_identical(own$response_Gv, unname(found$responses[, "Gv"]))
+  expect_equal(own$response_Te + own$response_Gv, own$mean)
+  expect_true(all(is.na(table$mean[-last$rows])) && !anyNA(own$mean))
+  expect_identical(rownames(as.data.frame(found, paste0("r", seq_along(m$y))))[2], "r2")
+  expect_error(as.data.frame(found, nonsense = 1), class = "rlib_error_dots_nonempty")
+  expect_named(as.data.frame(discrepancy(paper)),
+               c("time", "use", "measured", "mean", "lower95", "upper95", "residual"))
+  # As written before the whole record was kept.
+  found[c("record", "rows")] <- NULL
+  expect_equal(as.data.frame(found), own, ignore_attr = "row.names")
+})
+
 test_that("what is asked and not known is an error", {
   calls <- list(coef, confint, vcov, fitted, residuals, nobs, generics::tidy, generics::glance,
                 generics::augment, summary, predict, simulate, as.data.frame, as.matrix, update)
@@ -95,7 +139,7 @@ test_that("what is asked and not known is an error", {
 test_that("everything prints on standard output, in fifteen lines, and names the next step", {
   shown <- list(upgrade, upgrade$catalogue, upgrade$catalogue$sun, upgrade$models[[1]]$attribution,
                 fit, paper, summary(fit), summary(paper), fit$measurements, discrepancy(fit),
-                fit$emulator, fit$emulator$simulator,
+                discrepancy(paper), fit$emulator, fit$emulator$simulator,
                 simulate_design(linear_simulator(), fit$measurements, runs = 12, seed = 1),
                 ais(function(values) -0.5 * rowSums(values^2), list(a = normal(0, 1)),
                     list(pilot_chains = 24), seed = 1))
