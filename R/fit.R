@@ -10,6 +10,10 @@
 #'   `bf()` of the package `bridgesampling` give it as well). AIC and BIC of the simulator fitted by
 #'   least squares are among the criteria of [compare_models()].
 #'
+#'   `loo()` of the package `loo` is an error as well. It leaves out one row at a time, but the
+#'   neighbours of a row in a time series give it away. Judge predictions by rows that are held out
+#'   (`validate` of [measurements()]).
+#'
 #' @param object,x A calibration ([calibrate()], [calibrate_paper()]) or, except for `update()`, an
 #'   upgrade ([upgrade_model()]).
 #' @param data Not used; the record is part of the fit.
@@ -84,6 +88,19 @@ logLik.amiss_fit <- function(object, ...) {
     x = "Its discrepancy is integrated out.",
     i = "Compare models by the evidence: {.fun bayes_factor}, or {.code $log_evidence} of the fit.",
     i = "AIC and BIC of the least-squares fit are among the criteria of {.fun compare_models}."))
+}
+
+#' @rdname fit
+#' @exportS3Method loo::loo
+loo.amiss_fit <- function(x, ...) {
+  check_whole(x, "x")
+  abort_input(c(
+    "{.fun loo} is not for calibrations on a time series.",
+    x = paste("Rows of a record are not exchangeable: the neighbours of a row that is left out",
+              "give it away, and its score says little."),
+    i = paste("Hold rows out by {.arg validate} of {.fun measurements}, and compare them with",
+              "{.code predict(use = \"validate\")}."),
+    i = "Compare models by the evidence: {.fun bayes_factor}, or {.code $log_evidence}."))
 }
 
 #' @rdname fit

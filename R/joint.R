@@ -192,6 +192,9 @@ nobs.amiss_joint <- function(object, ...) {
 #' @export
 logLik.amiss_joint <- function(object, ...) logLik.amiss_fit(object, ...)
 
+#' @exportS3Method loo::loo
+loo.amiss_joint <- function(x, ...) loo.amiss_fit(x)
+
 # Of the emulators the largest numbers; `sigma` is in units of the noise.
 #' @export
 glance.amiss_joint <- function(x, ...) {

@@ -62,6 +62,10 @@ nobs.amiss_upgrade <- function(object, ...) stats::nobs(last_fit(object), ...)
 logLik.amiss_upgrade <- function(object, ...) stats::logLik(last_fit(object))
 
 #' @rdname fit
+#' @exportS3Method loo::loo
+loo.amiss_upgrade <- function(x, ...) loo.amiss_fit(last_fit(x))
+
+#' @rdname fit
 #' @export
 augment.amiss_upgrade <- function(x, data = NULL, newdata = NULL, ...) {
   generics::augment(last_fit(x), data = data, newdata = newdata, ...)
