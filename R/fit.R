@@ -37,6 +37,16 @@
 #'   The columns of `glance()` are `log10_evidence` and its interval, `trusted`, `emulator_error`
 #'   (of the check by runs, in units of the noise), `sigma` (of what the simulation leaves), `nobs`,
 #'   `vectors` and `runs`.
+#'
+#'   For an upgrade there are also
+#'   * `adopted`: the number of mechanisms adopted.
+#'   * `named_cause`, `log10_bf`: the cause and its log10 Bayes factor, as `print()` and
+#'     `candidates` of the upgrade have it. `NA` if no cause is named or likely.
+#'   * `gain_beside_unknown`: the log10 Bayes factor of the last model against the first, if both
+#'     have unknown responses to all their conditions. These responses imitate mechanisms, and the
+#'     factor is often much smaller than `log10_bf`.
+#'   * `rmse_before`, `rmse_after`, `rmse_validation_before`, `rmse_validation_after`: errors of the
+#'     first and the last model, on calibration rows and on rows held out.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

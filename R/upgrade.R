@@ -76,8 +76,9 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'     The rows of `"no change"` have the evidence for each condition by itself.
 #'   * `named_cause`: the cause that was named or, if there is none, the first that is likely:
 #'     `mechanism`, `boundary`, `log10_bf` and `sentence`. `NULL` if there is none of either.
-#'   * `gain`: `log10_bf` of the last model against the first with its `interval`, and the scores of
-#'     both.
+#'   * `gain`: the scores of the first and the last model, and `log10_bf` of the last against the
+#'     first with its `interval`. Both models then have unknown responses to all their conditions,
+#'     as `beside_unknown` of a mechanism.
 #'   * `stopped_because`: why the loop stopped; `stopped_id` is the same in a word.
 #'   * `runs_total`: the runs of the simulator that the loop took.
 #'   * `runs_found`: further runs that a program's cache had.

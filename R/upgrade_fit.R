@@ -77,7 +77,8 @@ glance.amiss_upgrade <- function(x, ...) {
   check_whole(x, "x")
   g <- x$gain
   data.frame(generics::glance(last_fit(x), ...), adopted = length(x$models) - 1L,
-             named_cause = x$named_cause$mechanism %||% NA_character_, log10_bf = g$log10_bf,
+             named_cause = x$named_cause$mechanism %||% NA_character_,
+             log10_bf = x$named_cause$log10_bf %||% NA_real_, gain_beside_unknown = g$log10_bf,
              rmse_before = g$rmse_calibration[1], rmse_after = g$rmse_calibration[2],
              rmse_validation_before = g$rmse_validation[1],
              rmse_validation_after = g$rmse_validation[2])

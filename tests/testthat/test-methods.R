@@ -37,6 +37,34 @@ test_that("there is no likelihood, and AIC() says so", {
   }
 })
 
+test_that("loo() is refused with the reason, also where package loo comes later", {
+  for (own in list(fit, paper, upgrade)) {
+    class <- intersect(class(own), c("amiss_fit", "amiss_upgrade"))
+    refuse <- getFromNamespace(paste0("loo.", class), "amiss")
+    expect_error(refuse(own), "not exchangeable.*validate.*bayes_factor",
+                 class = "amiss_error_input")
+  }
+  # One row for each method: generic, class, function, package of the generic.
+  methods <- readRDS(system.file("Meta", "nsInfo.rds", package = "amiss"))$S3methods
+  of_loo <- methods[methods[, 1] == "loo" & !is.na(methods[, 4]), ]
+  expect_setequal(of_loo[, 2], c("amiss_fit", "amiss_joint", "amiss_upgrade"))
+  skip_if_not_installed("loo")
+  expect_error(loo::loo(fit), "not exchangeable", class = "amiss_error_input")
+})
+
+test_that("log10_bf is the same number in print, in the table of candidates and at a glance", {
+  seen <- glance(upgrade)
+  row <- tidy(upgrade, "candidates")
+  row <- row[row$mechanism == seen$named_cause, ]
+  expect_identical(seen$log10_bf, row$log10_bf)
+  expect_match(printed(upgrade), paste("log10 Bayes factor", round(row$log10_bf, 1)), fixed = TRUE)
+  expect_identical(seen$gain_beside_unknown, upgrade$gain$log10_bf)
+  expect_equal(seen$gain_beside_unknown, row$beside_unknown)
+  unnamed <- upgrade
+  unnamed["named_cause"] <- list(NULL)
+  expect_identical(glance(unnamed)$log10_bf, NA_real_)
+})
+
 test_that("bridgesampling is told the evidence", {
   skip_if_not_installed("bridgesampling")
   expect_identical(bridgesampling::logml(fit), fit$log_evidence)
