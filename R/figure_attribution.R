@@ -46,7 +46,7 @@ figure_attribution <- function(attributions) {
                          "error is explained without it. Per cent, of what is significant: the ",
                          "share of the misfit (squared errors, weighed) that it explains",
                          if (length(attributions) > 1) ", before -> after", "."),
-                  x = "evidence lost without it (log10 Bayes factor, axis compressed)") +
+                  x = "log10 Bayes factor lost without it, axis compressed") +
     figure_theme() + if (length(attributions) < 2) ggplot2::guides(colour = "none")
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), shares$label)
   with_height(figure, 2.4 + 0.56 * nlevels(table$boundary))

@@ -144,7 +144,7 @@ figure_dropped <- function(comparison) {
     figure_titles(attribution_words(comparison),
                   paste("Each boundary condition, present and past: how much worse the",
                         "discrepancy is explained without it."),
-                  x = "evidence lost without it (log10 Bayes factor, axis compressed)")
+                  x = "log10 Bayes factor lost without it, axis compressed")
   with_height(figure, panel_height(comparison))
 }
 

@@ -23,7 +23,8 @@ stage_table <- function(stages, table_of) {
 leading_condition <- function(upgrade) {
   m <- upgrade$measurements
   name <- upgrade$models[[1]]$attribution$table$boundary[1]
-  list(name = name, title = condition_titles(m, name), time = m$time, value = condition_values(m, name))
+  list(name = name, title = condition_titles(m, name), time = m$time,
+       value = condition_values(m, name))
 }
 
 use_names <- c(calibrate = "calibration", validate = "held out")
