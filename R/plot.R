@@ -61,8 +61,8 @@ calibration_figures <- c("parameters", "residuals", "modes")
 #'   conditions that they depend on most, their normal quantiles, their autocorrelation and their
 #'   cumulated periodogram. The bands hold 95 %: each quantile is that of a beta distribution, the
 #'   autocorrelation within 1.96 / sqrt(n), and the whole periodogram (Kolmogorov and Smirnov). The
-#'   title tells of the first check that fails at a level of 1 %. Of a record with more than 20,000
-#'   rows the first 20,000 are shown.
+#'   title tells of the first check that fails at a level of 1 %. A long record shows its first
+#'   20,000 rows.
 #' @source Johnson (2007), Bayesian model assessment using pivotal quantities, Bayesian Analysis 2,
 #'   719-734. Durbin and Koopman (2012), Time series analysis by state space methods, 2nd edition,
 #'   for the prediction errors.
