@@ -245,7 +245,7 @@ test_that("a candidate is shown by how it was judged, and one without a number n
   upgrade$candidates[at("drift"), c("judged_by", "trusted")] <- list("trial", FALSE)
   shown <- plot(upgrade, "candidates")
   drift <- shown$data$mechanism == "drift"
-  expect_equal(as.character(shown$data$state[drift]), "tried, estimate rough")
+  expect_equal(as.character(shown$data$state[drift]), "estimate rough")
   expect_equal(nrow(ggplot2::layer_data(shown, 3)), 2)  # a line each
   upgrade$candidates[at("drift"), c("log10_bf", "lower95", "upper95", "error_ratio")] <- NA_real_
   for (why in c("silent", "none")) {
