@@ -289,7 +289,8 @@ draw_network_weather <- function(days, step, fine) {
   climate <- climates[[sample.int(length(climates), 1)]]
   record <- list(days = days, step_h = step / fine, seed = sample.int(1e9, 1))
   weather <- do.call(amiss::synthetic_weather, c(record, climate))
-  heating <- amiss::rolbs(round(24 * days / step), step, power = 1, seed = sample.int(1e9, 1))
+  seed <- withr::with_preserve_seed(sample.int(1e9, 1))
+  heating <- amiss::rolbs(round(24 * days / step), step, power = 1, seed = seed)
   cbind(Te = weather$Te, Gv = weather$Gv, P = rep(heating, each = fine))
 }
 

@@ -36,7 +36,8 @@ draw_weather <- function(days) {
   data <- do.call(amiss::synthetic_weather,
                   c(list(days = days, step_h = step_h, seed = sample.int(1e9, 1)), climate))
   n <- nrow(data)
-  data$RHP <- amiss::rolbs(n, step_h, power = 100, seed = sample.int(1e9, 1))
+  seed <- withr::with_preserve_seed(sample.int(1e9, 1))
+  data$RHP <- amiss::rolbs(n, step_h, power = 100, seed = seed)
   slow <- as.numeric(stats::filter(stats::rnorm(n), exp(-step_h / 12), "recursive"))
   data$Tn <- 20 + 2.5 * slow / stats::sd(slow) + 1.5 * (data$hour %% 24 > 7 & data$hour %% 24 < 22)
   data
