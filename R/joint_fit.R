@@ -71,3 +71,19 @@ left_by_simulation <- function(fit) {
 left_at_best <- function(fit) {
   if (is.null(fit$best)) left_by_mean(fit) else fit$measurements$y[fit$rows] - fit$best$output
 }
+
+# What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error
+# and discrepancy as large as they were seen, the fitted parameters taken off the degrees of
+# freedom.
+error_sd <- function(fit) {
+  r <- left_at_best(fit)
+  sqrt(sum(r^2) / max(1, length(r) - length(fit$emulator$parameters)))
+}
+
+# What the calibrated simulation leaves of the record.
+error_sentence <- function(fit) {
+  error <- error_sd(fit)
+  sprintf("The calibrated model's typical error is %s, %s times the stated noise.",
+          with_unit(short(error), fit$measurements$unit),
+          short(error / fit$measurements$noise_sd))
+}

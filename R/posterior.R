@@ -263,14 +263,6 @@ edge_sentence <- function(fit) {
 
 no_edge <- "No parameter is at the edge of its range."
 
-# What the calibrated simulation leaves of the record.
-error_sentence <- function(fit) {
-  error <- error_sd(fit)
-  sprintf("The calibrated model's typical error is %s, %s times the stated noise.",
-          with_unit(short(error), fit$measurements$unit),
-          short(error / fit$measurements$noise_sd))
-}
-
 # Modes of a parameter: parts of its draws that a gap keeps apart, list(median, lower95, upper95,
 # share) each. A gap counts if it is a quarter of the 95 % interval or more, with a twentieth of the
 # posterior on either side.

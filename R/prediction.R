@@ -249,14 +249,6 @@ runs_elsewhere <- function(fit, values, use, threads, record) {
   suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
 }
 
-# What the calibrated simulation leaves, as the standard deviation of new errors: noise, model error
-# and discrepancy as large as they were seen, the fitted parameters taken off the degrees of
-# freedom.
-error_sd <- function(fit) {
-  r <- left_at_best(fit)
-  sqrt(sum(r^2) / max(1, length(r) - length(fit$emulator$parameters)))
-}
-
 # Runs at draws of the posterior about the best run in place of their mean: where the discrepancy
 # takes over what parameters at the ends of their priors cannot do, draws lie off the best.
 about_best <- function(runs, best) runs + (as.numeric(best) - rowMeans(runs))

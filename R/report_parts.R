@@ -124,8 +124,8 @@ html_figure <- function(figure, alt) {
     knitr::image_uri(file)
   }
   cat("\n```{=html}\n<picture><source media=\"screen and (max-width: 620px)\" srcset=\"",
-      drawn(narrow, narrow_canvas, 170), "\">",
-      "<img src=\"", drawn(figure, canvas_width, 130), "\" alt=\"", html_attribute(alt),
+      drawn(narrow, narrow_canvas, 160), "\">",
+      "<img src=\"", drawn(figure, canvas_width, 120), "\" alt=\"", html_attribute(alt),
       "\"></picture>\n```\n", sep = "")
 }
 

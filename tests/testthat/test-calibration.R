@@ -157,7 +157,7 @@ test_that("options are checked", {
   expect_error(calibrate(emulator, m, list(chains = 3)), "unknown option",
                class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(ais = list(chains = 1)), seed = 1),
-               "control\\$ais\\$chains` = 1 cannot", class = "amiss_error_input")
+               "control\\$ais\\$chains` is 1; it must be 4 or more", class = "amiss_error_input")
   expect_error(calibrate(emulator, m, list(confidence = 3)), "confidence",
                class = "amiss_error_input")
   expect_error(calibrate(emulator, m, threads = 0), "threads", class = "amiss_error_input")

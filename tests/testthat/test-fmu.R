@@ -64,7 +64,7 @@ test_that("an input may have a column of another name, and one column may drive 
 test_that("print says what is free, fixed, driven and not driven", {
   said <- printed(house_fmu(house_file(3), fixed = list(leak = 3)))
   for (pattern in c("FMI 3.0", "1 free parameter", "R_out", "leak = 3 W/K", "Te from To, P",
-                    "keep their start value: Gv \\(0.0 W/m", "output: T_air degC, mean"))
+                    "keep their start value: Gv \\(0.0 W/m", "output: T_air °C, mean"))
     expect_match(said, pattern)
 })
 

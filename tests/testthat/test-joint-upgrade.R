@@ -207,7 +207,7 @@ test_that("what does not fit together is refused before anything runs", {
   refused("named lists of both", simulators = rooms$a)
   refused("named list", simulators = unname(rooms))
   refused("no simulator", simulators = list(a = rooms$a, b = 1))
-  refused("amiss_measurements", of = list(a = measured$a, b = 1))
+  refused("made by measurements", of = list(a = measured$a, b = 1))
   other <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
                               free("gain", uniform(0, 2)), boundary = "Te")
   refused("different priors", simulators = list(a = rooms$a, b = other))

@@ -127,7 +127,7 @@ test_that("bad arguments are refused", {
   expect_error(calibrate_refined(runs, m, control = list(check = 3)), "unknown option.*check",
                class = "amiss_error_input")
   expect_error(calibrate_refined(runs, m, control = list(calibration = list(check = 1.5))),
-               "control\\$calibration\\$check` = 1.5",
+               "control\\$calibration\\$check` must be one whole number; got the number 1.5",
                class = "amiss_error_input")
 })
 
