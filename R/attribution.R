@@ -205,7 +205,7 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
 # What is reported as significant: conditions, and each group of conditions that cannot be
 # distinguished as one. The paper's table has no groups.
 significant_conditions <- function(table) {
-  group <- table$group %||% rep(NA, nrow(table))
+  group <- table$group %||% rep(NA, length(table$boundary))
   told <- ifelse(is.na(group), table$boundary, group)
   unique(told[table$significant])
 }

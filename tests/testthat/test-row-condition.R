@@ -46,5 +46,5 @@ test_that("a condition that cannot be understood is refused, and why", {
   refuse("hour < 3; y", "not one condition")
   refuse("phase + 1 > 2", "non-numeric")
   refuse(strrep("-", 3000), "longer than 2000")
-  refuse("hour", "logical")
+  refuse("hour", "TRUE or FALSE")
 })
