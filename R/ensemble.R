@@ -224,7 +224,7 @@ place_runs <- function(outputs, validation, measurements, time, call = rlang::ca
 
 row_times <- function(time, rows, measurements, call) {
   read <- read_time(time, "time", measurements$time_format, measurements$time_zone, call)
-  hours <- time_hours(interval_ends(read, time))
+  hours <- time_hours(interval_ends(read, time, measurements$time_format))
   if (length(hours) != rows) abort_input(paste("{.arg time} has {length(hours)} value{?s}, the",
                                                "runs have {rows} row{?s}."), call = call)
   hours

@@ -23,7 +23,7 @@ check_words <- function(fits) {
   checks <- Filter(Negate(is.null), lapply(fits, `[[`, "check"))
   ratio <- vapply(checks, `[[`, 0, "ratio")
   if (!length(ratio)) return("The emulator was not checked by runs where the posterior lies")
-  sprintf("Where the posterior lies, runs find the emulator's error to be %s of the noise: %s",
+  sprintf("Where the posterior lies, its error by runs, divided by the noise, is %s: %s",
           listed(by_stage(short(ratio), names(ratio))),
           if (all(ratio <= rules$error_ratio)) "good enough" else "too much, more runs are needed")
 }

@@ -189,7 +189,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                   i = "Validation rows must not be seen by the calibration."))
   }
   used_for <- ifelse(calibrate, "calibrate", ifelse(validate, "validate", "none"))
-  stamps <- interval_ends(stamps, data[[time]], stamp)
+  stamps <- interval_ends(stamps, data[[time]], reading$format, stamp)
   grid <- regular_grid(time_hours(stamps), fill_gaps, time)
   there <- !is.na(grid$row)
   use_given <- used_for

@@ -144,7 +144,7 @@ new_record <- function(m, data, call = rlang::caller_env()) {
   compared <- c(terms$name, intersect(m$target, names(data)))
   require_numeric(data, compared, call)
   time <- interval_ends(read_time(data$time, "time", m$time_format, m$time_zone, call), data$time,
-                        m$stamp)
+                        m$time_format, m$stamp)
   hours <- time_hours(time)
   step <- m$raw$step_h
   if (length(hours) < 2 || any(abs(diff(hours) - step) > 0.01 * step)) {

@@ -38,16 +38,18 @@ span_hours <- function(values) {
                                   weeks = 168)[[unit]]
 }
 
-# Whether times that were read from `values` are dates without a time of day.
-are_days <- function(values, time) {
+# Whether times that were read from `values` are dates without a time of day. Seconds since 1970 are
+# times of day.
+are_days <- function(values, time, format) {
   if (inherits(values, "Date")) return(TRUE)
-  is.character(values) && inherits(time, "POSIXct") && !any(grepl(":", values, fixed = TRUE)) &&
-    all(format(time, "%H%M%S") == "000000", na.rm = TRUE)
+  if (inherits(values, "POSIXt") || !inherits(time, "POSIXct") || identical(format, "unix"))
+    return(FALSE)
+  !any(grepl(":", values, fixed = TRUE)) && all(format(time, "%H%M%S") == "000000", na.rm = TRUE)
 }
 
-# The ends of the intervals that stamps mark, `time` as read from `values`.
-interval_ends <- function(time, values, stamp = NULL) {
-  stamp <- stamp %||% if (are_days(values, time)) "start" else "end"
+# The ends of the intervals that stamps mark, `time` as read from `values` by `format`.
+interval_ends <- function(time, values, format, stamp = NULL) {
+  stamp <- stamp %||% if (are_days(values, time, format)) "start" else "end"
   if (stamp == "end") return(time)
   step_h <- stats::median(diff(time_hours(time)))
   time + step_h * if (is.numeric(time)) 1 else 3600

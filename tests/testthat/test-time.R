@@ -57,10 +57,13 @@ test_that("a stamp marks the end of its interval, the start if that is said, and
   expect_identical(first(format(hourly, "%Y-%m-%d %H:%M"), stamp = "start")[1],
                    "2024-03-01 01:00:00.0")
   days <- as.Date("2024-03-01") + 0:47
-  for (dates in list(days, format(days), format(days, "%d.%m.%Y")))
-    expect_identical(first(dates)[1], "2024-03-02 00:00:00.0")
+  for (dates in list(days, format(days), factor(format(days)), format(days, "%d.%m.%Y"),
+                     as.numeric(format(days, "%Y%m%d")), format(days, "%Y%m%d")))
+    expect_identical(suppressMessages(first(dates))[1], "2024-03-02 00:00:00.0")
   expect_identical(first(days, stamp = "end")[1], "2024-03-01 00:00:00.0")
-  expect_identical(first(as.POSIXct(format(days), tz = "UTC"))[1], "2024-03-01 00:00:00.0")
+  for (instants in list(as.POSIXct(format(days), tz = "UTC"), format(days, "%Y-%m-%d 00:00"),
+                        86400 * as.numeric(days)))
+    expect_identical(suppressMessages(first(instants))[1], "2024-03-01 00:00:00.0")
   # Hours without a date.
   data$hour <- 0:47
   m <- measurements(data, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,
