@@ -148,6 +148,7 @@ attribute_record <- function(fits, which, control, seed, threads) {
   structure(list(format_version = format_version, table = table, groups = groups,
                  surrogates = nrow(result$null_statistics),
                  statistic = result$statistic, null_statistics = result$null_statistics,
+                 p_value_own = stats::setNames(result$adjusted[alone], conditions),
                  control = control, labels = fit$measurements$labels, seed = seed),
             class = "amiss_attribution")
 }

@@ -48,7 +48,8 @@ calibration_control <- list(
 #' @param emulator A trained emulator ([train_emulator()]).
 #' @param measurements The [measurements()].
 #' @param control List of options, with their defaults:
-#'   * `confidence`: how firmly `noise_sd` is believed, c in `[2/N, 1]` (2/N).
+#'   * `confidence`: how firmly `noise_sd` is believed, c in `[2/N, 1]`. By default (2/N) the noise
+#'     may well be three times as large, or as small.
 #'   * `inclusion`: prior probability that a condition drives the discrepancy at all (0.2).
 #'   * `amplitude`: scale of the half-Cauchy prior of the discrepancy's standard deviation if a
 #'     condition drives it, in the target's unit (the noise).

@@ -279,13 +279,13 @@ attributed_together <- function(fits, each, control, seed, threads) {
   draws <- engine_draws(fits)
   filled <- fill_attribution_control(control, fits[[1]]$control$ais,
                                      length(fits[[1]]$measurements$conditions))
-  # `own`: of each record that has them, its row or group of the same conditions.
+  # `own`: p-values of each record that has them.
   dropped_from_all <- function(conditions, own) {
     at <- lapply(unname(fits),
                  function(fit) which(fit$measurements$conditions %in% conditions) - 1L)
     dropped <- staged("attributing the discrepancies together", call_engine(
       drop_conditions_(records, draws, at, filled$ais, engine_context(seed, threads))))
-    p <- min(1, sum(lengths(at) > 0) * min(1, vapply(own, `[[`, 0, "p_value")))
+    p <- min(1, sum(lengths(at) > 0) * min(1, own))
     list(log10_bf_dropped = dropped$lost / log(10),
          standard_error = dropped$standard_error / log(10), p_value = p,
          significant = dropped$lost / log(10) >= filled$least_log10_bf && p <= filled$level,
@@ -293,19 +293,22 @@ attributed_together <- function(fits, each, control, seed, threads) {
   }
   conditions <- unique(unlist(lapply(fits, function(fit) fit$measurements$conditions)))
   rows <- lapply(conditions, function(condition) {
-    own <- Filter(nrow, lapply(each, function(a) a$table[a$table$boundary == condition, ]))
-    data.frame(boundary = condition, dropped_from_all(condition, own), group = NA_character_,
-               records = paste(names(Filter(function(row) row$significant, own)), collapse = ", "))
+    has <- Filter(function(a) condition %in% a$table$boundary, each)
+    told <- vapply(has, function(a) a$table$significant[a$table$boundary == condition], NA)
+    p <- vapply(has, function(a) a$p_value_own[[condition]], 0)
+    data.frame(boundary = condition, dropped_from_all(condition, p), group = NA_character_,
+               records = paste(names(which(told)), collapse = ", "))
   })
   table <- do.call(rbind, rows)
   seen <- do.call(c, unname(lapply(each, `[[`, "groups")))
   groups <- lapply(unique(lapply(seen, `[[`, "conditions")), function(conditions) {
     own <- Filter(function(group) identical(group$conditions, conditions), seen)
-    c(list(conditions = conditions), dropped_from_all(conditions, own),
+    c(list(conditions = conditions),
+      dropped_from_all(conditions, vapply(own, `[[`, 0, "p_value")),
       list(correlation = min(vapply(own, `[[`, 0, "correlation"))))
   })
-  # A member that earns its evidence by itself is known apart.
-  alone <- table$boundary[table$log10_bf_dropped >= filled$least_log10_bf]
+  # A member that is significant by itself is known apart.
+  alone <- table$boundary[table$significant]
   groups <- Filter(function(group) group$significant && !any(group$conditions %in% alone), groups)
   table <- with_groups(table, groups)
   table <- table[order(-table$log10_bf_dropped), ]

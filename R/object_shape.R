@@ -107,7 +107,7 @@ object_shapes <- list(
                 trusted = "flag[1]", verdict = "text[1]", weights = "real[k]", draws = "real[k,p]",
                 ess = "number[1]", second = "number[2]", annealed = "number[2]"),
   amiss_attribution = c(table = "table", groups = "list", surrogates = "real[1]", control = "list",
-                        labels = "?text"),
+                        p_value_own = "?real", labels = "?text"),
   amiss_joint_attribution = c(records = "each:amiss_attribution", table = "table", groups = "list"),
   amiss_discrepancy = c(series = "table", responses = "?real[n,b]", record = "?table",
                         rows = "?real[n]", segment = "real[n]", target = "text[1]",

@@ -34,8 +34,8 @@ sources <- list(
       clean <- amiss:::simulate_measured(
         world$simulator, matrix(values, 1, dimnames = list(NULL, names(values))), m, "calibrate", 1)
       n <- length(clean)
-      lambda <- draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence))
-      clean[, 1] + stats::rnorm(n, 0, 1 / sqrt(lambda))
+      variance <- draw_variance(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence))
+      clean[, 1] + stats::rnorm(n, 0, sqrt(variance))
     }),
   "history model" = list(
     control = list(confidence = 0.5),

@@ -5,6 +5,10 @@
 draw_precision <- function(n, priors)
   stats::rgamma(n, priors$noise_shape, priors$noise_shape * priors$noise_sd^2)
 
+# sigma^2 of the history model.
+draw_variance <- function(n, priors)
+  priors$noise_sd^2 * stats::rf(n, 2 * priors$noise_shape, 2 * priors$noise_shape)
+
 # Equations (5) and (6): the noise is drawn for each coefficient (or once for all), and again for
 # the rest.
 draw_paper <- function(world, control, fictitious) {
@@ -56,7 +60,7 @@ draw_history <- function(world, control) {
   unit <- stats::runif(length(emulator$parameters))
   w <- coefficients_at(emulator, unit)
   variance <-
-    1 / draw_precision(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)) +
+    draw_variance(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)) +
       mean(emulator$basis$discarded_sd^2)
   level <- sample(length(control$error_ratios), length(control$error_times), replace = TRUE)
   reach <- sample(length(control$reach), 1)

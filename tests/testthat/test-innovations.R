@@ -80,6 +80,18 @@ test_that("an autocorrelated error is flagged if the error model knows only whit
   expect_lt(abs(first_lag(amiss:::innovations(knowing)$innovation)), 3.3 / sqrt(n))
 })
 
+# The error of a house: smooth, and its white part a twentieth of what was stated. If the stated noise
+# were firmly believed, neighbours would agree.
+test_that("a stated noise that is far too large is not believed", {
+  m <- linear_measurements(linear_data(noise = 0.005))
+  n <- sum(m$use == "calibrate")
+  error <- withr::with_seed(6, 0.02 * as.numeric(stats::arima.sim(list(ar = 0.9), n)))
+  m$y[m$use == "calibrate"] <- m$y[m$use == "calibrate"] + error
+  fit <- quick_fit(m)
+  expect_lt(abs(first_lag(amiss:::innovations(fit)$innovation)), 3.3 / sqrt(n))
+  expect_lt(sqrt(max(fit$posterior$variance)), m$noise_sd / 4)
+})
+
 test_that("the title tells of the first check that fails", {
   m <- linear_measurements()
   z <- withr::with_seed(2, rnorm(400))

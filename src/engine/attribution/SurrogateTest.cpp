@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "engine/optimise/maximise.hpp"
 #include "engine/parallel/parallel_for.hpp"
@@ -18,7 +19,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kTolerance = 1e-5;   // of a fit, relative: a few thousandths of a nat
+constexpr double kTolerance = 1e-5;  // of a fit, relative: a few thousandths of a nat
+// log t_s below the log variance of the whole error, white or not, where fits begin: an autocorrelated error
+// can do what responses do, so that the likelihood has more than one maximum.
+constexpr double kStarts[] = {1.0, 4.0, 8.0};
 constexpr double kNegligible = 0.02;  // nats: a condition that matters less need not be fitted again without
 
 struct Fit {
@@ -66,16 +70,31 @@ Fit best_fit(const HistoryModel& model, const WhitenedData& data, const Set& dro
   return {found.value, found.x};
 }
 
+// The others as strong as what is dropped: one that lies near zero stays there, though it could do the same.
+VectorXd taken_over(VectorXd x, const Set& dropped) {
+  double most = -std::numeric_limits<double>::infinity();
+  for (int s : dropped) most = std::max(most, x[1 + s]);
+  x.tail(x.size() - 1) = x.tail(x.size() - 1).cwiseMax(most);
+  return x;
+}
+
 // Loss of log-likelihood by dropping each set, for data seen under each of the settings.
 VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>& settings,
                      const std::vector<Set>& sets, const SurrogateOptions& options) {
   std::vector<Fit> full;
   std::vector<double> log_scale;
-  for (const auto& data : settings) {
-    log_scale.push_back(log_error_scale(model, data) - log_unit(model));
-    VectorXd start = VectorXd::Constant(1 + model.conditions(), log_scale.back() - 3.0);
-    start[0] = log_scale.back() - 0.5;
-    full.push_back(best_fit(model, data, {}, start, log_scale.back(), options));
+  for (std::size_t g = 0; g < settings.size(); ++g) {
+    log_scale.push_back(log_error_scale(model, settings[g]) - log_unit(model));
+    const int error = model.error_of(options.settings[g]);
+    const double whole = log_scale.back() + std::log1p(model.priors().error.setting(error).sum());
+    Fit highest;
+    for (double below : kStarts) {
+      VectorXd start = VectorXd::Constant(1 + model.conditions(), whole - below);
+      start[0] = log_scale.back() - 0.5;
+      Fit fit = best_fit(model, settings[g], {}, start, log_scale.back(), options);
+      if (fit.value > highest.value) highest = std::move(fit);
+    }
+    full.push_back(std::move(highest));
   }
   double best = full[0].value;
   for (const Fit& fit : full) best = std::max(best, fit.value);
@@ -85,8 +104,10 @@ VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>&
     for (std::size_t g = 0; g < settings.size(); ++g) {
       const VectorXd& x = full[g].x;
       double value = log_likelihood(model, settings[g], x, sets[s]);
-      if (full[g].value - value > kNegligible)
-        value = std::max(value, best_fit(model, settings[g], sets[s], x, log_scale[g], options).value);
+      if (full[g].value - value > kNegligible) {
+        for (const VectorXd& start : {x, taken_over(x, sets[s])})
+          value = std::max(value, best_fit(model, settings[g], sets[s], start, log_scale[g], options).value);
+      }
       without = std::max(without, value);
     }
     losses[static_cast<Index>(s)] = std::max(0.0, best - without);

@@ -25,8 +25,8 @@ struct HistoryData {
 
 /// Priors of the history model.
 struct HistoryPriors {
-  double noise_sd = 1.0;     ///< stated standard deviation of the white noise
-  double noise_shape = 2.0;  ///< shape a* = N c of lambda* ~ Gamma(a*, a* noise_sd^2): confidence in noise_sd
+  double noise_sd = 1.0;            ///< stated standard deviation of the white noise
+  double noise_shape = 2.0;         ///< a* = N c of sigma^2 ~ noise_sd^2 F(2a*, 2a*): confidence in noise_sd
   double discarded_variance = 0.0;  ///< of what the basis leaves out of a run, added to the white noise
   double inclusion = 0.2;  ///< probability that a condition drives the discrepancy at all; else t_s = 0
   double amplitude = 1.0;  ///< scale of the half-Cauchy prior of sqrt(t_s), if it does

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
-#include <boost/math/special_functions/gamma.hpp>
+#include <boost/math/special_functions/beta.hpp>
 #include <cmath>
 #include <utility>
 
@@ -42,17 +42,21 @@ Index HistoryCoordinates::first_condition() const {
   return 1 + priors.error.correlation_times.size() + (priors.reach.size() > 1 ? 1 : 0);
 }
 
-double HistoryCoordinates::noise_variance(double x) const {
-  const HistoryPriors& priors = model_->priors();
-  const double scaled =
-      boost::math::gamma_p_inv(priors.noise_shape, clamp_unit(normal_cdf(x)), DoublePolicy());
-  return priors.noise_shape * priors.noise_sd * priors.noise_sd / scaled;
+// sigma^2 = noise_sd^2 b / (1 - b) with b ~ Beta(a*, a*), the distribution F(2a*, 2a*).
+double HistoryCoordinates::noise_share(double x) const {
+  const double shape = model_->priors().noise_shape;
+  return clamp_unit(boost::math::ibeta_inv(shape, shape, clamp_unit(normal_cdf(x)), DoublePolicy()));
+}
+
+double HistoryCoordinates::noise_variance(double share) const {
+  const double sd = model_->priors().noise_sd;
+  return sd * sd * share / (1.0 - share);
 }
 
 HistoryParameters HistoryCoordinates::parameters(const Eigen::Ref<const VectorXd>& x) const {
   const HistoryPriors& priors = model_->priors();
   HistoryParameters point;
-  point.variance = noise_variance(x[0]) + priors.discarded_variance;
+  point.variance = noise_variance(noise_share(x[0])) + priors.discarded_variance;
   const Index components = priors.error.correlation_times.size();
   const int levels = static_cast<int>(priors.error.ratios.size());
   const int reaches = static_cast<int>(priors.reach.size());
@@ -77,10 +81,9 @@ VectorXd HistoryCoordinates::gradient(const Eigen::Ref<const VectorXd>& x, const
                                       const VectorXd& natural) const {
   const HistoryPriors& priors = model_->priors();
   VectorXd out = VectorXd::Zero(x.size());
-  const double noise = noise_variance(x[0]);
-  const double scaled = priors.noise_shape * priors.noise_sd * priors.noise_sd / noise;
-  out[0] = -natural[0] * noise / point.variance * normal_density(x[0]) /
-           (scaled * boost::math::gamma_p_derivative(priors.noise_shape, scaled, DoublePolicy()));
+  const double share = noise_share(x[0]), shape = priors.noise_shape;
+  out[0] = natural[0] * noise_variance(share) / point.variance * normal_density(x[0]) /
+           (share * (1.0 - share) * boost::math::ibeta_derivative(shape, shape, share, DoublePolicy()));
   const Index first = first_condition();
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const Index row = first + static_cast<Index>(a);

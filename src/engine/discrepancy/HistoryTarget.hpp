@@ -23,7 +23,8 @@ class HistoryCoordinates {
 
  private:
   Eigen::Index first_condition() const;
-  double noise_variance(double x) const;
+  double noise_share(double x) const;
+  double noise_variance(double share) const;
 
   const HistoryModel* model_;
   std::vector<int> active_;

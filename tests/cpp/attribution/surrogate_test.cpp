@@ -155,15 +155,12 @@ double largest(const std::function<double(const VectorXd&)>& f, VectorXd centre,
   return best;
 }
 
-// Both variances found by exhaustive search, under each of two settings.
-TEST(SurrogateTest, StatisticIsTheLossOfLogLikelihoodOfFreeFits) {
-  HistoryData data = make_data(0.3, 2);
-  data.responses = MatrixXd(data.responses.leftCols(4));
-  data.condition = {0, 0, 1, 1};
-  const HistoryModel model = make_model(data, {VectorXd::Constant(1, 3.0), Eigen::Vector2d(0.0, 2.0)});
+// The statistics of {0} and {0, 1} of a model of two conditions with both variances found by exhaustive
+// search about log sigma^2 = centre, under each setting.
+VectorXd exhaustive_losses(const HistoryModel& model, double centre) {
   const GaussianSimulator simulator = make_simulator();
   double full = -kInfinity, without_first = -kInfinity, without_both = -kInfinity;
-  for (int g : {0, 1}) {
+  for (int g = 0; g < model.settings(); ++g) {
     const WhitenedData seen =
         model.whitened(g).in_terms_of(simulator.mean - model.reference(), simulator.root);
     const auto f = [&](const VectorXd& x) {
@@ -171,20 +168,51 @@ TEST(SurrogateTest, StatisticIsTheLossOfLogLikelihoodOfFreeFits) {
       for (Index k = 1; k < x.size(); ++k) t[2 - k] = std::exp(x[k]);  // the second condition first
       return model.log_likelihood(seen, x[0], t);
     };
-    full = std::max(full, largest(f, Eigen::Vector3d(-1.5, -4.0, -4.0), Eigen::Vector3d(1.5, 6.0, 6.0)));
+    full = std::max(full, largest(f, Eigen::Vector3d(centre, -4.0, -4.0), Eigen::Vector3d(1.5, 6.0, 6.0)));
     without_first =
-        std::max(without_first, largest(f, Eigen::Vector2d(-1.5, -4.0), Eigen::Vector2d(1.5, 6.0)));
+        std::max(without_first, largest(f, Eigen::Vector2d(centre, -4.0), Eigen::Vector2d(1.5, 6.0)));
     without_both =
-        std::max(without_both, largest(f, VectorXd::Constant(1, -1.5), VectorXd::Constant(1, 1.5)));
+        std::max(without_both, largest(f, VectorXd::Constant(1, centre), VectorXd::Constant(1, 1.5)));
   }
+  return Eigen::Vector2d(full - without_first, full - without_both);
+}
+
+HistoryData two_conditions(HistoryData data) {
+  data.responses = MatrixXd(data.responses.leftCols(4));
+  data.condition = {0, 0, 1, 1};
+  return data;
+}
+
+TEST(SurrogateTest, StatisticIsTheLossOfLogLikelihoodOfFreeFits) {
+  const HistoryModel model =
+      make_model(two_conditions(make_data(0.3, 2)), {VectorXd::Constant(1, 3.0), Eigen::Vector2d(0.0, 2.0)});
   SurrogateOptions options = few_surrogates(1);
   options.settings = {0, 1};
-  const SurrogateTest test = surrogate_test(model, simulator, {{0}, {0, 1}, {1, 0}}, options, Context());
-  ASSERT_GT(full - without_first, 1.0);
+  const SurrogateTest test =
+      surrogate_test(model, make_simulator(), {{0}, {0, 1}, {1, 0}}, options, Context());
+  const VectorXd losses = exhaustive_losses(model, -1.5);
+  ASSERT_GT(losses[0], 1.0);
   // A fit ends at 1e-5 of its value, near -100; a loss is the difference of two.
-  EXPECT_NEAR(test.statistic[0], full - without_first, 3e-3);
-  EXPECT_NEAR(test.statistic[1], full - without_both, 3e-3);
+  EXPECT_NEAR(test.statistic[0], losses[0], 3e-3);
+  EXPECT_NEAR(test.statistic[1], losses[1], 3e-3);
   EXPECT_EQ(test.statistic[1], test.statistic[2]);
+}
+
+// An error without white noise can do what the responses do: the likelihood has a maximum at t = 0 as well.
+TEST(SurrogateTest, ASmoothErrorDoesNotHideAnEffect) {
+  for (unsigned seed : {2u, 3u, 4u, 5u}) {
+    HistoryData data = two_conditions(make_data(0.0, seed));
+    VectorXd smooth = 0.2 * normal_vector(kN, 70 + seed);
+    for (Index i = 1; i < kN; ++i) smooth[i] += 0.9 * smooth[i - 1];
+    data.y += -0.45 * normal_vector(kN, 100 * seed + 9) + smooth + 0.6 * data.responses.col(3);
+    const HistoryModel model = make_model(data, {VectorXd::Constant(1, 8.0), VectorXd::Constant(1, 100.0)});
+    const SurrogateTest test =
+        surrogate_test(model, make_simulator(), {{0}, {0, 1}}, few_surrogates(1), Context());
+    const VectorXd losses = exhaustive_losses(model, -5.0);
+    EXPECT_GT(losses[1], 5.0) << seed;
+    EXPECT_NEAR(test.statistic[1], losses[1], 3e-3) << seed;
+    EXPECT_NEAR(test.statistic[0], losses[0], 3e-3) << seed;
+  }
 }
 
 // Powers of two round nothing but logarithms of the unit, by which a search ends a little elsewhere.

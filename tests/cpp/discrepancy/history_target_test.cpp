@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <boost/math/distributions/cauchy.hpp>
-#include <boost/math/distributions/gamma.hpp>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 
 #include "engine/ais/Sampler.hpp"
@@ -19,14 +19,14 @@ TEST(HistoryCoordinates, MapToThePriorsQuantiles) {
   const HistoryModel model(make_data(), priors, Context());
   const HistoryCoordinates coordinates(model, {0, 2});
   ASSERT_EQ(coordinates.dimension(), 1 + 2 + 1 + 2);
-  // lambda* ~ Gamma(a*, rate a* sd^2); sqrt(t) ~ half-Cauchy(amplitude).
-  const boost::math::gamma_distribution<> precision(
-      priors.noise_shape, 1 / (priors.noise_shape * priors.noise_sd * priors.noise_sd));
+  // sigma^2 / sd^2 ~ F(2a*, 2a*); sqrt(t) ~ half-Cauchy(amplitude).
+  const boost::math::fisher_f noise(2 * priors.noise_shape, 2 * priors.noise_shape);
+  const double stated = priors.noise_sd * priors.noise_sd;
   const boost::math::cauchy cauchy(0.0, priors.amplitude);
   const boost::math::normal normal;
   for (double u : {0.03, 0.5, 0.9, 0.99}) {
     const HistoryParameters point = coordinates.parameters(VectorXd::Constant(6, quantile(normal, u)));
-    EXPECT_NEAR(cdf(precision, 1.0 / (point.variance - 0.03)), u, 1e-9);  // iterations of the quantile
+    EXPECT_NEAR(cdf(noise, (point.variance - 0.03) / stated), u, 1e-9);  // iterations of the quantile
     // With probability 1 - inclusion t = 0; else the half-Cauchy distribution.
     const double in_slab = (u - (1 - priors.inclusion)) / priors.inclusion;
     for (int s : {0, 2})
