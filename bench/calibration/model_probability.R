@@ -34,8 +34,8 @@ sources <- list(
       clean <- amiss:::simulate_measured(
         world$simulator, matrix(values, 1, dimnames = list(NULL, names(values))), m, "calibrate", 1)
       n <- length(clean)
-      variance <- draw_variance(1, list(noise_sd = m$noise_sd, noise_shape = n * control$confidence))
-      clean[, 1] + stats::rnorm(n, 0, sqrt(variance))
+      priors <- list(noise_sd = m$noise_sd, noise_shape = n * control$confidence)
+      clean[, 1] + stats::rnorm(n, 0, sqrt(draw_variance(1, priors)))
     }),
   "history model" = list(
     control = list(confidence = 0.5),

@@ -80,8 +80,8 @@ test_that("an autocorrelated error is flagged if the error model knows only whit
   expect_lt(abs(first_lag(amiss:::innovations(knowing)$innovation)), 3.3 / sqrt(n))
 })
 
-# The error of a house: smooth, and its white part a twentieth of what was stated. If the stated noise
-# were firmly believed, neighbours would agree.
+# The error of a house: smooth, and its white part a twentieth of what was stated. If the stated
+# noise were firmly believed, neighbours would agree.
 test_that("a stated noise that is far too large is not believed", {
   m <- linear_measurements(linear_data(noise = 0.005))
   n <- sum(m$use == "calibrate")
