@@ -68,7 +68,7 @@ new_discrepancy <- function(fit, mean, lower95, upper95, responses = NULL) {
                        upper95 = upper95)
   structure(list(format_version = format_version, series = series, responses = responses,
                  record = data.frame(time = m$time, use = m$use, measured = m$y), rows = fit$rows,
-                 segment = m$segment[fit$rows], target = m$target, unit = m$unit),
+                 segment = m$segment[fit$rows], target = target_label(m), unit = m$unit),
             class = "amiss_discrepancy")
 }
 

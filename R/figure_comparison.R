@@ -178,7 +178,7 @@ figure_models_in_time <- function(comparison, use) {
                   paste("Grey: measured. Coloured: simulated, with the band that should hold 95 %",
                         "of the measurements. At the right: root mean squared error."),
                   x = time_label(table$time),
-                  y = axis_label(m$target, level_unit(m$unit, table$observed))) +
+                  y = axis_label(target_label(m), level_unit(m$unit, table$observed))) +
     time_axis(table$time) + figure_theme() +
     ggplot2::theme(strip.text.y = ggplot2::element_text(angle = 0))
   with_height(figure, 2 + 1.15 * length(comparison$models))

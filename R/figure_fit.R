@@ -17,7 +17,8 @@ fit_title <- function(upgrade) {
 figure_fit <- function(upgrade) {
   m <- upgrade$measurements
   table <- stage_table(upgrade_stages(upgrade), prediction_rows)
-  panels <- c(axis_label(m$target, level_unit(m$unit, table$observed)), axis_label("error", m$unit))
+  panels <- c(axis_label(target_label(m), level_unit(m$unit, table$observed)),
+              axis_label("error", m$unit))
   in_panel <- function(i, table) cbind(table, panel = factor(panels[i], panels))
   measured <- table[table$stage == levels(table$stage)[1], ]
   figure <- ggplot2::ggplot(table, ggplot2::aes(.data$time)) +
@@ -128,7 +129,7 @@ figure_mean_day <- function(upgrade) {
 figure_measurements <- function(measurements) {
   m <- measurements
   series <- c(list(m$y), lapply(m$conditions, function(name) condition_values(m, name)))
-  panels <- c(axis_label(m$target, level_unit(m$unit, m$y)), condition_titles(m))
+  panels <- c(axis_label(target_label(m), level_unit(m$unit, m$y)), condition_titles(m))
   uses <- c(warmup = names(use_colours)[1], use_names, none = names(use_colours)[4])
   table <- data.frame(time = rep(m$time, length(panels)), value = unlist(series),
                       use = factor(uses[rep(m$use, length(panels))], uses),

@@ -23,40 +23,55 @@ innovations <- function(fit, draw = systematic_draws(fit$weights, 1), most = lon
 # white one. The columns are the responses to conditions within the draw's reach and, for what the
 # emulator does not know of the run at this draw, its basis.
 covariance_parts <- function(fit, draw) {
-  data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
+  moves <- simulator_moves(fit$emulator)
+  basis <- fit$emulator$basis$vectors
   emulated <- emulated_coefficients(fit$emulator, posterior_unit(fit)[draw, , drop = FALSE])
-  responses <- sweep(sweep(data$responses, 2, fit$centre), 2, fit$scale, "/")
-  of_condition <- data$condition + 1
+  error <- draw_errors(fit, draw)
+  responses <- standardised_responses(fit)
+  columns <- cbind(responses - moves %*% withheld_by(responses, moves, error$limit), basis)
+  spread <- c(error$spread, emulated$variance)
+  list(left = fit$measurements$y[fit$rows] - as.numeric(basis %*% emulated$mean[1, ]),
+       columns = columns[, spread > 0, drop = FALSE], spread = spread[spread > 0],
+       slow = error$slow, white = error$white)
+}
+
+# Of a draw the variances of the coefficients of all responses and of the errors, and `limit`: the
+# discrepancy keeps out of the directions in which the simulator moves by more than its square root,
+# a sum over the record.
+draw_errors <- function(fit, draw) {
+  of_condition <- rep(fit$measurements$condition, each = length(fit$control$time_constants))
   amount <- fit$posterior$t[draw, ] / tabulate(of_condition, ncol(fit$posterior$t))
   variance <- fit$posterior$variance[draw]
   settings <- length(fit$control$error_ratios)^length(fit$control$error_times)
   reach <- fit$control$reach[fit$posterior$setting[draw] %/% settings + 1]
-  columns <- cbind(within_reach(responses, data$moves, reach * fit$measurements$noise_sd^2),
-                   data$basis)
-  spread <- c(amount[of_condition], emulated$variance)
-  list(left = data$y - as.numeric(data$basis %*% emulated$mean[1, ]),
-       columns = columns[, spread > 0, drop = FALSE], spread = spread[spread > 0],
-       slow = variance * error_ratios_of(fit, draw)[1, ], white = variance)
+  list(spread = amount[of_condition], slow = variance * error_ratios_of(fit, draw)[1, ],
+       white = variance, limit = reach * fit$measurements$noise_sd^2)
 }
 
-# The responses without the directions in which the simulator moves by more than the square root of
-# `limit`, a sum over the record: (I + (E E' / limit)^2)^-1 of them, E the moves.
-within_reach <- function(responses, moves, limit) {
-  if (is.infinite(limit)) return(responses)
-  along <- svd(moves, nv = 0)
-  withheld <- 1 / (1 + (limit / along$d^2)^2)
-  responses - along$u %*% (withheld * crossprod(along$u, responses))
+# The responses to conditions at the calibration rows, as the posterior takes them.
+standardised_responses <- function(fit) {
+  responses <- filter_responses(fit$measurements, fit$control$time_constants)
+  sweep(sweep(responses[fit$rows, , drop = FALSE], 2, fit$centre), 2, fit$scale, "/")
+}
+
+# X with which (I + (E E' / limit)^2)^-1 of the responses is the responses less E X, E the moves.
+withheld_by <- function(responses, moves, limit) {
+  if (is.infinite(limit)) return(matrix(0, ncol(moves), ncol(responses)))
+  along <- svd(moves)
+  along$v %*% (crossprod(along$u, responses) / (along$d + limit^2 / along$d^3))
 }
 
 # Kalman filter (Durbin and Koopman 2012, chapter 4): list(error, sd) of each row, predicted from
 # those before it. The states are the coefficients of the columns, which stay, and the
-# autocorrelated errors; `kept` is what each of these keeps of the row before.
-filter_rows <- function(left, columns, spread, kept, slow, white) {
+# autocorrelated errors; `kept` is what each of these keeps of the row before. A row that was not
+# measured teaches nothing. `look(i, state, covariance)` sees what is known after row i, 0 at first.
+filter_rows <- function(left, columns, spread, kept, slow, white, look = function(...) NULL) {
   steady <- seq_along(spread)
   moving <- length(spread) + seq_along(slow)
   state <- numeric(length(spread) + length(slow))
   covariance <- diag(c(spread, slow), length(state))
   error <- sd <- numeric(length(left))
+  look(0, state, covariance)
   for (i in seq_along(left)) {
     keeps <- c(rep(1, length(steady)), kept[i, ])
     state <- keeps * state
@@ -68,8 +83,11 @@ filter_rows <- function(left, columns, spread, kept, slow, white) {
     variance <- sum(h * shared) + white
     error[i] <- left[i] - sum(h * state)
     sd[i] <- sqrt(variance)
-    state <- state + shared * (error[i] / variance)
-    covariance <- covariance - tcrossprod(shared) / variance
+    if (!is.na(left[i])) {
+      state <- state + shared * (error[i] / variance)
+      covariance <- covariance - tcrossprod(shared) / variance
+    }
+    look(i, state, covariance)
   }
   list(error = error, sd = sd)
 }

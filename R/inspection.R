@@ -127,7 +127,8 @@ held_out_inspection <- function(model, measurements) {
       paste("No data were held out, so that no change could fail a test. Measure %s more of %s and",
             "its conditions and hold them out (argument validate of measurements()), or keep a",
             "part of this record from calibration."),
-      calibrated_words(measurements, rules$held_out_length) %||% "some days", measurements$target)))
+      calibrated_words(measurements, rules$held_out_length) %||% "some days",
+      target_label(measurements))))
   }
   excess <- held_out_excess(model, measurements)
   if (is.null(excess)) return(NULL)
@@ -251,7 +252,7 @@ drift_inspection <- function(upgrade, adopted) {
   if (!length(shows)) return(NULL)
   over <- calibrated_words(upgrade$measurements)
   c(drift = sprintf("Compare the sensor of %s with a second one from time to time%s: %s.",
-                    upgrade$measurements$target,
+                    target_label(upgrade$measurements),
                     if (is.null(over)) "" else sprintf(" over %s or more", over),
                     paste(shows, collapse = "; ")))
 }

@@ -174,7 +174,7 @@ described_inspection <- function(upgrade, models) {
   conditions <- vapply(models, function(m) upgrade$catalogue[[m$mechanism]]$response$boundary, "")
   c(description = sprintf(paste("Look for what lets %s act on %s as the responses do, and add each",
                                 "as a mechanism: only that would explain them."),
-                          listed(conditions), upgrade$measurements$target))
+                          listed(conditions), target_label(upgrade$measurements)))
 }
 
 # What the calibrated values ask to be found on site, where physical values lie.

@@ -107,6 +107,8 @@
 #'   are left out of the comparison.
 #' @param stamp What a time stamp marks of its interval: `"end"` or `"start"`. If it is not given,
 #'   the end; but dates without a time of day mark the start of their day.
+#' @param label What the target is, in a few words: `"air of the living room"`. Sentences and
+#'   figures show it in place of the column's name.
 #' @return An object of class `amiss_measurements`:
 #'   * `time`, `hours`: of the end of each row, after averaging.
 #'   * `y`: the target in each row.
@@ -141,7 +143,7 @@
 measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, average = NULL,
                          calibrate = NULL, validate = NULL, warmup = 0, name = target, unit = "",
                          time_format = NULL, time_zone = NULL, fill_gaps = 0, missing = NULL,
-                         range = NULL, stamp = NULL) {
+                         range = NULL, stamp = NULL, label = NULL) {
   check_arguments()
   table <- time_table(data, time, time_format)
   data <- table$data
@@ -151,6 +153,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   check_input(checkmate::check_number(warmup, lower = 0, finite = TRUE), "warmup")
   check_input(checkmate::check_number(fill_gaps, lower = 0, finite = TRUE), "fill_gaps")
   check_input(checkmate::check_choice(stamp, c("end", "start"), null.ok = TRUE), "stamp")
+  check_input(checkmate::check_string(label, min.chars = 1, null.ok = TRUE), "label",
+              "Say in a few words what the target is.")
   terms <- boundary_terms(boundary)
   check_record(data, time, target, terms, name, unit)
   check_marks(missing, range)
@@ -229,15 +233,17 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   noise <- noise_level(noise_sd, coarse, raw$y)
   findings <- record_findings(list(columns = c(data[target], data[numeric_columns]),
                                    target = target, conditions = terms$name, circular = circular,
-                                   labels = stats::setNames(terms$label, terms$name),
-                                   use = use_given, noise_sd = noise$sd * sqrt(coarse$per_step),
+                                   labels = stats::setNames(c(label %||% target, terms$label),
+                                                            c(target, terms$name)),
+                                   use = use_given,
+                                   noise_sd = noise$sd * sqrt(coarse$per_step),
                                    per_step = coarse$per_step))
   structure(list(format_version = format_version, name = name, target = target, unit = unit,
-                 noise_sd = noise$sd, noise = noise[-1], raw = raw, per_step = coarse$per_step,
-                 step_h = coarse$step_h, time = coarse$time, hours = coarse$hours,
-                 segment = coarse$segment, use = coarse$use, y = coarse$y,
-                 standard_error = coarse$standard_error, block = coarse$block, boundary = x$values,
-                 condition = x$condition, conditions = x$names,
+                 label = label, noise_sd = noise$sd, noise = noise[-1], raw = raw,
+                 per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time,
+                 hours = coarse$hours, segment = coarse$segment, use = coarse$use,
+                 y = coarse$y, standard_error = coarse$standard_error, block = coarse$block,
+                 boundary = x$values, condition = x$condition, conditions = x$names,
                  labels = stats::setNames(terms$label, terms$name)[told],
                  units = stats::setNames(terms$unit, terms$name)[told],
                  time_format = reading$format, time_zone = time_zone, stamp = stamp,
@@ -510,7 +516,7 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
     x$noise$method, given = "",
     `standard error` = paste0(" (standard error of averages of ", x$per_step, " readings)"),
     sprintf(" (%s, %d an average, %d times)", x$noise$method, x$noise$readings, x$noise$replicates))
-  cli::cli_bullets(c("*" = paste("target {.field {x$target}}, noise standard deviation",
+  cli::cli_bullets(c("*" = paste("target {.field {target_label(x)}}, noise standard deviation",
                                  "{signif(x$noise_sd, 3)} {pretty_unit(x$unit)}{origin}"),
                      "*" = paste("{n[['calibrate']]} calibrate, {n[['validate']]} validate,",
                                  "{n[['warmup']]} warm up"),

@@ -32,7 +32,8 @@ object_shapes <- list(
                     before = "list", hold = "flag[1]", interpolation = "text[1]",
                     output_at = "text[1]", start_hours = "real[1]"),
   amiss_measurements = c(
-    name = "text[1]", target = "text[1]", unit = "text[1]", noise_sd = "real[1]", noise = "list",
+    name = "text[1]", target = "text[1]", unit = "text[1]", label = "?text[1]",
+    noise_sd = "real[1]", noise = "list",
     raw = ":raw", per_step = "real[1]", step_h = "real[1]", time = "values[n]", hours = "real[n]",
     segment = "real[n]", use = "text[n]", y = "number[n]", standard_error = "number[n]",
     boundary = "number[n,c]", condition = "real[c]", conditions = "text", labels = "?text",

@@ -5,6 +5,16 @@
 #' elsewhere, the emulator of these runs at the rows asked for predicts, and its own uncertainty
 #' widens the band too.
 #'
+#' # Forecasts
+#'
+#' With `horizon`, each row is predicted as it would have been that many steps before. The
+#' measurements up to then show the error and the discrepancy, and these are carried forward: a
+#' Kalman filter for each draw. The parameters stay those of the calibration. `summary()` of the
+#' result gives scores by horizon.
+#'
+#' If the rows are those of `newdata`, the filter knows the calibration rows and, as far as they
+#' were measured, the rows of `newdata` before.
+#'
 #' # New data
 #'
 #' `newdata` is a record of its own. It may be
@@ -33,6 +43,8 @@
 #' @param interval `"prediction"`, a band of new measurements, or `"confidence"`, one of the
 #'   simulation (and the discrepancy) alone.
 #' @param level Probability that the band holds.
+#' @param horizon Steps of the record: one or more whole numbers, such as `1:24`. `NULL`: no
+#'   measurement helps.
 #' @inheritParams calibrate
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A data frame (for several records a list by record) with
@@ -40,8 +52,14 @@
 #'   * `lower95`, `upper95`: the band, at the probability `level`.
 #'   * `crps`: the continuous ranked probability score of each row.
 #'   * `segment`: the number of the unbroken part, if `newdata` is a data frame.
-#' @source Gneiting and Raftery (2007), Strictly proper scoring rules, prediction, and estimation,
-#'   Journal of the American Statistical Association 102, 359-378, for the CRPS.
+#'   * `horizon`: with `horizon`, which repeats the rows for each.
+#'
+#'   `summary()` of forecasts: a data frame with a row for each `horizon` and the columns `rows`,
+#'   `rmse`, `crps` and `coverage`, the share of measurements inside the band.
+#' @source Durbin and Koopman (2012), Time Series Analysis by State Space Methods, second edition,
+#'   chapter 4, for the filter of forecasts. Gneiting and Raftery (2007), Strictly proper scoring
+#'   rules, prediction, and estimation, Journal of the American Statistical Association 102,
+#'   359-378, for the CRPS.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -58,11 +76,14 @@
 #' # Other weather: a table with the record's boundary conditions.
 #' warmer <- data.frame(time = 97:120, Te = 15 + 5 * sin(97:120 / 4), Gv = 0)
 #' head(predict(fit, warmer, interval = "confidence"))
+#'
+#' # How well the record is known one, three and twelve hours ahead.
+#' summary(predict(fit, use = "validate", horizon = c(1, 3, 12)))
 #' @export
 predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "validate"), draws = 40,
                               discrepancy = FALSE, interval = c("prediction", "confidence"),
-                              level = 0.95, seed = object$seed,
-                              threads = 1, ...) {
+                              level = 0.95, horizon = NULL, seed = object$seed, threads = 1,
+                              ...) {
   rlang::check_dots_empty()
   check_object(object, "amiss_fit", "object")
   check_input(checkmate::check_character(use, min.len = 1), "use")
@@ -74,8 +95,11 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
   threads <- check_threads(threads)
   seed <- pick_seed(seed)
   check_input(checkmate::check_flag(discrepancy), "discrepancy")
-  if (discrepancy && !knows_history(object)) {
-    abort_input(paste("{.arg discrepancy} needs a fit of {.fun calibrate}:",
+  forecast <- !is.null(horizon)
+  if (forecast) check_horizon(horizon, discrepancy, interval)
+  if ((discrepancy || forecast) && !knows_history(object)) {
+    asked <- if (forecast) "horizon" else "discrepancy"
+    abort_input(paste("{.arg {asked}} needs a fit of {.fun calibrate}:",
                       "that of the paper does not carry over to other rows."))
   }
   record <- prediction_record(object$measurements, newdata)
@@ -84,6 +108,10 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
   if (!length(rows)) abort_input("The measurements have no row to {.val {use}}.")
   check_run_number(draws, length(record$raw$hours), "draws")
   picked <- even_draws(object, draws)
+  if (forecast) {
+    require_simulator(object)
+    return(forecast_fit(object, record, use, picked, sort(unique(horizon)), level, seed, threads))
+  }
   if (is.null(object$emulator$simulator) && is.null(newdata)) {
     return(predict_given(object, picked, rows, use, discrepancy, interval, level, seed, threads))
   }
@@ -107,6 +135,20 @@ predict.amiss_fit <- function(object, newdata = NULL, use = c("calibrate", "vali
   with_seed(seed, summarise_prediction(record, rows, runs, sd, interval, level))
 }
 
+check_horizon <- function(horizon, discrepancy, interval, call = rlang::caller_env()) {
+  check_input(checkmate::check_integerish(horizon, lower = 1, any.missing = FALSE, min.len = 1),
+              "horizon", "Give numbers of steps of the record, such as {.code 1:24}.", call = call)
+  if (discrepancy) {
+    abort_input(c("{.arg discrepancy} does not go with {.arg horizon}.",
+                  i = "A forecast takes the discrepancy along, as far as it is known by then."),
+                call = call)
+  }
+  if (interval != "prediction") {
+    abort_input(c("{.arg interval} does not go with {.arg horizon}.",
+                  i = "The band of a forecast holds new measurements."), call = call)
+  }
+}
+
 require_simulator <- function(fit, call = rlang::caller_env()) {
   if (is.null(fit$emulator$simulator)) {
     abort_input(
@@ -114,8 +156,6 @@ require_simulator <- function(fit, call = rlang::caller_env()) {
         i = "Use {.fun predict} on the emulator for the calibration rows."), call = call)
   }
 }
-
-rows_used <- function(measurements, use) which(measurements$use %in% use & !is.na(measurements$y))
 
 # The record that is predicted: the fit's, one of its own, or one made of a data frame.
 prediction_record <- function(m, newdata, call = rlang::caller_env()) {
@@ -176,99 +216,6 @@ checked_values <- function(m, data, compared, numeric_columns, circular, call) {
                           m$noise_sd * sqrt(m$per_step), m$per_step, m$findings)
   warn_findings(found[found$id != "missing_code", ], "newdata")
   data
-}
-
-# The lacking response at the rows of these uses (rows x kept draws), and what it leaves in
-# calibration.
-carried_response <- function(fit, use, threads, record = fit$measurements) {
-  rows <- rows_used(record, use)
-  responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
-  moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads, record)
-           else matrix(0, length(rows), nrow(fit$withheld))
-  left <- left_by_mean(fit) - rowMeans(seen_response(fit))
-  list(response = lacking_response(fit, responses, moves),
-       sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
-}
-
-# The lacking response at the calibration rows (rows x kept draws).
-seen_response <- function(fit) {
-  responses <- filter_responses(fit$measurements, fit$control$time_constants)
-  lacking_response(fit, responses[fit$rows, , drop = FALSE], simulator_moves(fit$emulator))
-}
-
-# simulator_moves() at other rows.
-moves_at <- function(fit, use, threads, record = fit$measurements) {
-  emulator <- fit$emulator
-  if (is.null(emulator$moves)) {
-    wide <- emulator_over_priors(emulator)
-    return(vectors_at(fit, wide, use, threads, record) %*% wide$spread)
-  }
-  slopes_at(fit, use, threads, record)
-}
-
-# The simulator's slopes at other rows, at the run of least squares: by differences on both sides,
-# as far as the priors go.
-slopes_at <- function(fit, use, threads, record) {
-  parameters <- fit$emulator$parameters
-  space <- coordinates_of(parameters)
-  z <- fit$emulator$moves$z
-  step <- diag(rules$search_difference, length(z))
-  ends <- lapply(c(1, -1), function(side) {
-    t(pmin(pmax(z + side * step, space$lower), space$upper))
-  })
-  around <- do.call(rbind, ends)
-  runs <- runs_elsewhere(fit, unit_to_values(to_unit(around, space), parameters), use, threads,
-                         record)
-  if (!all(is.finite(runs))) {
-    abort_numerical("The simulator failed beside its best run at these rows.")
-  }
-  up <- seq_along(z)
-  sweep(runs[, up, drop = FALSE] - runs[, -up, drop = FALSE], 2,
-        fit$emulator$moves$unit / diag(ends[[1]] - ends[[2]]), "*")
-}
-
-# The vectors of an emulator's basis at other rows: the same combinations of its runs, without those
-# that fail there.
-vectors_at <- function(fit, emulator, use, threads, record) {
-  w <- emulator$processes$coefficients
-  last <- ncol(w)
-  runs <- if (is.null(fit$emulator$simulator)) runs_given(fit, use)
-          else runs_elsewhere(fit, unit_to_values(emulator$unit, emulator$parameters), use, threads,
-                              record)
-  made <- colSums(!is.finite(runs)) == 0
-  if (sum(made) < last) {
-    abort_numerical(paste("The simulator failed at {sum(!made)} of the ensemble's {length(made)}",
-                          "runs, made at these rows."))
-  }
-  coordinates <- w[made, -last, drop = FALSE]
-  shifted <- sweep(runs[, made, drop = FALSE], 2, w[made, last])
-  cbind(shifted %*% coordinates %*% solve(crossprod(coordinates) + diag(1e-12, last - 1)), 1)
-}
-
-runs_elsewhere <- function(fit, values, use, threads, record) {
-  suppress_run_warnings(simulate_measured(fit$emulator$simulator, values, record, use, threads))
-}
-
-# Runs at draws of the posterior about the best run in place of their mean: where the discrepancy
-# takes over what parameters at the ends of their priors cannot do, draws lie off the best.
-about_best <- function(runs, best) runs + (as.numeric(best) - rowMeans(runs))
-
-summarise_prediction <- function(m, rows, runs, sd, interval, level) {
-  n <- 200
-  member <- rep_len(seq_len(ncol(runs)), n)
-  samples <- runs[, member, drop = FALSE] + sd * stats::rnorm(length(rows) * n)
-  y <- (m$observed %||% m$y)[rows]
-  sorted <- t(apply(samples, 1, sort))
-  # CRPS of an ensemble: mean |x - y| - 1/2 mean |x - x'| (Gneiting and Raftery 2007), by the sorted
-  # members.
-  spread <- as.numeric(sorted %*% (2 * seq_len(n) - n - 1)) / n^2
-  tails <- c((1 - level) / 2, (1 + level) / 2)
-  band <- apply(if (interval == "prediction") sorted else runs, 1, stats::quantile, tails)
-  ends <- data.frame(band[1, ], band[2, ])
-  names(ends) <- paste0(c("lower", "upper"), format(100 * level, digits = 4))
-  data.frame(time = m$time[rows], use = m$use[rows], observed = y, mean = rowMeans(runs), ends,
-             crps = rowMeans(abs(samples - y)) - spread, segment = m$segment[rows],
-             row.names = NULL)
 }
 
 prediction_scores <- function(prediction) {
@@ -365,7 +312,7 @@ ornstein_uhlenbeck <- function(kept) {
 predict_given <- function(fit, picked, rows, use, discrepancy, interval, level, seed, threads,
                           call = rlang::caller_env()) {
   m <- fit$measurements
-  values <- fit$values[rep_len(picked, 200), , drop = FALSE]
+  values <- fit$values[rep_len(picked, predicted_samples), , drop = FALSE]
   mean <- sd <- matrix(0, length(rows), nrow(values))
   for (one in intersect(use, m$use[rows])) {
     emulated <- stats::predict(if (one == "calibrate") fit$emulator

@@ -361,6 +361,7 @@ coarse_value_step <- function(v) {
 suspect_words <- function(s, case) {
   if (is.null(s)) return(NULL)
   there <- is.finite(s$left)
+  s$told <- condition_label(case$measurements, s$column)
   s$fall <- sprintf("the base model's error falls from %s to %s",
                     short(rms(case$before$left[there])),
                     with_unit(short(rms(s$left[there])), case$measurements$unit))
@@ -369,13 +370,13 @@ suspect_words <- function(s, case) {
 
 suspect_sentences <- list(
   clock = function(s, case) {
-    sprintf("The clock of %s seems to be %s that of the rest: with it set right, %s.", s$column,
+    sprintf("The clock of %s seems to be %s that of the rest: with it set right, %s.", s$told,
             behind_words(s, case), s$fall)
   },
   daylight = function(s, case) {
     sprintf(paste("The clock of %s seems to be %s that of the rest %s %s, as with daylight saving",
                   "in one of them: with it set right, %s."),
-            s$column, behind_words(s, case), if (s$later) "from" else "until",
+            s$told, behind_words(s, case), if (s$later) "from" else "until",
             at_words(s, case), s$fall)
   },
   start = function(s, case) {
@@ -385,13 +386,13 @@ suspect_sentences <- list(
   },
   step_change = function(s, case) {
     sprintf(paste("From %s on, %s lies %s %s than before, as if a sensor was moved or exchanged:",
-                  "with that taken off, %s."), at_words(s, case), s$column,
+                  "with that taken off, %s."), at_words(s, case), s$told,
             with_unit(short(abs(s$amount)), case$measurements$unit),
             if (s$amount > 0) "higher" else "lower", s$fall)
   },
   range_end = function(s, case) {
     sprintf(paste("%s is %s in %d rows, as at the end of its sensor's range: with what may lie",
-                  "beyond, %s."), s$column, format(s$end), length(s$rows), s$fall)
+                  "beyond, %s."), s$told, format(s$end), length(s$rows), s$fall)
   })
 
 # A target that is late is simulated with a lag; a driver that is late needs a lead.

@@ -27,8 +27,8 @@ print.amiss_records <- function(x, ...) on_stdout(x, {
   for (name in names(x$records)) {
     m <- x$records[[name]]
     count <- function(use) sum(m$use == use & !is.na(m$y))
-    cli::cli_bullets(c("*" = paste("{name}: {.field {m$target}}, {count('calibrate')} steps to",
-                                   "calibrate, {count('validate')} held out, noise",
+    cli::cli_bullets(c("*" = paste("{name}: {.field {target_label(m)}}, {count('calibrate')}",
+                                   "steps to calibrate, {count('validate')} held out, noise",
                                    "{signif(m$noise_sd, 3)} {pretty_unit(m$unit)}")))
   }
 })

@@ -49,7 +49,7 @@ remainder_pattern <- function(r, rows, measurements, answers) {
   peak <- which.max(abs(profile - mean(r)))
   hour <- as.numeric(names(profile)[peak])
   list(what = sprintf("every day around %s the measured %s is on average %s %s than simulated",
-                      clock_words(hour), measurements$target,
+                      clock_words(hour), target_label(measurements),
                       with_unit(short(abs(profile[[peak]])), unit),
                       if (profile[[peak]] > 0) "higher" else "lower"),
        where = paste("Look for something that follows the clock and is not among the inputs: a",

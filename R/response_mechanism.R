@@ -76,7 +76,7 @@ response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, t
                         "below zero."), i = "Give one of positive hours."))
   }
   response <- new_response(boundary, measurements, unit, gain, time_constant, reference)
-  of <- measurements$target
+  of <- target_label(measurements)
   entry <- mechanism(
     name, function(model) with_response(model, response, measurements), boundary,
     sprintf(paste("%s responds to %s in a way that the model lacks: described here by a gain and a",
@@ -270,13 +270,13 @@ description_sentence <- function(entry, fit) {
   }
   gains <- paste(vapply(response$gains, number, ""), collapse = " and ")
   sprintf(paste("This describes and does not explain: %s responds to %s with a gain of %s,",
-                "smoothed over a time constant of %s. %s"), m$target, response$boundary, gains,
-          number(response$time_constant), shape)
+                "smoothed over a time constant of %s. %s"), target_label(m), response$boundary,
+          gains, number(response$time_constant), shape)
 }
 
 description_inspection <- function(upgrade, model) {
   response <- upgrade$catalogue[[model$mechanism]]$response
   c(description = sprintf(paste("Look for what lets %s act on %s as the response does, and add it",
                                 "as a mechanism: only that would explain it."),
-                          response$boundary, upgrade$measurements$target))
+                          response$boundary, target_label(upgrade$measurements)))
 }

@@ -2,13 +2,13 @@ study_fields <- list(
   needed = c("study", "data", "time", "target", "boundary"),
   upgrade = c("model", "catalogue"),
   comparison = c("models", "method", "truth"),
-  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "time_format",
-               "time_zone", "stamp", "fill_gaps_h", "missing", "range", "separator", "decimal",
-               "runs", "seed", "control", "title", "records"))
+  optional = c("noise_sd", "average_h", "calibrate", "validate", "warmup_h", "unit", "label",
+               "time_format", "time_zone", "stamp", "fill_gaps_h", "missing", "range", "separator",
+               "decimal", "runs", "seed", "control", "title", "records"))
 
 # What each of several records may have of its own.
 record_fields <- c("data", "time", "target", "boundary", "model", "noise_sd", "average_h",
-                   "calibrate", "validate", "warmup_h", "unit", "time_format", "time_zone",
+                   "calibrate", "validate", "warmup_h", "unit", "label", "time_format", "time_zone",
                    "stamp", "fill_gaps_h", "missing", "range", "separator", "decimal")
 
 # Fields that name a file. All but the data are R files.
@@ -38,7 +38,7 @@ file_fields <- c("data", "model", "catalogue", "models", "truth")
 #'   degrees. A condition may have a label and a unit, which people read in its place: `Gv: {label:
 #'   sun from the south, unit: W/m2}`, and `circular: true` for degrees.
 #' * `calibrate` and `validate`: conditions in the columns of the data.
-#' * `noise_sd`, `unit`, `time_format`, `time_zone`, `stamp`: as in [measurements()].
+#' * `noise_sd`, `unit`, `label`, `time_format`, `time_zone`, `stamp`: as in [measurements()].
 #' * `average_h` (the step of the data if it is not given), `warmup_h` and `fill_gaps_h` (0): in
 #'   hours.
 #' * `missing`: codes for a missing value, as `[-9999, 85]`, or `none`.
@@ -241,7 +241,8 @@ record_lines <- function(m, name) {
   c(sprintf("%srecord of %d rows of %s h, from %s to %s: %d calibrate, %s", of, length(m$y),
             format(m$step_h, digits = 3), at[1], at[2], count("calibrate"),
             if (held_out) paste(held_out, "validate") else "none held out"),
-    sprintf("%starget %s, noise %s; boundary conditions %s", of, axis_label(m$target, m$unit),
+    sprintf("%starget %s, noise %s; boundary conditions %s", of,
+            axis_label(target_label(m), m$unit),
             trimws(paste(signif(m$noise_sd, 3), pretty_unit(m$unit))), listed(condition_titles(m))))
 }
 
@@ -334,7 +335,7 @@ study_measurements <- function(study, files) {
     calibrate = rows("calibrate"), validate = rows("validate"),
     warmup = study$warmup_h %||% 0, name = study$study, unit = study$unit %||% "",
     time_format = study$time_format, time_zone = study$time_zone, stamp = study$stamp,
-    fill_gaps = study$fill_gaps_h %||% 0,
+    label = study$label, fill_gaps = study$fill_gaps_h %||% 0,
     missing = if (identical(study$missing, "none")) NA else unlist(study$missing),
     range = unlist(study$range))
 }
@@ -376,8 +377,9 @@ check_study_fields <- function(study, path, of = "", call = rlang::caller_env())
         i = if (any(absent %in% study_fields$upgrade))
               "Or name {.field models}, to compare several."), call = call)
   }
-  for (field in c("study", "title", "unit", "time", "target")) {
-    check_input(checkmate::check_string(study[[field]], null.ok = field %in% c("title", "unit")),
+  for (field in c("study", "title", "unit", "label", "time", "target")) {
+    check_input(checkmate::check_string(study[[field]],
+                                        null.ok = field %in% c("title", "unit", "label")),
                 field, "Numbers and dates are text in quotes only.", call = call)
   }
 }

@@ -197,3 +197,18 @@ test_that("a warm-up of less than a step, or of the whole record, is told as suc
   expect_no_warning(expect_error(linear_measurements(warmup = 1000), "Only 0 rows .* warm-up",
                                  class = "amiss_error_input"))
 })
+
+test_that("people read the target's label, and tables keep its column", {
+  m <- linear_measurements(label = "air of the room")
+  expect_output(print(m), "target air of the room, noise")
+  expect_match(levels(ggplot2::autoplot(m)$data$panel)[1], "air of the room")
+  fit <- linear_fit(m)
+  expect_output(print(discrepancy(fit)), "Discrepancy of air of the room")
+  expect_true("Ti" %in% names(generics::augment(fit)))
+  expect_match(response_mechanism("Gv", m)$sentence, "^air of the room responds to Gv")
+  for (wrong in list("", 1, NA_character_, c("a", "b")))
+    expect_error(linear_measurements(label = wrong), "label", class = "amiss_error_input")
+  plain <- linear_measurements()
+  expect_null(plain$label)
+  expect_output(print(plain), "target Ti, noise")
+})

@@ -277,3 +277,87 @@ test_that("codes and the range that the record declares hold in a table to predi
   expect_no_warning(table <- predict(fit, new_table("Te", 20:23, -9999)))
   expect_lt(table$mean[20], -1000)
 })
+
+# ---- forecasts
+
+# A record whose model lacks the sun, with an autocorrelated error.
+forecast_fit_of <- function(...) {
+  data <- linear_data(300, seed = 21)
+  data$Ti <- data$Ti + 0.004 * data$Gv + withr::with_seed(4, as.numeric(
+    stats::arima.sim(list(ar = 0.9), 300, sd = 0.1)))
+  linear_fit(linear_measurements(data, validate = data$hour > 220, ...))
+}
+
+test_that("forecasts are those of the joint normal distribution of all rows", {
+  fit <- forecast_fit_of()
+  draw <- amiss:::even_draws(fit, 1)
+  chain <- amiss:::forecast_chain(fit, fit$measurements, c("calibrate", "validate"), draw, 1)
+  known <- lapply(c(1, 5), function(k) amiss:::known_by(chain, k))
+  left <- chain$y - chain$runs[, 1]
+  found <- amiss:::forecast_draw(fit, draw, left, chain, known)
+  error <- amiss:::draw_errors(fit, draw)
+  calibrated <- seq_along(fit$rows)
+  expect_identical(chain$hours[calibrated], fit$measurements$hours[fit$rows])
+  limit <- if (is.finite(error$limit)) error$limit else 1e12
+  e <- chain$moves[calibrated, , drop = FALSE]
+  inner <- solve(crossprod(e) + diag(1e-9, ncol(e)))
+  # The responses elsewhere keep out of the same combinations of the parameters.
+  withheld <- inner %*% crossprod(e, chain$phi[calibrated, ] -
+    solve(diag(nrow(e)) + (tcrossprod(e) / limit) %*% (tcrossprod(e) / limit),
+          chain$phi[calibrated, ]))
+  psi <- chain$phi - chain$moves %*% withheld
+  apart <- abs(outer(chain$hours, chain$hours, "-"))
+  covariance <- psi %*% (error$spread * t(psi)) + diag(error$white, length(left)) +
+    Reduce(`+`, Map(function(v, t) v * exp(-apart / t), error$slow, fit$control$error_times))
+  for (k in 1:2) for (i in c(2, 40, 221, 290)) {
+    before <- seq_len(known[[k]][i])
+    if (!length(before)) next
+    gain <- solve(covariance[before, before], covariance[before, i])
+    expect_equal(found$mean[i, k], sum(gain * left[before]), tolerance = 1e-6)
+    expect_equal(found$sd[i, k]^2, covariance[i, i] - sum(gain * covariance[before, i]),
+                 tolerance = 1e-6)
+  }
+})
+
+test_that("one step ahead is known best, and any better than by the simulation alone", {
+  fit <- forecast_fit_of()
+  ahead <- predict(fit, use = "validate", horizon = c(24, 1, 4))
+  expect_s3_class(ahead, "amiss_forecast")
+  expect_identical(unique(ahead$horizon), c(1, 4, 24))
+  scores <- summary(ahead)
+  expect_identical(scores$rows, rep(80L, 3))
+  expect_true(all(scores$crps[1] < scores$crps[-1]))
+  simulated <- amiss:::prediction_scores(predict(fit, use = "validate"))$validate
+  expect_lt(scores$rmse[1], 0.5 * simulated[["rmse"]])
+  expect_lt(scores$rmse[3], simulated[["rmse"]])
+  # 80 rows that agree with their neighbours hold as much as some 20: a share of 0.95 has a standard
+  # error of 0.05.
+  expect_true(all(abs(scores$coverage - 0.95) < 0.15))
+  expect_identical(predict(fit, use = "validate", horizon = c(24, 1, 4)), ahead)
+})
+
+test_that("forecasts of a table know its rows before, if they were measured", {
+  fit <- forecast_fit_of()
+  later <- linear_data(60, seed = 22)
+  names(later)[names(later) == "hour"] <- "time"
+  later$time <- later$time + 1000
+  later$Ti <- later$Ti + 0.004 * later$Gv + 2
+  known <- predict(fit, later, horizon = 1)
+  unknown <- predict(fit, transform(later, Ti = replace(Ti, 11:60, NA)), horizon = 1)
+  expect_equal(known$mean[1:11], unknown$mean[1:11])
+  expect_lt(abs(mean((known$observed - known$mean)[30:60])), 0.5)
+  expect_gt(abs(mean(later$Ti[30:60] - unknown$mean[30:60])), 1)
+  blind <- predict(fit, later[names(later) != "Ti"], horizon = 1)
+  expect_equal(blind$mean[1], known$mean[1])
+  expect_identical(nrow(summary(unknown)), 1L)
+})
+
+test_that("what a forecast cannot be is said", {
+  fit <- plain_linear_fit()
+  for (wrong in list(0, 1.5, "a", NA, numeric()))
+    expect_error(predict(fit, horizon = wrong), "horizon", class = "amiss_error_input")
+  expect_error(predict(fit, horizon = 1, discrepancy = TRUE), "takes the discrepancy along",
+               class = "amiss_error_input")
+  expect_error(predict(fit, horizon = 1, interval = "confidence"), "new measurements",
+               class = "amiss_error_input")
+})

@@ -399,7 +399,7 @@ test_that("a study prints as a person reads it, and is a list still", {
   told <- printed(study)
   for (part in c("twinhouse_O5.*Twin House O5, living-room", "mechanisms of the catalogue",
                  "624 rows of 1 h, from 2013-08-30 01:00:00 to 2013-10-01.* 336 calibrate, 240 val",
-                 "target Ti \\[K\\], noise 0.1 K", "sun from the south \\[W/m",
+                 "target air of the living room \\[K\\], noise 0.1 K", "sun from the south \\[W/m",
                  "model: a zone with 9", "8 mechanisms: south solar aperture", "options: seed = 1",
                  "next: .*run_study")) {
     expect_match(told, part)
