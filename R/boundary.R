@@ -133,11 +133,11 @@ condition_label <- function(measurements, names) {
 
 record_labels <- function(measurements) {
   unlist(lapply(unname(each_record(measurements)), function(m) {
-    c(m$labels, if (!is.null(m$label)) stats::setNames(m$label, m$target))
+    c(m$labels, if (!is.null(m[["label"]])) stats::setNames(m[["label"]], m$target))
   }))
 }
 
-target_label <- function(measurements) measurements$label %||% measurements$target
+target_label <- function(measurements) measurements[["label"]] %||% measurements$target
 
 told_condition <- function(labels, names) {
   at <- match(names, names(labels))

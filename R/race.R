@@ -32,9 +32,8 @@ second_look <- function(present, trials, context) {
     bar <- bar_of(trials, present, context)
     before <- trials[[name]]
     trials[[name]] <- staged(paste(name, "again"), widened_trial(before, present, bar, context))
-    if (trials[[name]]$mode != before$mode) report_trial(trials[[name]], present, context)
-    is_decisive <- is_ahead(trials[[name]], present, replace(bar, "standing", -Inf))
-    if (!is_decisive || is_refused(trials[[name]], present)) next
+    if (trials[[name]]$mode == before$mode) next
+    report_trial(trials[[name]], present, context)
     trials <- race(present, trials, context)
     if (has_cause(trials, present, context)) return(trials)
   }

@@ -188,11 +188,12 @@ verify_trial <- function(model, present, context) {
 
 # A trial searched again from runs over all priors, far from where it ended: an extension may have a
 # better mode there, with another part of the model in the place that its mechanism takes. As it was
-# if none is found.
+# if no higher mode is found, or if what runs confirm of the new one is no better.
 widened_trial <- function(trial, present, bar, context) {
   model <- over_priors(trial, context)
   modes <- list(own_mode(trial, context))
-  for (start in start_runs(model, trial$mode)[-1]) {
+  made <- setdiff(seq_len(nrow(model$runs$z)), seq_len(nrow(trial$runs$z)))
+  for (start in start_runs(model, trial$mode, made)[-1]) {
     if (is_spent(context)) break
     search <- begin_search(model, start, regression_slopes(model, start), rules$scout_stale)
     search <- run_search(search, context)
@@ -201,10 +202,12 @@ widened_trial <- function(trial, present, bar, context) {
   }
   found <- ranked_modes(model, modes, context)
   best <- found$modes[[1]]
+  own <- Find(function(mode) mode$at == trial$mode, found$modes)
   trial$runs <- found$model$runs
-  if (best$at == trial$mode) return(trial)
+  if (best$value - own$value < rules$same_height) return(trial)
   again <- tried_model(with_modes(trial, list(best), context$seed), present, bar, context)
-  if (standing_of(again, present) > standing_of(trial, present)) return(again)
+  is_better <- standing_of(again, present) > standing_of(trial, present)
+  if (is_better || !is_confirmed(again)) return(again)
   trial$runs <- again$runs
   trial
 }

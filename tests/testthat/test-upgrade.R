@@ -223,6 +223,27 @@ test_that("a mechanism that replaces a parameter of the model is tried without t
   expect_lt(abs(factor), 0.5)
 })
 
+# The better of two places is a narrow one, of which a trial's first look says nothing.
+test_that("a trial that ended at a poor mode is searched again from runs over its priors", {
+  bump <- function(place) 0.6 * exp(-((place - 0.2) / 0.25)^2) + exp(-((place - 0.85) / 0.08)^2)
+  hidden <- adding("hidden",
+                   function(values, drivers) 0.01 * bump(values[["place"]]) * drivers[, "Gv"],
+                   free("place", uniform(0, 1)), boundary = "Gv")
+  present <- present_model()
+  bar <- list(factor = 2, standing = -Inf, leader = present$model)
+  poor <- amiss:::try_mechanism(present$model, "hidden",
+                                list(amiss:::extend(linear_simulator(), hidden)), NULL, bar,
+                                present$context)
+  place <- function(trial) {
+    unit <- amiss:::to_unit(trial$runs$z[trial$mode, , drop = FALSE], trial$space)
+    amiss:::unit_to_values(unit, trial$parameters)[1, "place"]
+  }
+  expect_lt(place(poor), 0.3)
+  better <- amiss:::widened_trial(poor, present$model, bar, present$context)
+  expect_equal(place(better), 0.85, tolerance = 0.02, ignore_attr = TRUE)
+  expect_lt(amiss:::least_error(better), 0.5 * amiss:::least_error(poor))
+})
+
 test_that("a mechanism that changes nothing costs its first look, and appears in no odds", {
   alone <- loop(sun)
   expect_warning(upgrade <- loop(nothing, sun), "\"nothing\" changes nothing",
