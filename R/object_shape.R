@@ -36,7 +36,8 @@ object_shapes <- list(
     noise_sd = "real[1]", noise = "list",
     raw = ":raw", per_step = "real[1]", step_h = "real[1]", time = "values[n]", hours = "real[n]",
     segment = "real[n]", use = "text[n]", y = "number[n]", standard_error = "number[n]",
-    boundary = "number[n,c]", condition = "real[c]", conditions = "text", labels = "?text",
+    block = "number", boundary = "number[n,c]", condition = "real[c]", conditions = "text",
+    labels = "?text",
     units = "?text", constant = "?text",
     time_format = "?text[1]", time_zone = "?text[1]", stamp = "?text[1]", findings = "?table",
     faulty = "?number", missing = "?number", range = "?number[2]"),
@@ -100,7 +101,7 @@ object_shapes <- list(
   model = c(name = "text[1]", fit = "amiss_fit|amiss_joint", prediction = "any", scores = "list"),
   amiss_comparison = c(method = "text[1]", models = "some:compared", tables = ":tables",
                        measurements = "amiss_measurements", control = "list", truth = "?list"),
-  tables = c(evidence = "table", criteria = "table", ranking = "?table", attribution = "?table",
+  tables = c(evidence = "table", criteria = "table", ranking = "?table", attribution = "table",
              parameters = "?table"),
   compared = c(name = "text[1]", fit = "amiss_fit", prediction = "any", scores = "list"),
   amiss_ais = c(log_evidence = "estimate[1]", standard_error = "estimate[1]",
@@ -147,10 +148,16 @@ object_rules <- list(
   },
   amiss_calibration = function(x) {
     length(x$centre) == length(x$control$time_constants) * ncol(x$measurements$boundary)
+  },
+  amiss_comparison = function(x) {
+    needed <- c("model", "boundary", "significant",
+                if (x$method == "paper") c("difference", "lower95", "upper95", "rank")
+                else c("log10_bf_dropped", "p_value"))
+    all(needed %in% names(x$tables$attribution))
   })
 
 rule_parts <- c(amiss_measurements = "conditions", amiss_fit = "rows",
-                amiss_calibration = "coefficients")
+                amiss_calibration = "coefficients", amiss_comparison = "tables")
 
 # NULL for an object that has all its parts, or list(absent) or list(part, value, expected) of the
 # first that is wrong.

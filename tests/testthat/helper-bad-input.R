@@ -117,7 +117,7 @@ valid_calls <- function() {
                         noise_sd = 0.1, average = NULL, calibrate = 1:60 <= 45,
                         validate = 1:60 > 45, warmup = 0, name = "a", unit = "K",
                         time_format = NULL, time_zone = NULL, fill_gaps = 0, missing = NULL,
-                        range = NULL, stamp = NULL),
+                        range = NULL, stamp = NULL, label = NULL),
     mechanism = list(name = "a", edit = identity, boundary = "Te", sentence = "A."),
     normal = list(mean = 0, sd = 1, lower = -Inf, upper = Inf),
     outputs_of = list(simulator = o$function_simulator, outputs = "a"),
