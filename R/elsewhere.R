@@ -8,8 +8,7 @@ rows_used <- function(measurements, use) which(measurements$use %in% use & !is.n
 carried_response <- function(fit, use, threads, record = fit$measurements) {
   rows <- rows_used(record, use)
   responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
-  moves <- if (any(fit$withheld != 0)) moves_at(fit, use, threads, record)
-           else matrix(0, length(rows), nrow(fit$withheld))
+  moves <- withheld_moves(fit, use, threads, record)
   left <- left_by_mean(fit) - rowMeans(seen_response(fit))
   list(response = lacking_response(fit, responses, moves),
        sd = sqrt(sum(left^2) / max(1, length(left) - length(fit$emulator$parameters))))
@@ -19,6 +18,12 @@ carried_response <- function(fit, use, threads, record = fit$measurements) {
 seen_response <- function(fit) {
   responses <- filter_responses(fit$measurements, fit$control$time_constants)
   lacking_response(fit, responses[fit$rows, , drop = FALSE], simulator_moves(fit$emulator))
+}
+
+# simulator_moves() at the rows of these uses, or zeros if nothing is withheld along them.
+withheld_moves <- function(fit, use, threads, record) {
+  if (any(fit$withheld != 0)) return(moves_at(fit, use, threads, record))
+  matrix(0, length(rows_used(record, use)), nrow(fit$withheld))
 }
 
 # simulator_moves() at other rows.

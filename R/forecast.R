@@ -5,10 +5,10 @@
 forecast_fit <- function(fit, record, use, picked, horizon, level, seed, threads) {
   chain <- forecast_chain(fit, record, use, picked, threads)
   known <- lapply(horizon, function(k) known_by(chain, k * record$step_h))
-  found <- lapply(seq_along(picked), function(i) {
-    forecast_draw(fit, picked[i], chain$y - chain$runs[, i], chain, known)
+  found <- lapply(seq_along(chain$draws), function(i) {
+    forecast_draw(fit, chain$draws[i], chain$y - chain$runs[, i], chain, known)
   })
-  members <- rep_len(seq_along(picked), predicted_samples)
+  members <- rep_len(seq_along(found), predicted_samples)
   tables <- lapply(seq_along(horizon), function(k) {
     of_draws <- function(what) {
       do.call(cbind, lapply(found, function(draw) draw[[what]][chain$asked, k]))
@@ -24,7 +24,7 @@ forecast_fit <- function(fit, record, use, picked, horizon, level, seed, threads
 
 # What the filter passes through: the rows of calibration and those asked for, of one record in the
 # order of time, those of another record after them. `part` changes where nothing of the error
-# before is left.
+# before is left. Draws at which the simulator fails are left out.
 forecast_chain <- function(fit, record, use, picked, threads) {
   same <- identical(record, fit$measurements)
   others <- if (same) setdiff(use, "calibrate") else use
@@ -36,12 +36,16 @@ forecast_chain <- function(fit, record, use, picked, threads) {
   use_of <- joined("use")
   order <- if (same) order(joined("hours")) else seq_along(of_part)
   part <- if (same) joined("segment") else paste(of_part, joined("segment"))
-  list(runs = joined("runs", rbind)[order, , drop = FALSE], y = joined("y")[order],
+  runs <- joined("runs", rbind)[order, , drop = FALSE]
+  made <- colSums(!is.finite(runs)) == 0
+  if (!any(made))
+    abort_numerical("The simulator failed at every one of the {length(picked)} posterior draws.")
+  list(runs = runs[, made, drop = FALSE], draws = picked[made], y = joined("y")[order],
        hours = joined("hours")[order], part = part[order],
        later = if (same) integer(length(order)) else of_part,
        phi = joined("phi", rbind)[order, , drop = FALSE],
        moves = joined("moves", rbind)[order, , drop = FALSE],
-       calibrated = parts[[1]]$phi,
+       calibrated = parts[[1]][c("phi", "moves")],
        asked = if (same) use_of[order] %in% use else of_part == 2)
 }
 
@@ -49,15 +53,11 @@ chain_part <- function(fit, record, use, picked, threads) {
   rows <- rows_used(record, use)
   runs <- simulate_measured(fit$emulator$simulator, fit$values[picked, , drop = FALSE], record,
                             use, threads)
-  if (!all(is.finite(runs)))
-    abort_numerical("The simulator failed at some of the {length(picked)} posterior draws.")
-  responses <- filter_responses(record, fit$control$time_constants)[rows, , drop = FALSE]
   moves <- if (identical(use, "calibrate")) simulator_moves(fit$emulator)
-           else if (any(fit$withheld != 0)) moves_at(fit, use, threads, record)
-           else matrix(0, length(rows), nrow(fit$withheld))
+           else withheld_moves(fit, use, threads, record)
   list(runs = runs, hours = record$hours[rows], segment = record$segment[rows],
        y = (record$observed %||% record$y)[rows], use = record$use[rows],
-       phi = sweep(sweep(responses, 2, fit$centre), 2, fit$scale, "/"), moves = moves)
+       phi = standardised_responses(fit, record, rows), moves = moves)
 }
 
 # For each row of the chain the last row that could be known `lead` hours before; 0: none.
@@ -74,27 +74,28 @@ known_by <- function(chain, lead) {
 forecast_draw <- function(fit, draw, left, chain, known) {
   error <- draw_errors(fit, draw)
   acts <- error$spread > 0
-  withheld <- withheld_by(chain$calibrated, simulator_moves(fit$emulator), error$limit)
+  withheld <- withheld_by(chain$calibrated$phi, chain$calibrated$moves, error$limit)
   columns <- (chain$phi - chain$moves %*% withheld)[, acts, drop = FALSE]
   times <- fit$control$error_times
-  mean <- sd <- matrix(0, length(left), length(known))
   last <- unlist(known)
   of_last <- split(seq_along(last), factor(last, seq(0, length(left))))
   look_ahead <- function(i, state, covariance) {
     at <- of_last[[i + 1]]
-    if (!length(at)) return()
+    if (!length(at)) return(NULL)
     rows <- (at - 1) %% length(left) + 1
     keeps <- exp(-outer(chain$hours[rows] - chain$hours[max(i, 1)], 1 / times))
     keeps[i == 0 | chain$part[rows] != chain$part[max(i, 1)], ] <- 0
     h <- cbind(columns[rows, , drop = FALSE], keeps)
-    mean[at] <<- h %*% state
-    sd[at] <<- sqrt(rowSums((h %*% covariance) * h) + (1 - keeps^2) %*% error$slow + error$white)
+    list(at = at, mean = h %*% state,
+         variance = rowSums((h %*% covariance) * h) + (1 - keeps^2) %*% error$slow + error$white)
   }
   steps <- c(Inf, diff(chain$hours))
   steps[c(TRUE, chain$part[-1] != chain$part[-length(left)])] <- Inf
-  filter_rows(left, columns, error$spread[acts], exp(-outer(steps, 1 / times)), error$slow,
-              error$white, look_ahead)
-  list(mean = mean, sd = sd)
+  seen <- filter_rows(left, columns, error$spread[acts], exp(-outer(steps, 1 / times)), error$slow,
+                      error$white, look_ahead)$seen
+  said <- function(what) unlist(lapply(seen, `[[`, what))
+  in_place <- function(x) matrix(x[order(said("at"))], length(left))
+  list(mean = in_place(said("mean")), sd = in_place(sqrt(said("variance"))))
 }
 
 #' @rdname predict.amiss_fit

@@ -48,10 +48,10 @@ draw_errors <- function(fit, draw) {
        white = variance, limit = reach * fit$measurements$noise_sd^2)
 }
 
-# The responses to conditions at the calibration rows, as the posterior takes them.
-standardised_responses <- function(fit) {
-  responses <- filter_responses(fit$measurements, fit$control$time_constants)
-  sweep(sweep(responses[fit$rows, , drop = FALSE], 2, fit$centre), 2, fit$scale, "/")
+# The responses to conditions, as the posterior takes them, at rows of its record or of another.
+standardised_responses <- function(fit, record = fit$measurements, rows = fit$rows) {
+  responses <- filter_responses(record, fit$control$time_constants)
+  sweep(sweep(responses[rows, , drop = FALSE], 2, fit$centre), 2, fit$scale, "/")
 }
 
 # X with which (I + (E E' / limit)^2)^-1 of the responses is the responses less E X, E the moves.
@@ -64,14 +64,15 @@ withheld_by <- function(responses, moves, limit) {
 # Kalman filter (Durbin and Koopman 2012, chapter 4): list(error, sd) of each row, predicted from
 # those before it. The states are the coefficients of the columns, which stay, and the
 # autocorrelated errors; `kept` is what each of these keeps of the row before. A row that was not
-# measured teaches nothing. `look(i, state, covariance)` sees what is known after row i, 0 at first.
+# measured teaches nothing. `look(i, state, covariance)` sees what is known after row i, 0 at first;
+# what it says is returned as `seen`.
 filter_rows <- function(left, columns, spread, kept, slow, white, look = function(...) NULL) {
   steady <- seq_along(spread)
   moving <- length(spread) + seq_along(slow)
   state <- numeric(length(spread) + length(slow))
   covariance <- diag(c(spread, slow), length(state))
   error <- sd <- numeric(length(left))
-  look(0, state, covariance)
+  seen <- list(look(0, state, covariance))
   for (i in seq_along(left)) {
     keeps <- c(rep(1, length(steady)), kept[i, ])
     state <- keeps * state
@@ -87,7 +88,7 @@ filter_rows <- function(left, columns, spread, kept, slow, white, look = functio
       state <- state + shared * (error[i] / variance)
       covariance <- covariance - tcrossprod(shared) / variance
     }
-    look(i, state, covariance)
+    seen[i + 1] <- list(look(i, state, covariance))
   }
-  list(error = error, sd = sd)
+  list(error = error, sd = sd, seen = seen)
 }
