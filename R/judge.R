@@ -48,8 +48,8 @@ doubts <- list(
                       "two that imitate a third together look like this"),
   alone = doubt(function(case) {
     if (length(case$unsettled)) {
-      sprintf(paste("%s, adopted after it, may be the cause by itself: the numbers of its trial",
-                    "without it are not trusted"), listed(case$unsettled))
+      sprintf("%s, adopted after it, may be the cause by itself: it comes as near without it",
+              listed(case$unsettled))
     }
   }, "what is adopted later may make it needless"),
   edge = doubt(function(case) {
@@ -112,7 +112,8 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads, l
        entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain,
        no_gain = isFALSE(gain$improves),
        others = 1 - row$probability - sum(trials$probability[trials$mechanism %in% later]),
-       unsettled = intersect(later, trials$mechanism[trials$trusted %in% FALSE]),
+       unsettled = later[vapply(models[-seq_len(k)],
+                                function(m) model$mechanism %in% m$may_replace, NA)],
        confounded = confounded_parameters(model$fit, new),
        drift = drift, slow = drift && acts_as_drift(parent$fit, model$fit, threads, left))
 }

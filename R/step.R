@@ -7,7 +7,8 @@ first_state <- function(started, catalogue, runs, context) {
   measured <- staged("base", measured_model(base, context))
   report_model(measured, context)
   list(present = base, models = list(measured), started = started, catalogue = catalogue,
-       candidates = NULL, responses = NULL, off = list(), base = names(base$parameters))
+       former = list(), candidates = NULL, responses = NULL, off = list(),
+       base = names(base$parameters))
 }
 
 next_step <- function(state, context) {
@@ -37,9 +38,13 @@ next_step <- function(state, context) {
     return(c(state, list(stopped = no_winner(table, last_model(state$models), context))))
   }
   context$say("Adopted {.strong {best$mechanism}}: log10 Bayes factor {round(best$log10_bf, 1)}")
-  state$present <- trials[[best$mechanism]]
-  measured <- measured_model(state$present, context)
+  adopted <- trials[[best$mechanism]]
+  measured <- measured_model(adopted, context)
+  measured$may_replace <- staged(paste(best$mechanism, "without others"),
+                                 may_replace(adopted, state, context))
   report_model(measured, context)
+  state$former <- c(state$former, list(state$present))
+  state$present <- adopted
   state$models <- c(state$models, list(measured))
   state
 }
@@ -74,6 +79,40 @@ reason_to_stop <- function(state, context) {
 budget_words <- function(context) {
   sprintf("the budget of %d runs of the simulator was spent",
           as.integer(context$control$runs_total))
+}
+
+# ---- a step backwards
+
+# Mechanisms adopted before that the one adopted now may make needless. Its own trial, without them,
+# may have ended at a poor mode. If that trial is not trusted, it is searched from the mode of both;
+# if that comes nearer to the record than the earlier mechanism did, the earlier one is needless.
+may_replace <- function(adopted, state, context) {
+  presents <- c(state$former, list(state$present))
+  needless <- vapply(seq_along(state$former), function(k) {
+    own <- state$candidates[state$candidates$from == presents[[k]]$name &
+                              state$candidates$mechanism == adopted$mechanism, ]
+    if (!any(own$trusted %in% FALSE)) return(FALSE)
+    alone <- error_alone(adopted, replace(state, "present", presents[k]), context)
+    is.na(alone) || alone < left_over_noise(presents[[k + 1]])
+  }, NA)
+  vapply(presents[-1], `[[`, "", "mechanism")[needless]
+}
+
+# The error of the present model of `state` with the mechanism of `full`, at the best that a search
+# from the mode of `full` finds; NA if there is no such model, or no run is left.
+error_alone <- function(full, state, context) {
+  simulators <- tryCatch(extended_simulators(state$catalogue[[full$mechanism]], state),
+                         amiss_error_edit = function(e) NULL)
+  if (is.null(simulators) || is_given(simulators)) return(NA_real_)
+  model <- new_model(simulators, state$present$records)
+  kept <- match(names(model$parameters), names(full$parameters))
+  if (anyNA(kept)) return(NA_real_)
+  made <- with_runs(model, full$runs$z[full$least$at, kept, drop = FALSE], context)
+  if (!any(succeeded(made$model))) return(NA_real_)
+  search <- begin_search(made$model, made$at, full$least$slopes[, kept, drop = FALSE],
+                         rules$trial_stale, rules$trial_steps)
+  search <- descend(search, context)
+  left_over_noise(replace(search$model, "least", list(search["at"])))
 }
 
 # ---- trials
