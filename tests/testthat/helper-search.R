@@ -41,3 +41,6 @@ stores_simulator <- function(first = free("first", uniform(0.5, 12), "h"),
     20 + 8 * routed(routed(drivers[, "Te"], values[["first"]]), values[["second"]])
   }, first, second, boundary = "Te")
 }
+
+space_of <- function(...)
+  amiss:::coordinates_of(lapply(list(...), function(prior) free("k", prior)))
