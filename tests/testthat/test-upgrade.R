@@ -211,7 +211,7 @@ two_adopted <- function(first, second) {
        adopted = with_both, context = base$context)
 }
 
-test_that("what is adopted later is searched without what was adopted before, from the mode of both", {
+test_that("what is adopted later is searched without what was before, from the mode of both", {
   found <- two_adopted(drift, sun)
   expect_identical(amiss:::may_replace(found$adopted, found$state, found$context), "drift")
   # As near as least squares on the simulator with the sun alone comes.
