@@ -3,12 +3,19 @@
 attribution_title <- function(attributions) {
   named <- lapply(attributions, function(a) significant_conditions(a$table))
   if (length(named) < 2)
-    return(paste("The discrepancy of the model follows",
-                 listed(named[[1]], none = "no boundary condition")))
+    return(paste("The remaining error follows", strongest(named[[1]])))
   if (!length(named[[1]]) && !length(named[[2]]))
     return("The remaining error follows no boundary condition, neither before nor after")
-  sprintf("Before, the remaining error follows %s; after the change it follows %s",
-          listed(named[[1]]), listed(named[[2]]))
+  sprintf("The remaining error follows %s before the change, %s after it", strongest(named[[1]]),
+          strongest(named[[2]]))
+}
+
+# At most three conditions, in the order of their evidence: the figure itself lists them all.
+strongest <- function(conditions) {
+  shown <- if (length(conditions) > 3) 2 else 3
+  others <- length(conditions) - shown
+  listed(c(utils::head(conditions, shown), if (others > 0) sprintf("%d others", others)),
+         none = "no boundary condition")
 }
 
 # For each condition that is significant, its shares of the misfit in the order of the stages.

@@ -123,18 +123,27 @@ with_least <- function(model, context) {
   model
 }
 
-# The slopes there by differences, because what the discrepancy keeps out of depends on them; the
-# search goes on as long as they promise that it comes nearer to the record.
+# What the discrepancy keeps out of depends on the slopes there, so they are taken by differences: at
+# the run at which a search by those of other runs converges, as slopes of where it came from would
+# be off by what they turn on the way.
 with_exact_least <- function(model, context) {
   model <- with_least(model, context)
   if (isTRUE(model$least$exact)) return(model)
+  model <- converged_least(model, least_reference(model), context)
   found <- difference_slopes(model, model$least$at, context)
   model <- found$model
   if (is.null(found$slopes)) return(model)
-  search <- begin_search(model, model$least$at, found$slopes, found$stale, gain = rules$least_gain)
+  model <- converged_least(model, found, context)
+  model$least$exact <- TRUE
+  model
+}
+
+# The search goes on from there as long as `known` slopes promise that it comes nearer to the record.
+converged_least <- function(model, known, context) {
+  search <- begin_search(model, model$least$at, known$slopes, known$stale, gain = rules$least_gain)
   search <- descend(search, context)
   model <- search$model
-  model$least <- list(at = search$at, slopes = search$slopes, exact = TRUE)
+  model$least <- search[c("at", "slopes")]
   model
 }
 

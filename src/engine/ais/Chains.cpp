@@ -1,5 +1,6 @@
 #include "engine/ais/Chains.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -15,6 +16,7 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double kLeaps = 1.0 / 3.0;       // share of chains that leap
 constexpr int kLeapfrogs = 4;              // of one Hamiltonian move
 constexpr int kConditionalLeapfrogs = 12;  // which are cheap
 
@@ -42,20 +44,22 @@ Heights heights(const AnnealingPath& path, const MatrixXd& x, const Context& con
 }
 
 // Moves each chain with probability min(1, exp(log_ratio)), never to where the likelihood is zero; returns
-// the share that moved.
+// the share that moved of those that `count`.
 double accept(Chains& chains, const MatrixXd& proposed, const Heights& at, const VectorXd& log_ratio,
-              Stream& stream) {
-  int accepted = 0;
+              Stream& stream, const std::vector<bool>& count = {}) {
+  int accepted = 0, counted = 0;
   for (Index i = 0; i < chains.size(); ++i) {
     const double log_u = std::log(stream.uniform());
+    const int counts = count.empty() || count[static_cast<std::size_t>(i)];
+    counted += counts;
     if (!std::isfinite(at.ll[i]) || !(log_u < log_ratio[i])) continue;
     chains.x.col(i) = proposed.col(i);
     chains.ll[i] = at.ll[i];
     chains.reference[i] = at.reference[i];
     chains.rise[i] = at.rise[i];
-    ++accepted;
+    accepted += counts;
   }
-  return static_cast<double>(accepted) / static_cast<double>(chains.size());
+  return static_cast<double>(accepted) / static_cast<double>(std::max(1, counted));
 }
 
 }  // namespace
@@ -99,12 +103,19 @@ void Chains::resample(Stream& stream) {
 double crank_nicolson_move(const AnnealingPath& path, Chains& chains, double beta, const PartMove& part,
                            Stream& stream, const Context& context) {
   MatrixXd proposed = chains.x;
-  const StudentT::Step step =
+  StudentT::Step step =
       part.proposal.step(part.bend.straight(chains.x.middleRows(part.first, part.size)), part.step, stream);
   proposed.middleRows(part.first, part.size) = part.bend.bent(step.to);
+  std::vector<bool> steps(static_cast<std::size_t>(chains.size()), true);
+  for (Index i = 0; part.first == 0 && path.target.has_leaps() && i < chains.size(); ++i) {
+    if (!(stream.uniform() < kLeaps)) continue;
+    steps[static_cast<std::size_t>(i)] = false;
+    proposed.col(i) = chains.x.col(i);
+    step.back[i] = path.target.leap(proposed.col(i), stream);
+  }
   const Heights at = heights(path, proposed, context);
   const VectorXd log_ratio = beta * (at.rise - chains.rise) + at.reference - chains.reference + step.back;
-  return accept(chains, proposed, at, log_ratio, stream);
+  return accept(chains, proposed, at, log_ratio, stream, steps);
 }
 
 bool hamiltonian(const Target& target, const AisOptions& options) {

@@ -55,8 +55,8 @@ struct Level {
   int sweeps;  ///< moves of every chain in every part
 };
 
-/// One Crank-Nicolson move of every chain in one part, reversible in its proposal; returns the share
-/// accepted.
+/// One Crank-Nicolson move of every chain in one part, reversible in its proposal; if the target has leaps, a
+/// third of the chains leap in its first part instead. Returns the share of the former that was accepted.
 double crank_nicolson_move(const AnnealingPath& path, Chains& chains, double beta, const PartMove& part,
                            Stream& stream, const Context& context);
 

@@ -1,9 +1,11 @@
 #pragma once
+#include <limits>
 #include <memory>
 #include <vector>
 
 #include "engine/ais/Conditional.hpp"
 #include "engine/linalg/Eigen.hpp"
+#include "engine/random/Stream.hpp"
 
 namespace amiss {
 
@@ -27,6 +29,16 @@ class Target {
   /// Hamiltonian moves along that part.
   virtual bool has_conditional() const { return false; }
   virtual std::unique_ptr<Conditional> along_last_part(const Eigen::MatrixXd& /*x*/) const { return nullptr; }
+
+  /// A target with coordinates that choose between settings, between which its likelihood jumps, says so and
+  /// overrides the next function; chains then leap from setting to setting too. Those coordinates belong to
+  /// the first part.
+  virtual bool has_leaps() const { return false; }
+  /// Takes x to a setting next to its own, the other coordinates to where it fits as well. A leap and its way
+  /// back are equally probable. Returns log |dx' / dx|; -infinity if there is no such setting.
+  virtual double leap(Eigen::Ref<Eigen::VectorXd> /*x*/, Stream& /*stream*/) const {
+    return -std::numeric_limits<double>::infinity();
+  }
 
   /// How many points are asked for at once, at most; several such blocks share the threads.
   virtual Eigen::Index block() const { return 16; }

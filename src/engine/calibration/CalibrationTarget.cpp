@@ -96,6 +96,18 @@ MatrixXd CalibrationTarget::unit(const MatrixXd& x) const {
   return x.bottomRows(parameters_).transpose().unaryExpr(&normal_cdf);
 }
 
+// A record that has no settings is left as it is, which is no leap.
+double CalibrationTarget::leap(Eigen::Ref<VectorXd> x, Stream& stream) const {
+  const auto k = static_cast<std::size_t>(stream.index(static_cast<int>(records_.size())));
+  if (!coordinates_[k].has_leaps()) return kImpossible;
+  return coordinates_[k].leap(x.segment(first_[k], coordinates_[k].dimension()), stream);
+}
+
+bool CalibrationTarget::has_leaps() const {
+  return std::any_of(coordinates_.begin(), coordinates_.end(),
+                     [](const HistoryCoordinates& record) { return record.has_leaps(); });
+}
+
 HistoryParameters CalibrationTarget::history(const VectorXd& x, std::size_t record) const {
   return coordinates_[record].parameters(x.segment(first_[record], coordinates_[record].dimension()));
 }

@@ -26,6 +26,9 @@ class CalibrationTarget : public Target {
   bool has_conditional() const override { return true; }
   std::unique_ptr<Conditional> along_last_part(const Eigen::MatrixXd& x) const override;
 
+  bool has_leaps() const override;
+  double leap(Eigen::Ref<Eigen::VectorXd> x, Stream& stream) const override;  ///< of one record's error
+
   HistoryParameters history(const Eigen::VectorXd& x, std::size_t record = 0) const;
   std::vector<HistoryParameters> histories(const Eigen::VectorXd& x) const;  ///< of each record
   Eigen::MatrixXd unit(const Eigen::MatrixXd& x) const;  ///< parameters in the unit cube, n x P

@@ -4,6 +4,7 @@
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/special_functions/beta.hpp>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "engine/linalg/constants.hpp"
@@ -53,6 +54,46 @@ double HistoryCoordinates::noise_variance(double share) const {
   return sd * sd * share / (1.0 - share);
 }
 
+double HistoryCoordinates::noise_slope(double x, double share) const {
+  const double shape = model_->priors().noise_shape;
+  return noise_variance(share) * normal_density(x) /
+         (share * (1.0 - share) * boost::math::ibeta_derivative(shape, shape, share, DoublePolicy()));
+}
+
+bool HistoryCoordinates::has_leaps() const {
+  const ErrorOptions& error = model_->priors().error;
+  return error.correlation_times.size() > 0 && error.ratios.size() > 1;
+}
+
+// With the variance of the whole error, sigma^2 (1 + sum_k ratio_k), kept, sigma^2 falls as a ratio rises:
+// the likelihood hardly changes then. The place within a level is kept too, which keeps u = Phi(x_k) uniform.
+double HistoryCoordinates::leap(Eigen::Ref<VectorXd> x, Stream& stream) const {
+  constexpr double kNone = -std::numeric_limits<double>::infinity();
+  const HistoryPriors& priors = model_->priors();
+  const VectorXd& ratios = priors.error.ratios;
+  const int levels = static_cast<int>(ratios.size());
+  const Index components = priors.error.correlation_times.size();
+  const Index row = 1 + stream.index(static_cast<int>(components));
+  const int from = level(x[row], levels), to = from + (stream.uniform() < 0.5 ? -1 : 1);
+  if (to < 0 || to >= levels) return kNone;
+  double whole = 1.0;
+  for (Index k = 1; k <= components; ++k) whole += ratios[level(x[k], levels)];
+  const double change = whole / (whole - ratios[from] + ratios[to]);
+
+  const double before = noise_share(x[0]);
+  const double variance =
+      (noise_variance(before) + priors.discarded_variance) * change - priors.discarded_variance;
+  if (!(variance > 0)) return kNone;
+  const double after = variance / (variance + priors.noise_sd * priors.noise_sd);
+  const VectorXd old = x;
+  const double u = boost::math::ibeta(priors.noise_shape, priors.noise_shape, after, DoublePolicy());
+  x[0] = boost::math::quantile(boost::math::normal(), clamp_unit(u));
+  x[row] = boost::math::quantile(boost::math::normal(),
+                                 clamp_unit(normal_cdf(x[row]) + static_cast<double>(to - from) / levels));
+  return std::log(change * noise_slope(old[0], before) / noise_slope(x[0], after)) +
+         0.5 * (x[row] * x[row] - old[row] * old[row]);
+}
+
 HistoryParameters HistoryCoordinates::parameters(const Eigen::Ref<const VectorXd>& x) const {
   const HistoryPriors& priors = model_->priors();
   HistoryParameters point;
@@ -81,9 +122,8 @@ VectorXd HistoryCoordinates::gradient(const Eigen::Ref<const VectorXd>& x, const
                                       const VectorXd& natural) const {
   const HistoryPriors& priors = model_->priors();
   VectorXd out = VectorXd::Zero(x.size());
-  const double share = noise_share(x[0]), shape = priors.noise_shape;
-  out[0] = natural[0] * noise_variance(share) / point.variance * normal_density(x[0]) /
-           (share * (1.0 - share) * boost::math::ibeta_derivative(shape, shape, share, DoublePolicy()));
+  const double share = noise_share(x[0]);
+  out[0] = natural[0] * noise_slope(x[0], share) / point.variance;
   const Index first = first_condition();
   for (std::size_t a = 0; a < active_.size(); ++a) {
     const Index row = first + static_cast<Index>(a);

@@ -18,6 +18,10 @@ class HistoryCoordinates {
   /// jumps.
   Eigen::VectorXd gradient(const Eigen::Ref<const Eigen::VectorXd>& x, const HistoryParameters& point,
                            const Eigen::VectorXd& natural) const;
+  bool has_leaps() const;  ///< whether there is a grid of errors
+  /// One component of the error to the level next to its own, the variance of the whole error kept; returns
+  /// log |dx' / dx|, or -infinity (Target).
+  double leap(Eigen::Ref<Eigen::VectorXd> x, Stream& stream) const;
   const HistoryModel& model() const { return *model_; }
   const std::vector<int>& active() const { return active_; }  ///< condition of each of the last coordinates
 
@@ -25,6 +29,7 @@ class HistoryCoordinates {
   Eigen::Index first_condition() const;
   double noise_share(double x) const;
   double noise_variance(double share) const;
+  double noise_slope(double x, double share) const;  ///< d noise_variance / dx
 
   const HistoryModel* model_;
   std::vector<int> active_;
@@ -48,6 +53,10 @@ class HistoryTarget : public Target {
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x) const override;
   bool has_gradient() const override { return true; }
   Eigen::VectorXd log_likelihood(const Eigen::MatrixXd& x, Eigen::MatrixXd& gradient) const override;
+  bool has_leaps() const override { return coordinates_.has_leaps(); }
+  double leap(Eigen::Ref<Eigen::VectorXd> x, Stream& stream) const override {
+    return coordinates_.leap(x, stream);
+  }
   HistoryParameters parameters(const Eigen::VectorXd& x) const;
   /// The same point with the coordinate of the reach, if there is one, where it chooses the given one: u of
   /// the way through its interval.

@@ -6,6 +6,8 @@
 
 #include "engine/ais/Sampler.hpp"
 #include "engine/discrepancy/HistoryTarget.hpp"
+#include "engine/linalg/constants.hpp"
+#include "engine/linalg/log_sum_exp.hpp"
 #include "history_helpers.hpp"
 
 namespace amiss {
@@ -56,6 +58,48 @@ TEST(HistoryCoordinates, ErrorComponentsAndReachChooseTheirOwnLevels) {
   }
   // Phi rounds to 1.
   EXPECT_EQ(coordinates.parameters(Eigen::Vector4d(0.0, 40.0, 40.0, 40.0)).setting, kSettings - 1);
+}
+
+TEST(HistoryCoordinates, LeapsKeepTheVarianceOfTheErrorAndKnowTheirJacobian) {
+  HistoryPriors priors = make_priors();
+  priors.discarded_variance = 0.01;
+  const HistoryModel model(make_data(), priors, Context());
+  const HistoryCoordinates coordinates(model, {0});
+  const auto whole = [&](const VectorXd& x) {
+    const HistoryParameters point = coordinates.parameters(x);
+    return point.variance * (1 + priors.error.setting(model.error_of(point.setting)).sum());
+  };
+  int leaps = 0;
+  for (unsigned item = 0; item < 40; ++item) {
+    const VectorXd from = normal_vector(coordinates.dimension(), 200 + item);
+    const auto leap = [&](VectorXd x, double& log_jacobian) {
+      Stream stream(1, 2, item);  // each time the same leap
+      log_jacobian = coordinates.leap(x, stream);
+      return x;
+    };
+    double log_jacobian = 0, other = 0;
+    const VectorXd to = leap(from, log_jacobian);
+    if (!std::isfinite(log_jacobian)) continue;
+    ++leaps;
+    EXPECT_NEAR(whole(to), whole(from), 1e-9 * whole(from));
+    EXPECT_NE(coordinates.parameters(to).setting, coordinates.parameters(from).setting);
+    MatrixXd jacobian(from.size(), from.size());
+    for (Index i = 0; i < from.size(); ++i) {
+      const VectorXd step = 1e-5 * VectorXd::Unit(from.size(), i);
+      jacobian.col(i) = (leap(from + step, other) - leap(from - step, other)) / 2e-5;
+    }
+    EXPECT_NEAR(std::log(std::abs(jacobian.determinant())), log_jacobian, 1e-6) << item;
+    // One of the leaps from there is the way back.
+    bool back = false;
+    for (unsigned k = 0; k < 60 && !back; ++k) {
+      Stream stream(1, 3, k);
+      VectorXd x = to;
+      const double again = coordinates.leap(x, stream);
+      back = std::isfinite(again) && (x - from).norm() < 1e-8 && std::abs(again + log_jacobian) < 1e-8;
+    }
+    EXPECT_TRUE(back) << item;
+  }
+  EXPECT_GT(leaps, 15);
 }
 
 TEST(HistoryCoordinates, OneReachHasNoCoordinate) {
@@ -122,6 +166,48 @@ TEST(HistoryTarget, EvidenceEqualsQuadrature) {
   EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
   // Four reported standard errors, and in any case less than matters to a Bayes factor.
   EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.15));
+}
+
+// A slow error with hardly any white noise, of which far more is stated: settings next to one another fit, each
+// with a noise of its own, and no single coordinate leads from one to the other.
+TEST(HistoryTarget, EvidenceOfErrorsThatJumpEqualsQuadrature) {
+  constexpr Index kRows = 300;
+  HistoryData data;
+  data.axis = even_axis(kRows);
+  data.basis = VectorXd::Ones(kRows);
+  data.responses = normal_matrix(kRows, 1, 3);
+  data.condition = {0};
+  data.y = normal_vector(kRows, 7);  // innovations
+  for (Index i = 1; i < kRows; ++i) data.y[i] = std::exp(-1.0 / 8) * data.y[i - 1] + 0.48 * data.y[i];
+  data.y += 0.09 * normal_vector(kRows, 8);
+  HistoryPriors priors;
+  priors.noise_sd = 1.0;
+  priors.noise_shape = 2.0;
+  priors.error = {VectorXd::Constant(1, 8.0), Eigen::Vector4d(10.0, 30.0, 100.0, 300.0)};
+  const HistoryModel model(data, priors, Context());
+  const HistoryTarget target(model, {}, {VectorXd::Zero(1), MatrixXd::Identity(1, 1)});
+  // Over sigma by steps, over the settings as a mean.
+  const VectorXd sigma = VectorXd::LinSpaced(4001, -9.0, 3.0);
+  VectorXd settings(4);
+  for (int k = 0; k < 4; ++k) {
+    MatrixXd x(2, sigma.size());
+    x.row(0) = sigma.transpose();
+    x.row(1).setConstant(quantile(boost::math::normal(), (k + 0.5) / 4));
+    settings[k] = log_sum_exp(target.log_likelihood(x) - 0.5 * sigma.cwiseAbs2()) +
+                  std::log((sigma[1] - sigma[0]) / std::sqrt(2 * kPi) / 4);
+  }
+  const double truth = log_sum_exp(settings);
+  std::cerr << normalised_exp(settings).transpose() << "\n";
+  AisOptions options;
+  options.pilot_chains = 200;
+  options.groups = 6;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    Context context;
+    context.seed = seed;
+    const AisResult result = sample_ais(target, options, context);
+    EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
+    EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.15)) << seed << " " << settings.transpose();
+  }
 }
 
 TEST(HistoryTarget, NumberingOfTheConditionsLeavesTheSampledEvidenceUnchanged) {
