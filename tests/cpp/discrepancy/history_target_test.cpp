@@ -168,10 +168,10 @@ TEST(HistoryTarget, EvidenceEqualsQuadrature) {
   EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.15));
 }
 
-// A slow error with hardly any white noise, of which far more is stated: settings next to one another fit, each
-// with a noise of its own, and no single coordinate leads from one to the other.
+// A slow error with hardly any white noise, of which far more is stated: settings next to one another fit,
+// each with a noise of its own, and no single coordinate leads from one to the other.
 TEST(HistoryTarget, EvidenceOfErrorsThatJumpEqualsQuadrature) {
-  constexpr Index kRows = 300;
+  constexpr Index kRows = 1000;
   HistoryData data;
   data.axis = even_axis(kRows);
   data.basis = VectorXd::Ones(kRows);
@@ -179,7 +179,7 @@ TEST(HistoryTarget, EvidenceOfErrorsThatJumpEqualsQuadrature) {
   data.condition = {0};
   data.y = normal_vector(kRows, 7);  // innovations
   for (Index i = 1; i < kRows; ++i) data.y[i] = std::exp(-1.0 / 8) * data.y[i - 1] + 0.48 * data.y[i];
-  data.y += 0.09 * normal_vector(kRows, 8);
+  data.y += 0.1 * normal_vector(kRows, 8);
   HistoryPriors priors;
   priors.noise_sd = 1.0;
   priors.noise_shape = 2.0;
@@ -197,16 +197,17 @@ TEST(HistoryTarget, EvidenceOfErrorsThatJumpEqualsQuadrature) {
                   std::log((sigma[1] - sigma[0]) / std::sqrt(2 * kPi) / 4);
   }
   const double truth = log_sum_exp(settings);
-  std::cerr << normalised_exp(settings).transpose() << "\n";
+  EXPECT_GT(normalised_exp(settings)[3], 0.2);  // two settings count
+  EXPECT_GT(normalised_exp(settings)[2], 0.2);
   AisOptions options;
   options.pilot_chains = 200;
   options.groups = 6;
-  for (unsigned seed = 1; seed <= 6; ++seed) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
     Context context;
     context.seed = seed;
     const AisResult result = sample_ais(target, options, context);
     EXPECT_TRUE(trusted(result.outcome)) << in_words(result.outcome);
-    EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.15)) << seed << " " << settings.transpose();
+    EXPECT_LT(std::abs(result.log_evidence - truth), std::min(4 * result.standard_error, 0.15)) << seed;
   }
 }
 
