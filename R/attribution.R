@@ -26,9 +26,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' # Limits
 #'
 #' *Products.* Responses are linear in each condition's history. An effect that is a product of two
-#' conditions shows only as far as one of them indicates it. A mechanism that holds such a product
-#' is judged by its own runs ([upgrade_model()]). It can be found even if no condition is
-#' significant.
+#' conditions shows only as far as one of them indicates it. A mechanism that holds a product is
+#' judged by its own runs ([upgrade_model()]). It can be found even if no condition is significant.
 #'
 #' *A condition is not yet a cause.* A fault that changes how much a system loses or stores changes
 #' its response to everything. The error may then respond to what moves the output most (in a heated
@@ -39,7 +38,7 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #'
 #' Conditions with the same information hide one another: each can be dropped without harm, but not
 #' both. Among conditions that can be dropped alone, a set is sought that cannot be dropped together
-#' and cannot be made smaller. Such a group is tested like a condition. Its members are named
+#' and cannot be made smaller. A group is tested like a condition. Its members are named
 #' together, because this record cannot separate their effects. If there are several records, a
 #' group of one record is dropped from all, because another record may separate its members.
 #'

@@ -1,7 +1,7 @@
 #' A catalogue of mechanisms for the test box
 #'
 #' @description
-#' Lists what may be missing in a model such as [paper_box()]`("M2")`:
+#' Lists what may be missing in a model like [paper_box()]`("M2")`:
 #'
 #' * wind-driven infiltration,
 #' * window transmission,

@@ -8,7 +8,7 @@
 #' @param simulator A [zone()].
 #' @param values Matrix of parameter values, one row a point, named columns; or one named vector.
 #' @param drivers Named vector of the driver columns that are neither temperatures nor sun, sky or
-#'   power, such as wind speed and direction. What is not named is 0.
+#'   power, like wind speed and direction. What is not named is 0.
 #' @param outside,inside Temperatures, degC. Only buoyancy and the density of air depend on them.
 #' @return Heat loss coefficients, W/K, one for each point.
 #' @examples

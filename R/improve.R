@@ -123,9 +123,9 @@ with_least <- function(model, context) {
   model
 }
 
-# What the discrepancy keeps out of depends on the slopes there, so they are taken by differences: at
-# the run at which a search by those of other runs converges, as slopes of where it came from would
-# be off by what they turn on the way.
+# The run of least squares, with the slopes there by differences: the discrepancy keeps out of them.
+# First the search converges by the slopes at hand. Slopes of a run before its end would be off by
+# what they turn on the way.
 with_exact_least <- function(model, context) {
   model <- with_least(model, context)
   if (isTRUE(model$least$exact)) return(model)
@@ -138,7 +138,7 @@ with_exact_least <- function(model, context) {
   model
 }
 
-# The search goes on from there as long as `known` slopes promise that it comes nearer to the record.
+# The search goes on as long as `known` slopes promise that it comes nearer to the record.
 converged_least <- function(model, known, context) {
   search <- begin_search(model, model$least$at, known$slopes, known$stale, gain = rules$least_gain)
   search <- descend(search, context)

@@ -16,7 +16,7 @@
 #' The time column may be `POSIXct`, `POSIXlt`, `Date`, a `difftime`, numbers of hours, or text in
 #' one format:
 #'
-#' * ISO 8601 (`2013-08-30T00:10:00`), with or without an offset such as `Z` or `+02:00`;
+#' * ISO 8601 (`2013-08-30T00:10:00`), with or without an offset like `Z` or `+02:00`;
 #' * `30.08.2013 00:10`;
 #' * `30/08/2013 00:10` or `08/30/2013 12:10 AM`, if the whole column tells day from month;
 #' * the stamps of EnergyPlus (` 01/21 24:00:00`, hours of a year that is not known);
@@ -25,7 +25,7 @@
 #' Midnight may be `24:00:00`.
 #'
 #' Numbers are hours if their step is a usual one (10 min, 1 h, 1 d). Other numbers are recognised,
-#' with a message, if they cannot be hours: Unix time, digits of a date such as 201308300010, and
+#' with a message, if they cannot be hours: Unix time, digits of a date like 201308300010, and
 #' days that Excel, MATLAB or astronomers count. Numbers that could be several things are an error
 #' that names the `time_format` of each. Examples are daily digits of two-digit years, whole days of
 #' Excel, steps of 5, 10, 60 or 600, and a column called `day` or `seconds`. What stays open is an
@@ -42,7 +42,7 @@
 #' # Gaps
 #'
 #' Rows whose target is `NA` drive the simulator and are left out of the comparison. An average that
-#' holds such a row is left out, too.
+#' holds one of these rows is left out, too.
 #'
 #' A lost row does not break the record: its drivers are interpolated linearly. Longer gaps, and
 #' values that a driver lacks, are filled in the same way up to `fill_gaps` hours. If more is lost,
@@ -97,10 +97,10 @@
 #'     `"mjd"` (modified Julian);
 #'   * either: a format of [strptime()] (`"%Y%m%d%H"`).
 #' @param time_zone Zone of text without an offset, and of the clock that times of day are shown in:
-#'   `"UTC"`, or a name such as `"Europe/Berlin"`.
+#'   `"UTC"`, or a name like `"Europe/Berlin"`.
 #' @param fill_gaps Longest gap, in hours, that is filled in what drives the simulator: by straight
 #'   lines, circular boundary conditions by way of sine and cosine.
-#' @param missing Values that stand for a missing one, such as `c(-9999, 85)`: they become `NA` in
+#' @param missing Values that stand for a missing one, like `c(-9999, 85)`: they become `NA` in
 #'   every column. `NA` says that no value does. Otherwise, codes in the target or in a boundary
 #'   condition are refused.
 #' @param range Lower and upper end of the range of the target's sensor. Rows at an end, or beyond,

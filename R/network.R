@@ -3,8 +3,8 @@
 #' Nodes hold something and exchange it in proportion to their states: heat between the resistances
 #' and capacities of a grey-box model, water between the stores of a catchment, a tracer between
 #' tanks. The network is linear, so each run is exact at any length of a row, and it knows its own
-#' slopes: a search for the best parameters needs no runs for differences. Parameters stand where
-#' the numbers would ([free()]).
+#' slopes: a search for the best parameters needs no runs for differences. Parameters stand in
+#' the place of numbers ([free()]).
 #'
 #' The state `x` of each node follows `capacity dx/dt = sum of links + flows + gains`. A link brings
 #' `conductance * (x_other - x)`, a flow takes `rate * x_from` from one node to another, a gain

@@ -51,7 +51,7 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
 #' line uses. Neither a trend nor the line then biases the variance.
 #'
 #' Either way the readings' errors are taken as independent. What they have in common over a window,
-#' such as an offset of the sensor, is not seen. The noise is then larger than the estimate.
+#' like an offset of the sensor, is not seen. The noise is then larger than the estimate.
 #'
 #' @param replicates Number of bootstrap draws of each window.
 #' @param detrend Take a straight line off each window first; the paper does not.

@@ -4,7 +4,7 @@
 #'
 #' Makes one simulator for each output of a simulator whose function returns several series in one
 #' run ([calibrate_jointly()]). The simulators share their runs. For the same values, drivers and,
-#' if the function asks for it, `info`, the function is called only once. Runs are kept as long as
+#' if the function takes it, `info`, the function is called only once. Runs are kept as long as
 #' the session lasts, or until the memory of runs holds ten million numbers.
 #'
 #' @param simulator A [function_simulator()] whose function returns a matrix with named columns, or

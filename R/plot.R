@@ -36,7 +36,7 @@ calibration_figures <- c("parameters", "residuals", "modes")
 #'   * `"emulator"`: the emulator's errors on runs left out.
 #'   * `"residuals"`: whether the last model's error is as the error model says, see *Residuals*.
 #'   * `"sampler"`: how the annealing went.
-#'   * `"modes"`: the modes of the last model's posterior, and where searches ended.
+#'   * `"modes"`: the modes of the last model's posterior, and the ends of searches.
 #'
 #'   If an upgrade has several records, figures that show a series are of one record: `"fit of
 #'   NAME"`. `"fit"` then shows the first record.
@@ -52,7 +52,7 @@ calibration_figures <- c("parameters", "residuals", "modes")
 #' @section Figures of a calibration:
 #'   * `"parameters"`: their estimates.
 #'   * `"residuals"`: whether the error is as the error model says.
-#'   * `"modes"`: the modes of the posterior, and where searches ended.
+#'   * `"modes"`: the modes of the posterior, and the ends of searches.
 #' @section Residuals:
 #'   A residual is what a measurement does beyond what the calibrated model expects of it, given all
 #'   measurements before, in standard deviations. The model is that of one draw of the posterior:

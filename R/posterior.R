@@ -136,7 +136,7 @@ vcov.amiss_fit <- function(object, ...) {
 #' weights by a systematic rule.
 #'
 #' A draw of more weight than one of `draws` is repeated. Its repeats stand next to each other, as
-#' in a Markov chain that stays where it is; apart from that the order is random. The effective
+#' in a Markov chain that does not move; apart from that the order is random. The effective
 #' number of draws that `posterior` states (`ess_bulk`, `ess_tail`) therefore counts repeats only
 #' once: it is about the effective number of the weighted draws, however large `draws` is, and not
 #' above the number of distinct draws by more than the error of its estimate.

@@ -177,7 +177,7 @@ print.amiss_prior <- function(x, ...) {
   invisible(x)
 }
 
-#' Declare a free parameter where it stands
+#' Declare a free parameter in its place
 #'
 #' Puts a free parameter, an unknown that calibration finds, in place of a number in a model's
 #' description. The same name may stand in several places. It is then one parameter, and must carry

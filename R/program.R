@@ -235,7 +235,7 @@ check_program <- function(simulator, call = rlang::caller_env()) {
 #' Edit the templates of a program
 #'
 #' Edits the templates of a [program_simulator()] and adds parameters. A mechanism of a program is
-#' such an edit.
+#' an edit like that.
 #'
 #' @param simulator A [program_simulator()].
 #' @param templates Named list of templates, new ones or in place of those of the same name. Each is

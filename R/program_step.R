@@ -1,12 +1,12 @@
 #' Programs one after the other
 #'
-#' A simulation often takes a chain of programs: one simulates, another extracts what was asked for.
+#' A simulation often takes a chain of programs: one simulates, another extracts what is needed.
 #' Give `program_simulator(command = list(program_step(...), program_step(...)), ...)`. The steps
 #' run one after the other in the folder of the run, without a shell; the first that fails ends the
 #' run, and the warning shows what it wrote last.
 #'
 #' A program that exits with 0 may have failed all the same. `makes`, `needs` and `fails_if` find
-#' that out at the step where it happened, and not at the next, which only misses a file.
+#' that out at the step that failed, and not at the next, which only misses a file.
 #'
 #' @param command The program. `./name` or the name of a file in the run's folder is a program that
 #'   is copied there.
@@ -16,7 +16,7 @@
 #'   filled in.
 #' @param stdout Name of the file for its standard output. By default `stdout.txt` for the last step
 #'   and `stdout-1.txt`, `stdout-2.txt`, ... for those before.
-#' @param folder Folder within that of the run in which it is started, such as `"cfg"`; by default
+#' @param folder Folder within that of the run in which it is started, like `"cfg"`; by default
 #'   that of the run.
 #' @param makes Names of files, from the folder of the run, that must be there and not empty after
 #'   the step.

@@ -1,7 +1,7 @@
 #' Calibrate with few runs, checked by the simulator
 #'
 #' Searches for the mode by runs of the simulator and trains an emulator in the region of the mode.
-#' The posterior is sampled, and the simulator checks the emulator where the posterior lies. The
+#' The posterior is sampled, and the simulator checks the emulator at draws of it. The
 #' runs of a check also train the emulator of the next round. The rounds end when a check passes
 #' with enough to spare, or after `rounds`.
 #'
@@ -112,9 +112,9 @@ with_known_runs <- function(model, ensembles) {
   model
 }
 
-#' More runs where they matter
+#' More runs near the posterior
 #'
-#' Makes an ensemble of the region where a first posterior lies. A design spread over the priors has
+#' Makes an ensemble of the region of a first posterior. A design spread over the priors has
 #' few runs there, and fewer the more informative the data are. Its emulator can be wrong there by
 #' more than it knows. In the region, a few dozen runs do what hundreds spread over the priors
 #' cannot.

@@ -10,8 +10,8 @@
 #' @param ... New names by the old ones: `door = "door of O5"`.
 #' @return An object of class `amiss_renamed`: a simulator that differs only in the names. The
 #'   `edit` of a [mechanism()] gets the simulator with its own names.
-#' @section Errors: `amiss_error_input` if the simulator has no such parameter, or already has one
-#'   of the new name.
+#' @section Errors: `amiss_error_input` if the simulator does not have the parameter, or already
+#'   has one of the new name.
 #' @examples
 #' linear <- function_simulator(function(values, drivers) values[["gain"]] * drivers[, "Te"],
 #'                              free("gain", uniform(0, 2)), boundary = "Te")

@@ -1,8 +1,8 @@
 #' Comparison in words
 #'
 #' Says in plain sentences and tables which model the evidence chooses and how clearly. They also
-#' say what its discrepancy responds to, where criteria of practice would choose otherwise, and what
-#' cannot be trusted. [report()] lays it out.
+#' say what its discrepancy responds to, whether criteria of practice would choose otherwise, and
+#' what cannot be trusted. [report()] lays it out.
 #'
 #' @param object A comparison ([compare_models()]).
 #' @param x The summary.

@@ -211,14 +211,14 @@ print.amiss_function_simulator <- function(x, ...) on_stdout(x, {
 #' @param values Matrix of parameter values, one run a row, named columns.
 #' @param drivers Numeric matrix with named columns: one row per interval of one unbroken segment.
 #' @param step_h Length of an interval in hours.
-#' @param hold Values at which the target is held during warm-up, `NA` where it is free; a simulator
+#' @param hold Values at which the target is held during warm-up, `NA` if it is free; a simulator
 #'   that cannot be held ignores it.
 #' @param threads Number of threads.
 #' @param ... What a method may use or ignore: `time` of each row (`POSIXct`, or hours) and the
 #'   number of the `segment`. Every method must have it.
 #' @return `free_parameters()`: named list of [free()]; `driver_names()`: names of the columns that
 #'   it needs; `simulate_runs()`: matrix with one row per interval and one column per run, `NaN`
-#'   columns where a run failed.
+#'   columns of failed runs.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))

@@ -89,8 +89,8 @@
 #'   the sign itself. Decimals may have a comma. If columns disagree, `decimal` says `","` or `"."`,
 #'   and the other sign then separates thousands. Exponents may be `E` or `D`.
 #'
-#'   Empty fields and words such as `NA`, `NaN` and `null` are missing values. A column without a
-#'   name gets that of its place, such as `column_1`. A row with more or fewer fields than the
+#'   Empty fields and words like `NA`, `NaN` and `null` are missing values. A column without a
+#'   name gets that of its place, like `column_1`. A row with more or fewer fields than the
 #'   header has names is an error. Text that is not UTF-8 is read as UTF-16 or Windows-1252, with a
 #'   message.
 #'
@@ -102,7 +102,7 @@
 #' @param threads Number of threads; results do not depend on it.
 #' @param quiet No progress messages.
 #' @param trust Whether the R files that the study names may run, and files outside its folder be
-#'   read: both can do whatever you can. If not, such a study is refused, or you are asked at a
+#'   read: both can do whatever you can. If not, the study is refused, or you are asked at a
 #'   terminal. Studies that ship with the package need no trust.
 #' @return `run_study()`: the result of [upgrade_model()] or [compare_models()], with `study`,
 #'   `title` and `wall_s`, invisibly. `read_study()`: a list of class

@@ -109,10 +109,10 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   Each model also has
 #'   * `confounded_with`: parameters that are correlated beyond 0.4 with those that the mechanism
 #'     brought.
-#'   * `steps`: what shorter steps of the simulator change, for each record. `error` is the RMS, in
-#'     the target's unit, of what the parameters cannot take up. `moved` says by how many of its
-#'     standard deviations each parameter would move. `steps` is `NULL` if this is not known
-#'     ([function_simulator()]).
+#'   * `steps`: what shorter steps of the simulator change, for each record (`NULL` if this is not
+#'     known; see [function_simulator()]). Its `error` is the RMS, in the target's unit, of what the
+#'     parameters cannot take up. Its `moved` says by how many of its standard deviations each
+#'     parameter would move.
 #'
 #'   For several records `fit` is what [calibrate_jointly()] gives. `records` of a model then has
 #'   `prediction`, `scores` and `held_out_gain` of each record in its own unit.

@@ -57,11 +57,11 @@
 #'
 #' *Walls.* The inner surface exchanges heat with the air by `inside_convection` and with the other
 #' surfaces by `4 sigma (293.15 K)^3 inside_emissivity` (5.1 W/m2K at 0.9). The outer surface gains,
-#' in W/m2, `film (Te - T) + absorptance sun - outside_emissivity sky_view (sigma Te^4 - sky)`, Te
-#' in kelvin in the last term, with `film = (1 - wind_film) outside_film + wind_film (7.3 + 3 V)`, V
-#' the wind along the facade (of a horizontal wall the wind speed). Without `outside`, `sun` and
-#' `sky` count for nothing; without `sky`, `outside_emissivity` does; with `wind_film = 0`, wind and
-#' azimuth do.
+#' in W/m2, `film (Te - T) + absorptance sun - outside_emissivity sky_view (sigma Te^4 - sky)`. In
+#' the last term Te is in kelvin. Here
+#' `film = (1 - wind_film) outside_film + wind_film (7.3 + 3 V)`. `V` is the wind along the facade
+#' (for a horizontal wall the wind speed). Without `outside`, `sun` and `sky` count for nothing;
+#' without `sky`, `outside_emissivity` does; with `wind_film = 0`, wind and azimuth do.
 #'
 #' *Windows* lose `u_value area (Ta - Te)` from the air, and gain `solar_factor area sun`, of which
 #' the share `1 - to_air` goes to the walls.

@@ -154,7 +154,7 @@ simulate_runs.amiss_zone <- function(simulator, values, drivers, step_h, hold = 
 #'   it, as the zone itself is held at its target there.
 #' @return An object of class `amiss_zone_flux`: a simulator of the mean heat flux at the inner
 #'   surface, W/m2, positive into the room.
-#' @section Errors: `amiss_error_input` if the zone has no such wall.
+#' @section Errors: `amiss_error_input` if the zone does not have this wall.
 #' @examples
 #' brick <- zone_layer(0.2, free("k", uniform(0.1, 0.3), "W/mK"), 8e5)
 #' room <- zone(zone_wall("facade", area = 12, brick, outside = "Te"), volume = 40)
