@@ -315,10 +315,14 @@ has_settled <- function(fits, before) {
   !is.null(before) && abs(fits[[1]]$log_evidence - before) <= rules$rounds_agree &&
     all(vapply(fits, function(fit) {
       check <- fit$check
-      isTRUE(check$passed) && check$border <= rules$border_intervals &&
+      isTRUE(check$passed) && !surely_exceeds(check$border, rules$border_intervals, fit) &&
         check$effective >= rules$effective_intervals && fit$standard_error <= rules$evidence_error
     }, NA))
 }
+
+# Whether more than a share of a posterior lies somewhere, by so many draws: at two standard errors.
+surely_exceeds <- function(seen, share, fit)
+  seen > share + 2 * sqrt(share * (1 - share) / fit$posterior$ess)
 
 # Passed ones first, among them by the effective share of the runs.
 check_score <- function(fits) {

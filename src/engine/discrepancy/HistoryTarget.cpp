@@ -60,10 +60,7 @@ double HistoryCoordinates::noise_slope(double x, double share) const {
          (share * (1.0 - share) * boost::math::ibeta_derivative(shape, shape, share, DoublePolicy()));
 }
 
-bool HistoryCoordinates::has_leaps() const {
-  const ErrorOptions& error = model_->priors().error;
-  return error.correlation_times.size() > 0 && error.ratios.size() > 1;
-}
+bool HistoryCoordinates::has_leaps() const { return first_condition() > 1; }
 
 // With the variance of the whole error, sigma^2 (1 + sum_k ratio_k), kept, sigma^2 falls as a ratio rises:
 // the likelihood hardly changes then. The place within a level is kept too, which keeps u = Phi(x_k) uniform.
@@ -71,27 +68,29 @@ double HistoryCoordinates::leap(Eigen::Ref<VectorXd> x, Stream& stream) const {
   constexpr double kNone = -std::numeric_limits<double>::infinity();
   const HistoryPriors& priors = model_->priors();
   const VectorXd& ratios = priors.error.ratios;
-  const int levels = static_cast<int>(ratios.size());
   const Index components = priors.error.correlation_times.size();
-  const Index row = 1 + stream.index(static_cast<int>(components));
+  const Index row = 1 + stream.index(static_cast<int>(first_condition() - 1));
+  const bool of_error = row <= components;
+  const int levels = static_cast<int>(of_error ? ratios.size() : priors.reach.size());
   const int from = level(x[row], levels), to = from + (stream.uniform() < 0.5 ? -1 : 1);
   if (to < 0 || to >= levels) return kNone;
-  double whole = 1.0;
-  for (Index k = 1; k <= components; ++k) whole += ratios[level(x[k], levels)];
-  const double change = whole / (whole - ratios[from] + ratios[to]);
+  const double old = x[row];
+  x[row] = boost::math::quantile(boost::math::normal(),
+                                 clamp_unit(normal_cdf(old) + static_cast<double>(to - from) / levels));
+  const double log_change = 0.5 * (x[row] * x[row] - old * old);
+  if (!of_error) return log_change;
 
-  const double before = noise_share(x[0]);
+  double to_whole = 1.0;
+  for (Index k = 1; k <= components; ++k) to_whole += ratios[level(x[k], levels)];
+  const double change = (to_whole - ratios[to] + ratios[from]) / to_whole, before = noise_share(x[0]);
   const double variance =
       (noise_variance(before) + priors.discarded_variance) * change - priors.discarded_variance;
   if (!(variance > 0)) return kNone;
   const double after = variance / (variance + priors.noise_sd * priors.noise_sd);
-  const VectorXd old = x;
+  const double slope = noise_slope(x[0], before);
   const double u = boost::math::ibeta(priors.noise_shape, priors.noise_shape, after, DoublePolicy());
   x[0] = boost::math::quantile(boost::math::normal(), clamp_unit(u));
-  x[row] = boost::math::quantile(boost::math::normal(),
-                                 clamp_unit(normal_cdf(x[row]) + static_cast<double>(to - from) / levels));
-  return std::log(change * noise_slope(old[0], before) / noise_slope(x[0], after)) +
-         0.5 * (x[row] * x[row] - old[row] * old[row]);
+  return log_change + std::log(change * slope / noise_slope(x[0], after));
 }
 
 HistoryParameters HistoryCoordinates::parameters(const Eigen::Ref<const VectorXd>& x) const {

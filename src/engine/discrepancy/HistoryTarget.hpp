@@ -18,9 +18,9 @@ class HistoryCoordinates {
   /// jumps.
   Eigen::VectorXd gradient(const Eigen::Ref<const Eigen::VectorXd>& x, const HistoryParameters& point,
                            const Eigen::VectorXd& natural) const;
-  bool has_leaps() const;  ///< whether there is a grid of errors
-  /// One component of the error to the level next to its own, the variance of the whole error kept; returns
-  /// log |dx' / dx|, or -infinity (Target).
+  bool has_leaps() const;  ///< whether there are settings to choose from
+  /// One component of the error to the level next to its own, the variance of the whole error kept; or the
+  /// reach. Returns log |dx' / dx|, or -infinity (Target).
   double leap(Eigen::Ref<Eigen::VectorXd> x, Stream& stream) const;
   const HistoryModel& model() const { return *model_; }
   const std::vector<int>& active() const { return active_; }  ///< condition of each of the last coordinates
