@@ -132,9 +132,9 @@ test_that("bad arguments are refused", {
 })
 
 checked_by_hand <- function(passed = TRUE, effective = 0.5, border = 0, ratio = 0.1,
-                            standard_error = 0.1, log_evidence = 10) {
+                            standard_error = 0.1, log_evidence = 10, ess = 400) {
   list(check = list(passed = passed, effective = effective, border = border, ratio = ratio),
-       standard_error = standard_error, log_evidence = log_evidence)
+       standard_error = standard_error, log_evidence = log_evidence, posterior = list(ess = ess))
 }
 
 test_that("verification ends once a check passes with enough to spare, and two rounds agree", {
@@ -146,7 +146,10 @@ test_that("verification ends once a check passes with enough to spare, and two r
   expect_false(settled(effective = 0.2))
   expect_false(settled(passed = FALSE))
   expect_false(settled(passed = NA))
-  expect_false(settled(border = 0.03))
+  # A hundredth within two standard errors of its draws: 0.01 + 2 sqrt(0.01 0.99 / 400) = 0.02.
+  expect_true(settled(border = 0.0199))
+  expect_false(settled(border = 0.02))
+  expect_false(settled(border = 0.0199, ess = 500))
   expect_false(settled(standard_error = 1.5))
   # Of several records all.
   expect_false(amiss:::has_settled(list(checked_by_hand(), checked_by_hand(passed = FALSE)), 10))
