@@ -88,11 +88,25 @@ check_seed <- function(seed, name, call = rlang::caller_env()) {
 # Evaluates an expression under a seed of its own and leaves R's generator as it was.
 with_seed <- function(seed, expression) {
   old <- globalenv()$.Random.seed
-  on.exit(if (is.null(old)) rm(list = ".Random.seed", envir = globalenv())
-          else assign(".Random.seed", old, envir = globalenv()))
+  on.exit(restore_generator(old))
   set.seed(as.integer(seed), kind = "Mersenne-Twister", normal.kind = "Inversion",
            sample.kind = "Rejection")
   expression
+}
+
+restore_generator <- function(seed) {
+  if (!is.null(seed)) assign(".Random.seed", seed, envir = globalenv())
+  else suppressWarnings(rm(list = ".Random.seed", envir = globalenv()))
+}
+
+# A process that can be stopped with all that it starts. processx takes the name of that tree from
+# R's random numbers and the second. Processes of two sessions with one seed, or of one session that
+# restores its generator, could have one name and be stopped together. So it gets numbers of its own.
+start_process <- function(...) {
+  old <- globalenv()$.Random.seed
+  on.exit(restore_generator(old))
+  restore_generator(NULL)  # R then begins from the time and the number of the process
+  processx::process$new(...)
 }
 
 check_threads <- function(threads, call = rlang::caller_env()) {

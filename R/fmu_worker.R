@@ -102,7 +102,7 @@ start_fmu_worker <- function(fmu, platform) {
   code <- sprintf("loadNamespace('amiss', lib.loc = %s); amiss:::serve_fmu(%d)",
                   encodeString(dirname(getNamespaceInfo("amiss", "path")), quote = "'"),
                   Sys.getpid())
-  worker$process <- processx::process$new(
+  worker$process <- start_process(
     file.path(R.home("bin"), "Rscript"), c("--vanilla", "-e", code), stdin = "|", stdout = "|",
     stderr = file.path(worker$folder, "stderr.txt"), wd = file.path(worker$folder, "work"),
     cleanup_tree = TRUE,

@@ -216,11 +216,11 @@ step_status <- function(plan, job, k, folder, ends) {
   program <- if (is.null(step$within)) job$commands[[k]][1] else file.path(folder, step$within)
   if (!is.null(stdin) && !is_regular_file(file.path(folder, stdin)))
     stop("there is no file ", stdin, " for its input")
-  process <- processx::process$new(program, job$commands[[k]][-1],
-                                   wd = file.path(folder, step$folder %||% "."),
-                                   stdin = if (!is.null(stdin)) file.path(folder, stdin),
-                                   stdout = file.path(folder, step$stdout),
-                                   stderr = file.path(folder, step$stderr), cleanup_tree = TRUE)
+  process <- start_process(program, job$commands[[k]][-1],
+                           wd = file.path(folder, step$folder %||% "."),
+                           stdin = if (!is.null(stdin)) file.path(folder, stdin),
+                           stdout = file.path(folder, step$stdout),
+                           stderr = file.path(folder, step$stderr), cleanup_tree = TRUE)
   wait_for(process, ends, limit, plan$simulator$size_limit, folder)
   process$get_exit_status()
 }
@@ -356,7 +356,7 @@ stop_with_session <- function(pid) {
     if (is.null(pid)) return(invisible())
     script <-
       "while read line; do group=$line; done; [ \"$group\" = none ] || kill -s KILL -- \"-$group\""
-    guard$shell <- processx::process$new("sh", c("-c", script), stdin = "|")
+    guard$shell <- start_process("sh", c("-c", script), stdin = "|")
     guard$session <- Sys.getpid()
   }
   guard$shell$write_input(paste0(if (is.null(pid)) "none" else pid, "\n"))

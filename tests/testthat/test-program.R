@@ -178,6 +178,20 @@ test_that("a run ends with its program, and what that left in the background is 
   expect_false(alive("^sleep 30[12]$"))
 })
 
+test_that("processes that start from one seed at one second are not stopped together", {
+  skip_on_os("windows")
+  withr::local_seed(1)
+  before <- .Random.seed
+  start <- function() amiss:::with_seed(1, amiss:::start_process("sleep", "304"))
+  Sys.sleep(1 - as.numeric(Sys.time()) %% 1)  # a second begins
+  both <- list(start(), start())
+  withr::defer(for (process in both) process$kill())
+  both[[1]]$kill_tree()
+  both[[1]]$wait(5000)
+  expect_identical(vapply(both, function(process) process$is_alive(), NA), c(FALSE, TRUE))
+  expect_identical(.Random.seed, before)
+})
+
 test_that("a program that writes without end is stopped, and little of it is kept", {
   cache <- withr::local_tempdir()
   expect_match(shell_run("yes", cache = cache), "wrote more than 10 MB")
