@@ -101,7 +101,7 @@ restore_generator <- function(seed) {
 
 # A process that can be stopped with all that it starts. processx takes the name of that tree from
 # R's random numbers and the second. Processes of two sessions with one seed, or of one session that
-# restores its generator, could have one name and be stopped together. So it gets numbers of its own.
+# restores its generator, could have one name and be stopped together. So it gets its own numbers.
 start_process <- function(...) {
   old <- globalenv()$.Random.seed
   on.exit(restore_generator(old))
