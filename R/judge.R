@@ -48,8 +48,8 @@ doubts <- list(
                       "two that imitate a third together look like this"),
   alone = doubt(function(case) {
     if (length(case$unsettled)) {
-      sprintf(paste("%s, adopted after it, may be the cause by itself: no search shows that it needs",
-                    "this one"), listed(case$unsettled))
+      sprintf(paste("%s, adopted after it, may be the cause by itself: no search shows that it",
+                    "needs this one"), listed(case$unsettled))
     }
   }, "what is adopted later may make it needless"),
   edge = doubt(function(case) {
