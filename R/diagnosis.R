@@ -98,6 +98,9 @@ mechanism_verdict <- function(upgrade) {
   likely <- of("likely")
   if (length(likely)) {
     tag <- if (describes(upgrade$catalogue[[likely[[1]]$mechanism]])) "Described, not explained"
+           else if (is_one_of(likely[[1]]))
+             paste0("The cause is ", listed(c(likely[[1]]$mechanism, likely[[1]]$rivals), "or"),
+                    "; this record does not distinguish them")
            else paste("Likely cause, but",
                       paste(c(utils::head(likely[[1]]$doubts, 2),
                               if (length(likely[[1]]$doubts) > 2) "more speaks against it"),
@@ -106,6 +109,10 @@ mechanism_verdict <- function(upgrade) {
   }
   list(verdict = "unexplained", tag = "Unexplained; a stand-in fits", headline = headline)
 }
+
+# Whether nothing speaks against a mechanism but others that would do as well: then they are named
+# together.
+is_one_of <- function(model) length(model$rivals) && identical(names(model$doubts), "rivals")
 
 open_verdict <- function(upgrade) {
   explained <- if (is.null(upgrade$candidates)) "no mechanism was tried"

@@ -13,8 +13,9 @@ doubts <- list(
     if (describes(case$entry)) "it describes what is missing and does not explain it"
   }, "a response is no cause"),
   rivals = doubt(function(case) {
-    if (case$others > rules$rival_probability) "other causes are possible"
-  }, "another mechanism of the catalogue may hold more than 5 % of the probability"),
+    if (length(case$rivals))
+      sprintf("this record does not distinguish it from %s", listed(rival_words(case$rivals), "or"))
+  }, "others may have more than 5 % of the probability"),
   untried = doubt(function(case) {
     twins <- untried_twins(case$parent, case$entry, case$catalogue)
     told <- function(names) condition_label(case$measurements, names)
@@ -111,15 +112,27 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads, l
   list(model = model, parent = parent, models = models[seq_len(k)], row = row, new = new,
        entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain,
        no_gain = isFALSE(gain$improves),
-       others = 1 - row$probability - sum(trials$probability[trials$mechanism %in% later]),
+       rivals = rivals_of(trials, c(model$mechanism, later)),
        unsettled = later[vapply(models[-seq_len(k)],
                                 function(m) model$mechanism %in% m$may_replace, NA)],
        confounded = confounded_parameters(model$fit, new),
        drift = drift, slow = drift && acts_as_drift(parent$fit, model$fit, threads, left))
 }
 
+# What else the evidence of a step allows, with its probability: mechanisms that were not adopted
+# and no change, the most probable ones until the others have together no more than 5 %.
+rivals_of <- function(trials, adopted) {
+  share <- stats::setNames(c(trials$probability, max(0, 1 - sum(trials$probability))),
+                           c(trials$mechanism, "no change"))
+  share <- sort(share[setdiff(names(share), adopted)], decreasing = TRUE)
+  share[rev(cumsum(rev(share))) > rules$rival_probability]
+}
+
+rival_words <- function(rivals) paste0(names(rivals), " (", percent(unname(rivals)), ")")
+
 judged_model <- function(case) {
   model <- case$model
+  model$rivals <- setdiff(names(case$rivals), "no change")
   model$held_out_gain <- case$gain
   for (name in names(model$records)) {
     model$records[[name]]$held_out_gain <- held_out_gain(record_model(case$parent, name),

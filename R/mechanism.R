@@ -82,6 +82,13 @@ catalogue <- function(...) {
   structure(unclass(x)[i], labels = attr(x, "labels"), class = "amiss_catalogue")
 }
 
+# A catalogue with further entries; those of a name that it has are the same.
+with_entries <- function(catalogue, entries) {
+  new <- entries[setdiff(names(entries), names(catalogue))]
+  structure(c(unclass(catalogue), new), labels = attr(catalogue, "labels"),
+            class = "amiss_catalogue")
+}
+
 #' @export
 print.amiss_mechanism <- function(x, ...) on_stdout(x, {
   cli::cli_text("{.strong {x$name}}, driven by {.field {x$boundary}}: {x$sentence}")
@@ -142,6 +149,24 @@ extend <- function(simulator, mechanism, adopted = character(), record = NULL,
   }
   extended
 }
+
+# Two mechanisms as one. `of`: their names.
+paired_mechanism <- function(a, b) {
+  both <- function(simulator, record) {
+    first <- extend(simulator, a, record = record)
+    brought <- setdiff(names(free_parameters(first)), names(free_parameters(simulator)))
+    extend(first, b, brought, record)
+  }
+  pair <- mechanism(paste(a$name, "+", b$name), both, union(a$boundary, b$boundary),
+                    paste(a$sentence, b$sentence))
+  pair$of <- c(a$name, b$name)
+  pair
+}
+
+# The mechanisms that an entry of a catalogue stands for.
+single_names <- function(entry) entry$of %||% entry$name
+
+is_single <- function(entry) is.null(entry$of)
 
 # Given runs cannot be extended: those that lack what was adopted can no longer be tried.
 applies <- function(mechanism, adopted) {

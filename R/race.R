@@ -45,11 +45,18 @@ nearest_first <- function(trials) {
   names(searched)[order(vapply(searched, least_error, 0))]
 }
 
-# Whether a trial may be adopted that takes the error away.
-has_cause <- function(trials, present, context) {
+# The row of the mechanism to adopt, or NULL.
+to_adopt <- function(trials, present, context) {
+  if (!length(trials)) return(NULL)
   decisive <- context$control$decisive
   best <- best_trial(trial_table(trials, present, names(trials), decisive), decisive)
-  may_be_adopted(best, decisive) && takes_error(trials[[best$mechanism]], present)
+  if (may_be_adopted(best, decisive)) best
+}
+
+# Whether a trial may be adopted that takes the error away.
+has_cause <- function(trials, present, context) {
+  best <- to_adopt(trials, present, context)
+  !is.null(best) && takes_error(trials[[best$mechanism]], present)
 }
 
 # Whether a model leaves little of the error, or of what was beyond the noise.
@@ -72,10 +79,9 @@ left_over_noise <- function(model) {
 
 # What is to be adopted, searched again; if that changes which it is, the next one too.
 confirm_best <- function(trials, present, context) {
-  decisive <- context$control$decisive
   repeat {
-    best <- best_trial(trial_table(trials, present, names(trials), decisive), decisive)
-    if (!may_be_adopted(best, decisive)) return(trials)
+    best <- to_adopt(trials, present, context)
+    if (is.null(best)) return(trials)
     trial <- trials[[best$mechanism]]
     if (!is.null(trial$modes) || trial$level == "given") return(trials)
     trials[[best$mechanism]] <- staged(paste("searching", best$mechanism, "again"),

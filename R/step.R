@@ -20,21 +20,20 @@ next_step <- function(state, context) {
   }
   if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
   state$present <- as_present(state$present, state$catalogue[left], context)
-  trials <- staged(paste("step", length(state$models)),
-                   try_all(state, left, sparing(context, rules$trials_share,
-                                                rules$least_trial)))
-  trials <- race(state$present, trials, context)
-  if (asks_again(state) && !has_cause(trials, state$present, context))
-    trials <- second_look(state$present, trials, context)
-  trials <- confirm_best(trials, state$present, context)
-  decisive <- context$control$decisive
-  table <- trial_table(trials, state$present, left, decisive)
-  state$candidates <- rbind(state$candidates, table)
-  state$responses <- rbind(state$responses, response_table(trials, state$present,
-                                                           last_model(state$models)$attribution))
+  alone <- tried_alone(state, left, context)
+  paired <- staged("pairs", try_pairs(state, alone, context))
+  state <- paired$state
+  present <- state$present
+  trials <- c(alone, paired$trials)
+  state$candidates <- rbind(state$candidates,
+                            trial_table(trials, present, left, context$control$decisive))
+  state$responses <- rbind(state$responses,
+                           response_table(trials, present, last_model(state$models)$attribution))
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
-  best <- best_trial(table, decisive)
-  if (!may_be_adopted(best, decisive)) {
+  best <- higher_of(to_adopt(alone, present, context),
+                    to_adopt(paired$trials, present, paired$context))
+  if (is.null(best)) {
+    table <- trial_table(alone, present, left, context$control$decisive)
     return(c(state, list(stopped = no_winner(table, last_model(state$models), context))))
   }
   context$say("Adopted {.strong {best$mechanism}}: log10 Bayes factor {round(best$log10_bf, 1)}")
@@ -49,16 +48,36 @@ next_step <- function(state, context) {
   state
 }
 
+# All mechanisms that are left, each by itself: tried, raced, and what is to be adopted confirmed.
+tried_alone <- function(state, left, context) {
+  present <- state$present
+  trials <- staged(paste("step", length(state$models)),
+                   try_all(state, left, sparing(context, rules$trials_share, rules$least_trial)))
+  trials <- race(present, trials, context)
+  if (asks_again(state) && !has_cause(trials, present, context))
+    trials <- second_look(present, trials, context)
+  confirm_best(trials, present, context)
+}
+
+# Of two rows of the table of trials, each NULL if there is none, that of the higher standing.
+higher_of <- function(a, b) if (is.null(a) || !is.null(b) && b$standing > a$standing) b else a
+
 # Whether nothing was adopted yet, though so much of the error is left that mechanisms of the
 # catalogue may be missed.
 asks_again <- function(state) length(state$models) == 1 && leaves_much(state$present)
 
 # Mechanisms that were not adopted and can be applied on top of what was.
 mechanisms_left <- function(state) {
-  left <- setdiff(names(state$catalogue), unlist(lapply(state$models, `[[`, "mechanism")))
+  left <- single_names_left(state)
   brought <- setdiff(names(state$present$parameters), state$base)
   left <- left[vapply(state$catalogue[left], applies, NA, brought)]
   left[vapply(state$catalogue[left], can_extend, NA, state, brought)]
+}
+
+single_names_left <- function(state) {
+  adopted <- unlist(lapply(state$models, `[[`, "mechanism"))
+  single <- Filter(is_single, unclass(state$catalogue))
+  setdiff(names(single), unlist(lapply(state$catalogue[adopted], single_names)))
 }
 
 # list(id, words), or NULL.
@@ -66,7 +85,7 @@ reason_to_stop <- function(state, context) {
   stop_for <- function(id, words) list(id = id, words = words)
   control <- context$control
   if (!length(state$catalogue)) return(stop_for("empty", "the catalogue is empty"))
-  if (length(state$models) > length(state$catalogue)) {
+  if (!length(single_names_left(state))) {
     return(stop_for("all", "every mechanism of the catalogue has been adopted"))
   }
   if (is_spent(context)) return(stop_for("budget", budget_words(context)))
@@ -177,18 +196,6 @@ trial_order <- function(catalogue, attribution) {
     if (length(lost)) max(lost) else 0
   }, 0)
   names(catalogue)[order(-weight)]
-}
-
-# The present simulators with a mechanism, of each record in turn; what was adopted may act on some
-# of them.
-extended_simulators <- function(mechanism, state) {
-  brought <- setdiff(names(state$present$parameters), state$base)
-  simulators <- state$present$simulators
-  extended <- Map(function(simulator, record) {
-    extend(simulator, mechanism, intersect(brought, names(parameters_of(simulator))), record)
-  }, simulators, names(simulators) %||% state$started$record)
-  check_one_prior(lapply(unname(extended), parameters_of))
-  extended
 }
 
 # An edit that could be made on the base model may not be possible on top of what was adopted: then

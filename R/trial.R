@@ -12,6 +12,18 @@ as_present <- function(model, catalogue, context) {
   model
 }
 
+# The present simulators with a mechanism, of each record in turn; what was adopted may act on some
+# of them.
+extended_simulators <- function(mechanism, state) {
+  brought <- setdiff(names(state$present$parameters), state$base)
+  simulators <- state$present$simulators
+  extended <- Map(function(simulator, record) {
+    extend(simulator, mechanism, intersect(brought, names(parameters_of(simulator))), record)
+  }, simulators, names(simulators) %||% state$started$record)
+  check_one_prior(lapply(unname(extended), parameters_of))
+  extended
+}
+
 # A mechanism tried on the present model: a model at level "tried", or "silent" if it changes
 # nothing. `off`: the values of its parameters at which it is switched off, if they are known.
 try_mechanism <- function(present, name, simulators, off, bar, context) {

@@ -29,6 +29,14 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'
 #' [decision_rules()] lists every number that decides.
 #'
+#' # Pairs
+#'
+#' If no mechanism suffices alone, though much of the error is left, pairs of mechanisms are tried.
+#' One of a pair may take away what the other brings too much of. What the trials have seen tells
+#' which pairs promise this. A pair must earn twice the log10 Bayes factor of a mechanism. It is
+#' adopted as one, in one step, under both names (`"sun + leak"`). `catalogue` of the result then
+#' holds it too.
+#'
 #' # Workers
 #'
 #' If [future::plan()] offers workers and there is no budget, the mechanisms of a step after the
@@ -107,6 +115,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'     standard error.
 #'
 #'   Each model also has
+#'   * `rivals`: mechanisms that the record does not distinguish from it. They and "no change" have
+#'     together more than 5 % of the probability.
 #'   * `confounded_with`: parameters that are correlated beyond 0.4 with those that the mechanism
 #'     brought.
 #'   * `steps`: what shorter steps of the simulator change, for each record (`NULL` if this is not

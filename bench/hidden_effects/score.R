@@ -10,7 +10,7 @@ score_world <- function(world, control = list(max_steps = 2,
                                   control = control, seed = fit_seed(world), threads = 1,
                                   quiet = TRUE)
   wall <- proc.time()[["elapsed"]] - started
-  adopted <- vapply(upgrade$models[-1], `[[`, "", "mechanism")
+  adopted <- unlist(adopted_mechanisms(upgrade))
   attributed <- attributed_condition(upgrade)
   verdict <- amiss:::diagnosis_verdict(upgrade)
   rmse <- vapply(upgrade$models, function(m) m$scores$calibrate[["rmse"]], 0)
@@ -22,8 +22,9 @@ score_world <- function(world, control = list(max_steps = 2,
     days = world$days, true_boundary = world$true_boundary,
     true_mechanism = intersect(world$kinds, names(world$catalogue)),
     condition = told_condition(upgrade, attributed), attributed_condition = attributed,
-    mechanism = if (length(adopted)) adopted[1] else NA, adopted = adopted,
-    verdicts = mechanism_verdicts(upgrade, verdict$verdict), check_passed = check_passed(upgrade),
+    mechanism = if (length(adopted)) adopted[1] else NA, adopted = as.character(adopted),
+    verdicts = rep(mechanism_verdicts(upgrade, verdict$verdict),
+                   lengths(adopted_mechanisms(upgrade))), check_passed = check_passed(upgrade),
     verdict = verdict$verdict, unexplained = verdict$verdict == "unexplained",
     headline = verdict$headline,
     log10_bf = max(upgrade$candidates$log10_bf[upgrade$candidates$from == upgrade$models[[1]]$name],
@@ -32,11 +33,20 @@ score_world <- function(world, control = list(max_steps = 2,
     physical_covered = parameter_covered(world, upgrade, "physical"),
     rmse = rmse, best_rmse = best, rmse_ratio = rmse[length(rmse)] / best,
     over_least = if (least_squares) over_least_squares(world, upgrade) else c(NA, NA),
-    doubts = lapply(upgrade$models[-1], function(m) names(m$doubts)),
+    doubts = rep(lapply(upgrade$models[-1], function(m) names(m$doubts)),
+                 lengths(adopted_mechanisms(upgrade))),
     candidates = first_trials(upgrade), wall_s = wall, runs_total = upgrade$runs_total)
   if (rivals) row <- c(row, rival_conditions(upgrade$models[[1]]$fit, world),
                        list(paper_condition = paper_condition(world, 120)))
   row
+}
+
+# The mechanisms of each model, both of a pair.
+adopted_mechanisms <- function(upgrade) {
+  lapply(upgrade$models[-1], function(m) {
+    of <- upgrade$catalogue[[m$mechanism]]$of
+    if (is.null(of)) m$mechanism else of
+  })
 }
 
 # What is said of each mechanism that was adopted, in turn; of all of them together where the
@@ -75,7 +85,7 @@ best_rmse <- function(world) {
 # squares on the same simulator by itself.
 over_least_squares <- function(world, upgrade) {
   model <- upgrade$models[[length(upgrade$models)]]
-  adopted <- vapply(upgrade$models[-1], `[[`, "", "mechanism")
+  adopted <- unlist(adopted_mechanisms(upgrade))
   simulator <- Reduce(function(simulator, name) world$catalogue[[name]]$edit(simulator), adopted,
                       world$base)
   m <- world$measurements

@@ -34,7 +34,7 @@ test_that("a mechanism that nothing speaks against is named", {
 })
 
 test_that("each doubt makes a mechanism likely", {
-  expect_doubt("other causes are possible", function(u) {
+  expect_doubt("does not distinguish it from drift \\(30 %\\)", function(u) {
     u$candidates$probability <- c(0.6, 0.3)
     u
   })
@@ -109,14 +109,14 @@ test_that("so it is of a second sensor of the sun, not of one that is coarse", {
 test_that("what was adopted later is no other cause", {
   upgrade <- small_upgrade()
   upgrade$candidates$probability <- ifelse(upgrade$candidates$mechanism == "sun", 0.6, 0.4)
-  expect_match(rejudged(upgrade)$models[[2]]$doubts, "other causes are possible")
+  expect_match(rejudged(upgrade)$models[[2]]$doubts, "does not distinguish it from drift")
   later <- upgrade$models[[2]]
   later[c("name", "parent", "mechanism")] <- list("base + sun + drift", "base + sun", "drift")
   upgrade$models[[3]] <- later
   upgrade$candidates <- rbind(upgrade$candidates,
                               transform(upgrade$candidates, from = "base + sun"))
   upgrade <- rejudged(upgrade)
-  expect_no_match(c("", upgrade$models[[2]]$doubts), "other causes")
+  expect_no_match(c("", upgrade$models[[2]]$doubts), "does not distinguish")
   expect_false(any(grepl("tell sun from drift", upgrade_inspections(upgrade))))
   expect_null(upgrade$models[[2]]$doubts[["alone"]])
   # It may be, if it comes as near without the other.
