@@ -64,7 +64,7 @@ check_by_left_out <- function(fit) {
   inputs <- fit$emulator$unit
   centre <- colSums(fit$weights * posterior_unit(fit))
   near <- order(rowSums(sweep(inputs, 2, centre)^2))[seq_len(
-    min(nrow(inputs), max(20, ceiling(nrow(inputs) / 5))))]
+    min(nrow(inputs), max(rules$left_out_runs, ceiling(rules$left_out_share * nrow(inputs)))))]
   error <- tcrossprod(fit$emulator$basis$vectors, loo$error[near, , drop = FALSE])
   error <- sqrt(error^2 + fit$emulator$basis$discarded_sd^2)
   new_check(fit, error, series_variance(fit$emulator$basis, loo$variance[near, , drop = FALSE]), 0,
@@ -96,7 +96,7 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
 # noise stated (it then holds more than noise), in units of that.
 error_over_noise <- function(fit, error) {
   posterior <- fit$posterior
-  picked <- systematic_draws(fit$weights, 8)
+  picked <- systematic_draws(fit$weights, rules$check_draws)
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   data$y <- numeric(nrow(error))
   priors <- fit$priors

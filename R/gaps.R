@@ -1,7 +1,5 @@
 # The record on equal steps: rows that were lost, stamps that stray, and values that drivers lack.
 
-stray_limit <- 0.25   # of a step: a reading is at the nearest step if it strays by no more
-stray_share <- 0.1    # of the rows that may be off all steps and are left out
 
 # The rows of the record: list(row, hours, segment, step), `row` the row of the data, NA where it
 # was lost. A segment goes on over lost rows that together last no longer than `bridge` hours, over
@@ -18,7 +16,7 @@ regular_grid <- function(hours, bridge, name, call = rlang::caller_env()) {
   if (any(!ends & (apart > 1e-6 * steps | steps < 0.5))) {
     snapped <- snap(hours, segment, step)
     row <- which(snapped$keep)
-    if (length(row) < (1 - stray_share) * length(hours))
+    if (length(row) < (1 - rules$stray_share) * length(hours))
       refuse_unequal(steps, step, ends, name, call)
     if (any(!ends & (apart > 0.01 * steps | steps < 0.5))) tell_stray(hours, snapped, name)
     hours <- snapped$hours[row]
@@ -32,7 +30,7 @@ refuse_unequal <- function(steps, step, ends, name, call) {
   off <- which(!ends & abs(steps - 1) > 0.01)[1]
   abort_input(c(paste("Time column {.val {name}} has unequal steps: {signif(steps[off] * step, 4)}",
                       "h after row {off}, while the usual step is {signif(step, 4)} h; more than",
-                      "{100 * stray_share} % of the rows are at no step."),
+                      "{100 * rules$stray_share} % of the rows are at no step."),
                 i = paste("Interpolate or average the record to equal steps; gaps and stamps that",
                           "stray a little may stay.")), call = call)
 }
@@ -61,7 +59,7 @@ snap_to <- function(hours, segment, step) {
   stray <- abs(hours - at)
   nearest <- logical(length(hours))
   nearest[order(stray)] <- !duplicated(data.frame(segment, index)[order(stray), ])
-  list(hours = at, step = step, keep = stray <= stray_limit * step & nearest)
+  list(hours = at, step = step, keep = stray <= rules$stray_limit * step & nearest)
 }
 
 insert_lost <- function(row, hours, segment, step) {

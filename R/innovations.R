@@ -1,11 +1,11 @@
 # What a record does at each row beyond what the fitted model expects of it, given all rows before.
 # If the model is right, these innovations at a draw of its posterior are independent and N(0, 1).
 
-longest_filtered <- 20000  # rows; of a longer record the first ones
 
 # A draw of the posterior is distributed as the true parameters are (Johnson 2007, Bayesian model
 # assessment using pivotal quantities), so that no degree of freedom is lost to what was fitted.
-innovations <- function(fit, draw = systematic_draws(fit$weights, 1), most = longest_filtered) {
+innovations <- function(fit, draw = systematic_draws(fit$weights, 1),
+                        most = rules$longest_filtered) {
   parts <- covariance_parts(fit, draw)
   m <- fit$measurements
   steps <- c(Inf, diff(m$hours[fit$rows]))

@@ -204,7 +204,7 @@ edge_inspections <- function(fit) {
 tied_inspections <- function(fit) {
   r <- posterior_correlation(fit)
   if (ncol(r) < 2) return(NULL)
-  pairs <- which(abs(r) > 0.9 & upper.tri(r), arr.ind = TRUE)
+  pairs <- which(abs(r) > rules$tied & upper.tri(r), arr.ind = TRUE)
   label <- parameter_labels(fit, colnames(r))
   a <- label[pairs[, 1]]
   b <- label[pairs[, 2]]
@@ -220,7 +220,7 @@ tied_inspections <- function(fit) {
 
 loose_inspections <- function(fit) {
   left <- narrowing(fit)
-  loose <- names(left)[left > 0.7]
+  loose <- names(left)[left > rules$loose]
   if (length(loose)) {
     c(loose = sprintf(paste("The record says little about %s: %s is still the prior's; if it",
                             "matters, measure it or find a record in which it shows."),

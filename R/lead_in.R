@@ -46,7 +46,7 @@ record_rows_at <- function(hours, raw, rows, needed) {
                    rowSums(!is.finite(raw$drivers[, needed, drop = FALSE])) == 0)
   if (!length(earlier)) return(rep(NA_integer_, length(hours)))
   nearest <- earlier[pmax(1, findInterval(hours + 0.5 * raw$step_h, raw$hours[earlier]))]
-  ifelse(abs(raw$hours[nearest] - hours) <= stray_limit * raw$step_h, nearest, NA_integer_)
+  ifelse(abs(raw$hours[nearest] - hours) <= rules$stray_limit * raw$step_h, nearest, NA_integer_)
 }
 
 tell_repeated <- function(source, step, segment, begins) {

@@ -26,7 +26,7 @@ match_rows <- function(seconds, ends, step, stamps) {
   own <- step / per_row
   seconds <- seconds + own * c(end = 0, middle = 0.5, start = 1)[[stamps]]
   place <- (seconds - (ends[1] - step)) / own
-  at <- known[abs(place[known] - round(place[known])) <= stray_limit]
+  at <- known[abs(place[known] - round(place[known])) <= rules$stray_limit]
   at <- at[round(place[at]) >= 1 & round(place[at]) <= length(ends) * per_row]
   row <- as.integer(ceiling(round(place[at]) / per_row))
   list(at = at, row = row, count = tabulate(row, length(ends)), per_row = per_row, coarse = coarse,

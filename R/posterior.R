@@ -226,7 +226,9 @@ edge_of_prior <- function(fit) {
   unit <- posterior_unit(fit)
   stats::setNames(vapply(seq_len(ncol(unit)), function(p) {
     q <- weighted_quantile(unit[, p], fit$weights, c(0.025, 0.5, 0.975))
-    (q[3] > 0.99 && q[2] > 0.9) || (q[1] < 0.01 && q[2] < 0.1)
+    near <- rules$edge_interval
+    outer <- rules$edge_median
+    (q[3] > 1 - near && q[2] > 1 - outer) || (q[1] < near && q[2] < outer)
   }, NA), colnames(fit$values))
 }
 
@@ -282,7 +284,7 @@ draws_of_modes <- function(fit, name) {
   w <- fit$weights[keep][order] / sum(fit$weights[keep])
   width <- diff(weighted_quantile(x, w, c(0.025, 0.975)))
   below <- cumsum(w)[-length(w)]
-  gap <- which(diff(x) > 0.25 * width & below > 0.05 & below < 0.95)
+  gap <- which(diff(x) > rules$mode_gap * width & pmin(below, 1 - below) > rules$mode_part)
   part <- findInterval(seq_along(x), gap + 1)
   lapply(unname(split(seq_along(x), part)), function(own) list(x = x[own], w = w[own]))
 }

@@ -123,12 +123,12 @@ usual_ends <- function(values) format_each(signif(range(values), 4))
 far_rows <- function(v) {
   size <- if (are_amounts(v)) sqrt(v) else v
   u <- sort(unique(size))
-  if (length(u) < 10) return(integer())
-  skip <- ceiling(length(u) / 20)
+  if (length(u) < rules$few_values) return(integer())
+  skip <- ceiling(rules$record_tail * length(u))
   upper <- first_gap(u[-seq_len(skip)], u[length(u) - skip])
   lower <- -first_gap(-rev(u)[-seq_len(skip)], -u[skip + 1])
   rows <- which(size > upper | size < lower)
-  if (length(rows) <= sum(!is.na(v)) / 10) rows else integer()
+  if (length(rows) <= rules$few_far * sum(!is.na(v))) rows else integer()
 }
 
 # The last of rising values before such a gap, beginning at `from`.
@@ -139,7 +139,7 @@ first_gap <- function(u, from) {
 
 are_amounts <- function(v) {
   v <- v[!is.na(v)]
-  length(v) > 0 && min(v) == 0 && mean(v == 0) > 0.1
+  length(v) > 0 && min(v) == 0 && mean(v == 0) > rules$zero_share
 }
 
 # ---- the end of a range
@@ -148,7 +148,8 @@ are_amounts <- function(v) {
 piled_rows <- function(v, upper) {
   levels <- rle(sort(if (upper) -v else v))
   count <- levels$lengths
-  if (length(count) < 6 || count[1] < max(5, 0.01 * sum(count))) return(NULL)
+  least <- max(rules$pile_rows, rules$pile_share * sum(count))
+  if (length(count) < 6 || count[1] < least) return(NULL)
   end <- levels$values[1] * if (upper) -1 else 1
   if (count[1] > rules$piled_up * max(count[2:6])) list(rows = which(v == end), end = end)
 }
@@ -174,7 +175,7 @@ range_finding <- function(x) {
 
 # ---- readings that repeat
 
-has_few_levels <- function(v) length(unique(v[!is.na(v)])) <= 10
+has_few_levels <- function(v) length(unique(v[!is.na(v)])) <= rules$few_values
 
 # Unbroken runs of one value: list(first, length, value), without those of zero.
 value_runs <- function(v) {
@@ -188,7 +189,7 @@ value_runs <- function(v) {
 # either end of its range.
 stuck_finding <- function(x) {
   runs <- value_runs(x$v)
-  if (length(runs$length) < 10) return(NULL)
+  if (length(runs$length) < rules$few_values) return(NULL)
   usual <- stats::quantile(runs$length, 0.9, type = 1)
   long <- runs$length > max(rules$stuck_runs * usual, if (!x$is_target) rules$stuck_rows)
   if (!x$is_target) long <- long & !runs$value %in% range(x$v, na.rm = TRUE)
@@ -203,7 +204,7 @@ stuck_finding <- function(x) {
 # Changes of value stand a whole number of rows apart.
 repeated_finding <- function(x) {
   changes <- which(diff(x$v) != 0)
-  if (length(changes) < 10) return(NULL)
+  if (length(changes) < rules$few_values) return(NULL)
   times <- common_spacing(changes)
   if (times < 2 || x$per_step %% times == 0) return(NULL)
   list(value = times, says = sprintf(paste("%s changes every %d rows at most: each value stands in",
@@ -214,7 +215,8 @@ repeated_finding <- function(x) {
 # The largest spacing that nineteen in twenty of the places share.
 common_spacing <- function(at) {
   for (times in sort(unique(diff(at)), decreasing = TRUE)) {
-    if (times > 1 && max(tabulate(at %% times + 1)) >= 0.95 * length(at)) return(times)
+    most <- max(tabulate(at %% times + 1))
+    if (times > 1 && most >= rules$repeated_share * length(at)) return(times)
   }
   1
 }
@@ -227,7 +229,9 @@ value_step <- function(v) {
   apart <- apart[apart > 1e-9 * max(abs(v), na.rm = TRUE)]
   if (length(apart) < 3) return(NULL)
   step <- stats::median(apart)
-  if (mean(abs(apart / step - round(apart / step)) < 0.01 & apart / step > 0.5) > 0.9) step
+  whole <- round(apart / step)
+  are_steps <- whole > 0 & abs(apart / step - whole) < rules$step_off
+  if (mean(are_steps) > rules$step_share) step
 }
 
 quantised_finding <- function(x) {
@@ -263,7 +267,7 @@ circle_jumps <- function(v) {
   pairs <- pairs[rowSums(pairs == 0) == 0, , drop = FALSE]  # zero is off, or calm
   jump <- abs(pairs[, 2] - pairs[, 1])
   over <- jump > 180
-  close <- any(over) && stats::median(360 - jump[over]) < 60
+  close <- any(over) && stats::median(360 - jump[over]) < rules$circle_near
   if (close && all(tabulate(floor((v %% 360) / 90) + 1, 4) > 0)) sum(over) else 0
 }
 
@@ -273,9 +277,11 @@ counter_finding <- function(x) {
   change <- diff(v)
   fall <- which(change < 0)
   rise <- change[change > 0]
-  if (!length(fall) || length(rise) < 20 || length(fall) > length(rise) / 5) return(NULL)
-  if (length(unique(signif(rise, 6))) <= 5) return(NULL)
-  resets <- v[fall + 1] <= min(v) + 0.1 * diff(range(v)) & -change[fall] > 3 * max(rise)
+  if (!length(fall) || length(rise) < rules$counter_rises ||
+      length(fall) > rules$counter_falls * length(rise)) return(NULL)
+  if (length(unique(signif(rise, 6))) <= rules$clock_rises) return(NULL)
+  to_start <- v[fall + 1] <= min(v) + rules$counter_start * diff(range(v))
+  resets <- to_start & -change[fall] > rules$counter_reset * max(rise)
   if (!all(resets)) return(NULL)
   list(value = length(fall), says = sprintf(
     paste("%s only rises, and is reset %s: it is a counter. Give its change over each row."),

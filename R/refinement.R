@@ -179,7 +179,7 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
   # it lies elsewhere in part. An emulator that knows how far it is off has widened the posterior
   # already.
   astray <- isTRUE(fit$check$border > rules$border || fit$check$z2 > 1)
-  region <- posterior_region(fit, growth = if (astray) 1.5 else 1)
+  region <- posterior_region(fit, growth = if (astray) rules$astray_growth else 1)
   regional_ensemble(ensemble, region, fit$emulator, fit$measurements, runs, threads)
 }
 
@@ -189,7 +189,7 @@ regional_ensemble <- function(ensemble, region, emulator, measurements, runs, th
   values <- unit_to_values(unit, ensemble$parameters)
   outputs <- simulate_measured(ensemble$simulator, values, measurements, "calibrate", threads)
   # The last of the runs that lie inside: those of checks, where the posterior was seen last.
-  inside <- utils::tail(which(in_region(region, ensemble$unit)), 40)
+  inside <- utils::tail(which(in_region(region, ensemble$unit)), rules$inside_runs)
   new_ensemble(ensemble$parameters, rbind(ensemble$unit[inside, , drop = FALSE], unit),
                rbind(ensemble$values[inside, , drop = FALSE], values),
                cbind(ensemble$outputs[, inside, drop = FALSE], outputs), ensemble$simulator,

@@ -48,8 +48,9 @@ region_of_draws <- function(unit, weights, parameters, growth = 1) {
     diag(1e-10, ncol(z))
   root <- growth * t(chol(covariance))
   distance <- sqrt(colSums(forwardsolve(root, t(apart))^2))
-  farthest <- max(sqrt(stats::qchisq(0.999, ncol(z))), weighted_quantile(distance, w, 0.999))
-  new_region(centre, root, 1.1 * farthest, parameters)
+  held <- rules$region_quantile
+  farthest <- max(sqrt(stats::qchisq(held, ncol(z))), weighted_quantile(distance, w, held))
+  new_region(centre, root, rules$region_margin * farthest, parameters)
 }
 
 # The region as the parameters `own` see it.

@@ -121,12 +121,10 @@ drift_evidence <- function(base, threads) {
 response_ais <- list(pilot_chains = 64, groups = 2, max_groups = 2, max_sweeps = 6, precision = 1,
                      importance_draws = 300, ess_drop = 0.3, gradient = FALSE)
 
-response_scales <- c(1, 0.25, 0.0625)
-
 # What the record says of responses (rows x k) beside the model of a calibration, taken as its
 # tangent: their log10 Bayes factor against none, its 95 % interval and the word. Amounts are N(0,
 # 1) times the scale that suits the record best.
-responses_factor <- function(fit, responses, threads, scales = response_scales) {
+responses_factor <- function(fit, responses, threads, scales = rules$drift_scale^(0:2)) {
   data <- history_data(fit$emulator, fit$measurements, fit$rows, fit$control)
   ais <- fill_ais_control(utils::modifyList(fit$control$ais, response_ais))
   evidence <- function(responses) {

@@ -127,8 +127,8 @@ regression_slopes <- function(model, at) {
   ways <- sweep(model$runs$z, 2, model$runs$z[at, ])
   fine <- succeeded(model)
   x <- cbind(1, ways)[fine, , drop = FALSE]
-  weights <- 1 / (0.5 + rowSums(ways^2)[fine])
-  penalty <- diag(c(0, rep(0.02, ncol(ways))), ncol(x))
+  weights <- 1 / (rules$scout_near + rowSums(ways^2)[fine])
+  penalty <- diag(c(0, rep(rules$scout_ridge, ncol(ways))), ncol(x))
   coefficients <- solve(crossprod(x * sqrt(weights)) + penalty,
                         crossprod(x * weights, t(model$runs$outputs[, fine, drop = FALSE])))
   t(coefficients[-1, , drop = FALSE])

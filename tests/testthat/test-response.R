@@ -37,7 +37,7 @@ test_that("the factor of a response lies near that of the mechanism, fully calib
 
 test_that("amounts are of the scale that suits the record best", {
   sun <- 0.0058 * felt("Gv", 3)
-  each <- vapply(amiss:::response_scales, function(scale) {
+  each <- vapply(amiss:::rules$drift_scale^(0:2), function(scale) {
     of_response(sun, scales = scale)$log10_bf
   }, 0)
   expect_equal(of_response(sun)$log10_bf, max(each), tolerance = 1e-10)
