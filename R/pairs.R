@@ -45,7 +45,7 @@ promising_pairs <- function(state, trials) {
   after <- vapply(pairs, left, 0)
   together <- none - after
   apart <- vapply(pairs, function(pair) sum(alone[pair]), 0)
-  enough <- after < max(rules$large_remainder^2, 1 + rules$cause_leaves * (none - 1))
+  enough <- after - 1 < rules$cause_leaves * (none - 1)
   promising <- pairs[order(after)][(enough & apart < rules$pair_share * together)[order(after)]]
   entries <- lapply(utils::head(promising, rules$pairs), function(pair)
     paired_mechanism(state$catalogue[[pair[1]]], state$catalogue[[pair[2]]]))
