@@ -116,9 +116,12 @@ start_fmu_worker <- function(fmu, platform) {
     ready <- fmu_answer_line %in% worker$process$read_output_lines()
   }
   if (ready) return(worker)
+  how <- if (worker$process$is_alive()) paste("it did not answer within", fmu_start_limit, "s")
+         else ended_words(worker)
   said <- fmu_last_words(NULL, file.path(worker$folder, "stderr.txt"))
-  abort_input(c("the process of the FMU could not be started: {said}"),
-              class = "amiss_error_worker", call = NULL)
+  why <- paste(c(paste("the process of the FMU could not be started:", how), said),
+               collapse = ". ")
+  abort_input("{why}", class = "amiss_error_worker", call = NULL)
 }
 
 unpacked_fmus <- new.env(parent = emptyenv())

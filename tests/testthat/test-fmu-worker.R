@@ -37,6 +37,19 @@ test_that("each way to fail is told, and the session and the next runs go on", {
   expect_match(told, "asked to end the simulation")
 })
 
+test_that("a process that does not start says how it ended", {
+  once <- faulty(house_file())
+  amiss:::stop_fmu_worker(once)
+  stand_in(fmu_start_limit = 0)
+  told <- told_of(simulate_runs(once, with_fault(0), house_drivers(3), 1))
+  expect_match(told, "could not be started: it did not answer within 0 s")
+  # Nor one whose package cannot be loaded.
+  stand_in(fmu_start_limit = 60, start_process = function(command, args, ...)
+    processx::process$new(command, c("--vanilla", "-e", "stop('no package')"), ...))
+  told <- told_of(simulate_runs(once, with_fault(0), house_drivers(3), 1))
+  expect_match(told, "could not be started: its process ended with exit status 1. .*no package")
+})
+
 test_that("no run is lost that succeeds, and those that fail cost no process that need not end", {
   house <- faulty(house_file(), time_limit = 1)
   fault <- rep(0, 30)
