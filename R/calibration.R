@@ -243,13 +243,12 @@ fill_calibration_control <- function(control, measurements, n, what = "control",
 
 # What a person should know before using it.
 fit_trust <- function(fit) {
-  why <- c(if (!fit$posterior$trusted) fit$posterior$verdict,
-           if (isFALSE(fit$check$passed)) paste("not trusted:", fit$check$verdict),
-           if (fit$posterior$trusted && fit$standard_error > rules$evidence_error)
-             paste("not trusted: corrected by the runs, the evidence has a standard error of",
-                   "more than one nat"))
-  list(trusted = is.null(why),
-       verdict = if (is.null(why)) fit$posterior$verdict else paste(why, collapse = "; "))
+  against <- c(if (!fit$posterior$trusted) fit$posterior$why,
+               if (isFALSE(fit$check$passed)) fit$check$verdict,
+               if (fit$posterior$trusted && fit$standard_error > rules$evidence_error)
+                 paste("corrected by the runs, the evidence has a standard error of more than one",
+                       "nat"))
+  new_trust(is.null(against), against %||% fit$posterior$why)
 }
 
 #' @export

@@ -30,7 +30,7 @@ sure_sentences <- function(upgrade) {
   best <- trials[if (length(adopted)) match(adopted[[1]]$mechanism, trials$mechanism) else 1, ]
   needed <- sprintf(paste("This was the best; to be adopted, a mechanism needs odds of %s and a 95",
                           "%% interval that lies wholly in its favour."),
-                    sub(" in favour", "", odds(upgrade$control$decisive)))
+                    odds_size(upgrade$control$decisive))
   if (!length(adopted)) {
     if (unjudged(upgrade))
       return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
@@ -77,7 +77,7 @@ unjudged_sentence <- function(fit) {
   remedy <- if (is_given(model_of(fit))) "more runs where the posterior lies, or narrower priors"
             else "more runs, narrower priors or a shorter record"
   sprintf("No odds can be given for or against any mechanism: %s. What would change it: %s.",
-          gsub("not trusted: ", "", fit$trust$verdict), remedy)
+          paste(fit$trust$why, collapse = "; "), remedy)
 }
 
 # Only where the size of the error itself says that something is missing, and not that the

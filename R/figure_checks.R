@@ -69,7 +69,7 @@ figure_sampler <- function(results) {
   trusted <- vapply(results, function(r) isTRUE(r$trusted), TRUE)
   title <- if (all(trusted)) "The sampler passed its own checks"
            else paste("The sampler is not to be trusted:",
-                      sub("^not trusted: ", "", results[[which(!trusted)[1]]]$verdict))
+                      results[[which(!trusted)[1]]]$why)
   figure <- ggplot2::ggplot(
     table, ggplot2::aes(.data$beta, .data$value, colour = .data$stage, shape = .data$stage)) +
     ggplot2::geom_line(ggplot2::aes(linetype = .data$stage), linewidth = 0.8) +

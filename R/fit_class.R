@@ -52,6 +52,12 @@ default_control <- function(fit) UseMethod("default_control")
 # What a comparison shows of the conditions.
 condition_table <- function(fit, settings) UseMethod("condition_table")
 
+# Whether to believe numbers, and why: `why` is one reason or several.
+new_trust <- function(trusted, why) {
+  list(trusted = trusted, why = why,
+       verdict = paste(if (trusted) "trusted:" else "not trusted:", paste(why, collapse = "; ")))
+}
+
 # What the sampler said: of the paper's calibration, which samples twice, of both.
 sampler_said <- function(fit) if (knows_history(fit)) fit$posterior else fit$trust
 

@@ -364,9 +364,7 @@ best_runs <- function(model) {
   }, model$own, model$rows)
 }
 
-not_checked <- function() {
-  list(trusted = FALSE, verdict = "not trusted: the budget left no runs to check the emulator")
-}
+not_checked <- function() new_trust(FALSE, "the budget left no runs to check the emulator")
 
 # Of searches from several starts no two led to one mode: there may be a better one.
 not_agreed <- function(trust, modes) {
@@ -375,9 +373,7 @@ not_agreed <- function(trust, modes) {
          else if (modes$searches < 2)
            "the budget allowed a single search, so that no other confirms its mode"
          else sprintf("no two of %d searches led to one mode", modes$searches)
-  list(trusted = FALSE,
-       verdict = paste0(c(if (!trust$trusted) trust$verdict, paste("not trusted:", why)),
-                        collapse = "; "))
+  new_trust(FALSE, c(if (!trust$trusted) trust$why, why))
 }
 
 # Whether a second search ended in the region of the posterior, as seen in the end; and how many

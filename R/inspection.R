@@ -102,7 +102,7 @@ emulator_inspection <- function(models) {
 }
 
 sampler_inspection <- function(models) {
-  why <- vapply(models, function(m) sub("^not trusted: ", "", sampler_said(m$fit)$verdict), "")
+  why <- vapply(models, function(m) listed(sampler_said(m$fit)$why), "")
   chains <- unique(vapply(models, function(m) as.integer(m$fit$control$ais$pilot_chains), 0L))
   c(sampler = sprintf("%s: give %s more chains (pilot_chains, %s now).",
                       untrusted_words("sampler's result for", "sampler's results for", models,

@@ -26,10 +26,8 @@ new_joint <- function(fits) {
   values <- do.call(cbind, unname(lapply(fits, `[[`, "values")))[, names(parameters), drop = FALSE]
   first <- fits[[1]]
   untrusted <- Filter(function(name) !fits[[name]]$trust$trusted, names(fits))
-  verdict <- if (!length(untrusted)) first$trust$verdict else {
-    paste(vapply(untrusted, function(name) paste0(name, ": ", fits[[name]]$trust$verdict), ""),
-          collapse = "; ")
-  }
+  why <- if (!length(untrusted)) first$trust$why
+         else unlist(lapply(untrusted, function(name) paste0(name, ": ", fits[[name]]$trust$why)))
   posterior <- first$posterior[setdiff(names(first$posterior), c("setting", "variance", "t"))]
   units <- do.call(cbind, unname(lapply(fits, posterior_unit)))
   named <- unlist(lapply(fits, function(fit) names(fit$emulator$parameters)))
@@ -39,7 +37,7 @@ new_joint <- function(fits) {
          values = values, weights = first$weights, posterior = posterior,
          log_evidence = first$log_evidence, standard_error = first$standard_error,
          interval = first$interval, check = joint_check(fits),
-         trust = list(trusted = !length(untrusted), verdict = verdict), rounds = first$rounds,
+         trust = new_trust(!length(untrusted), why), rounds = first$rounds,
          runs_made = first$runs_made, modes = first$modes, exchanges = first$exchanges,
          seed = first$seed),
     class = "amiss_joint")

@@ -167,7 +167,8 @@ add_mode <- function(result, density, peak, seed) {
   result$interval <- log_evidence + c(-1.96, 1.96) * error
   result$ess <- 1 / sum(result$weights^2)
   if (result$trusted) {
-    result$verdict <- "trusted: a search added a mode of the posterior that the chains had missed"
+    found <- "a search added a mode of the posterior that the chains had missed"
+    result[c("trusted", "why", "verdict")] <- new_trust(TRUE, found)
   }
   result
 }

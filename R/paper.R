@@ -125,10 +125,9 @@ calibrate_paper <- function(emulator, measurements, control = NULL, seed = NULL,
 
 # What a person should know before using it.
 paper_trust <- function(outside, inside) {
-  why <- c(if (!outside$trusted) paste("discrepancy:", outside$verdict),
-           if (!inside$trusted) paste("parameters:", inside$verdict))
-  list(trusted = is.null(why),
-       verdict = if (is.null(why)) inside$verdict else paste(why, collapse = "; "))
+  against <- c(if (!outside$trusted) paste("discrepancy:", outside$why),
+               if (!inside$trusted) paste("parameters:", inside$why))
+  new_trust(is.null(against), against %||% inside$why)
 }
 
 fill_paper_control <- function(control, n, what = "control", call = rlang::caller_env()) {

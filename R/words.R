@@ -130,10 +130,11 @@ power_of_ten <- function(x)
 format_each_comma <- function(x) vapply(x, format, "", big.mark = ",", scientific = FALSE)
 
 odds <- function(x) {
-  size <- power_of_ten(abs(x))
-  if (size == "1") return("1 to 1, neither for nor against")
-  paste(size, if (x >= 0) "to 1 in favour" else "to 1 against")
+  if (power_of_ten(abs(x)) == "1") return("1 to 1, neither for nor against")
+  paste(odds_size(x), if (x >= 0) "in favour" else "against")
 }
+
+odds_size <- function(x) paste(power_of_ten(abs(x)), "to 1")
 
 # An interval of odds in words, left out where both ends read the same and lie on one side.
 odds_interval <- function(interval) {

@@ -75,7 +75,9 @@ inline Rcpp::List ais_list(const AisResult& result) {
       _["ladder"] = Rcpp::DataFrame::create(_["beta"] = beta, _["step"] = step, _["sweeps"] = sweeps,
                                             _["acceptance"] = acceptance, _["ess"] = ess),
       _["evaluations"] = static_cast<double>(result.evaluations), _["trusted"] = trusted(result.outcome),
-      _["verdict"] = in_words(result.outcome));
+      _["why"] = in_words(result.outcome),
+      _["verdict"] =
+          (trusted(result.outcome) ? "trusted: " : "not trusted: ") + std::string(in_words(result.outcome)));
   out["weights"] = result.weights;
   out["log_likelihood"] = result.log_likelihood;
   return out;

@@ -349,7 +349,7 @@ test_that(
   expect_match(paste(summary(open)$sure, collapse = " "), "odds of")
   open$models[[1]]$fit$check$passed <- FALSE
   open$models[[1]]$fit$trust <- list(
-    trusted = FALSE, verdict = "not trusted: the emulator's error is 0.64 of the noise")
+    trusted = FALSE, why = "the emulator's error is 0.64 of the noise")
   told <- summary(open)
   expect_identical(told$verdict, "unexplained")
   expect_match(told$headline,

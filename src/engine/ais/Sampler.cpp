@@ -141,19 +141,19 @@ const char* in_words(Estimator estimator) {
 const char* in_words(Outcome outcome) {
   switch (outcome) {
     case Outcome::hardly_moves:
-      return "not trusted: the chains hardly move at some temperature";
+      return "the chains hardly move at some temperature";
     case Outcome::few_chains:
-      return "not trusted: a few chains carry all the weight";
+      return "a few chains carry all the weight";
     case Outcome::imprecise:
-      return "not trusted: the standard error exceeds one nat";
+      return "the standard error exceeds one nat";
     case Outcome::inconsistent:
-      return "not trusted: the other estimator has seen part of the posterior that this one misses";
+      return "the other estimator has seen part of the posterior that this one misses";
     case Outcome::approximate:
-      return "not trusted: the approximate kernel is off by more than a nat at some draws";
+      return "the approximate kernel is off by more than a nat at some draws";
     case Outcome::uncompared:
-      return "trusted: chains move and weights are even";
+      return "chains move and weights are even";
     case Outcome::consistent:
-      return "trusted: chains move, weights are even and the two estimators are consistent";
+      return "chains move, weights are even and the two estimators are consistent";
   }
   return "";
 }
