@@ -58,7 +58,7 @@ object_shapes <- list(
                 region = "?list", trend = "?real[q,z]"),
   check = c(passed = "flag[1]", verdict = "text[1]", ratio = "number[1]",
             mean = "?real[n]"),
-  trust = c(trusted = "flag[1]", verdict = "text[1]"),
+  trust = c(trusted = "flag[1]", why = "?text", verdict = "text[1]"),
   amiss_fit = c(emulator = "amiss_emulator", measurements = "amiss_measurements", control = "list",
                 rows = "real[n]", priors = "list", values = "values[k,u]", weights = "real[k]",
                 posterior = ":posterior", log_evidence = "estimate[1]",

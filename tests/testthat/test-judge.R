@@ -40,7 +40,7 @@ test_that("each doubt makes a mechanism likely", {
   })
   for (k in 1:2) {
     expect_doubt("numbers behind it are not trusted", function(u) {
-      u$models[[k]]$fit$trust <- list(trusted = FALSE, verdict = "chains stick")
+      u$models[[k]]$fit$trust <- amiss:::new_trust(FALSE, "chains stick")
       u
     })
   }
@@ -348,8 +348,8 @@ test_that(
   open <- base_only(small_upgrade())
   expect_match(paste(summary(open)$sure, collapse = " "), "odds of")
   open$models[[1]]$fit$check$passed <- FALSE
-  open$models[[1]]$fit$trust <- list(
-    trusted = FALSE, why = "the emulator's error is 0.64 of the noise")
+  open$models[[1]]$fit$trust <- amiss:::new_trust(FALSE,
+                                                  "the emulator's error is 0.64 of the noise")
   told <- summary(open)
   expect_identical(told$verdict, "unexplained")
   expect_match(told$headline,
