@@ -175,11 +175,17 @@ cause_headline <- function(upgrade) {
   told <- vapply(seq_along(adopted), function(k) {
     m <- adopted[[k]]
     switch(m$verdict, named = paste0(if (k > 1) "Also: ", sentence(m)),
-           likely = paste0(if (k > 1) "Likely as well: " else "Most likely: ", sentence(m)),
+           likely = paste0(likely_word(m, k), sentence(m)),
            paste0("\"", m$mechanism, "\" fits", if (k > 1) " too", ", but held-out data do not ",
                   "improve with it: take it as a stand-in for something else."))
   }, "")
   paste(told, collapse = " ")
+}
+
+likely_word <- function(model, k) {
+  if (k > 1) "Likely as well: "
+  else if ("remains" %in% names(model$doubts)) "Likely a part of it: "
+  else "Most likely: "
 }
 
 #' @export

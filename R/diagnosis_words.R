@@ -17,6 +17,9 @@ improves_held_out <- function(upgrade) {
 }
 
 evidence_sentence <- function(row) {
+  if (!isTRUE(row$trusted) && row$upper95 - row$lower95 > rules$too_rough) {
+    return(sprintf("The numbers for %s are too rough for odds.", row$mechanism))
+  }
   sprintf("The evidence for %s over no change is %s: odds of %s%s.", row$mechanism, row$word,
           odds(row$log10_bf), odds_interval(c(row$lower95, row$upper95)))
 }
@@ -34,7 +37,8 @@ sure_sentences <- function(upgrade) {
   if (!length(adopted)) {
     if (unjudged(upgrade))
       return(c(missing_sentence(upgrade), unjudged_sentence(upgrade$models[[1]]$fit)))
-    if (keeps_error(best)) needed <- raised_sentence(best)
+    if (keeps_error(best) && best$log10_bf >= upgrade$control$decisive)
+      needed <- raised_sentence(best)
     else if (is_refuted(best)) needed <- refuted_sentence(best)
     else if (is_unverified(best, upgrade))
       needed <- "It was not adopted, because no runs were left to verify it."
@@ -95,9 +99,9 @@ probability_sentence <- function(trials) {
   all <- sort(all, decreasing = TRUE)
   near <- all[-1][all[-1] >= 0.01]
   told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
-  paste0("The most probable of ", nrow(trials),
-         if (nrow(trials) == 1) " mechanism" else " mechanisms",
-         " tried and \"no change\", all equally likely beforehand, is ", told(all[1]),
+  paste0("The most probable of ",
+         if (nrow(trials) == 1) "the mechanism tried" else paste(nrow(trials), "mechanisms tried"),
+         " and \"no change\", all equally likely beforehand, is ", told(all[1]),
          if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
 }
 

@@ -83,9 +83,8 @@ residuals.amiss_fit <- function(object, ...) {
 
 #' @rdname fit
 #' @export
-nobs.amiss_fit <- function(object, ...) {
+nobs.amiss_fit <- function(object, ...) {  # sigma() gives it `use.fallback`
   check_whole(object, "object")
-  rlang::check_dots_empty()
   length(object$rows)
 }
 
@@ -173,7 +172,8 @@ augment.amiss_fit <- function(x, data = NULL, newdata = NULL, ...) {
 
 augment_prediction <- function(fit, prediction) {
   ends <- grep("^(lower|upper)", names(prediction), value = TRUE)
-  out <- data.frame(prediction[c("time", "observed")], .fitted = prediction$mean,
+  told <- intersect(c("time", "observed", "use", "segment", "horizon"), names(prediction))
+  out <- data.frame(prediction[told], .fitted = prediction$mean,
                     .lower = prediction[[ends[1]]], .upper = prediction[[ends[2]]],
                     .resid = prediction$observed - prediction$mean)
   names(out)[2] <- fit$measurements$target

@@ -282,8 +282,9 @@ verify_model <- function(model, context, before = NULL,
     least <- filled + length(model$checked$at) + if (passed) 0 else rules$more_runs
   }
   best <- best %||% found
-  if (is.null(best$fits[[1]]$check)) {  # the budget ended before the check
-    return(with_fit(best$model, best$fits, best$model$level, 0, context))
+  if (is.null(best$fits[[1]]$check)) {  # the budget ended before the check, or all its runs failed
+    level <- if (is_spent(context)) best$model$level else "unchecked"
+    return(with_fit(best$model, best$fits, level, 0, context))
   }
   best$model$runs <- model$runs
   if (!is.null(model$modes)) best$model$modes <- confirmed_modes(best$model, model$modes, best$fits)
@@ -340,7 +341,7 @@ with_fit <- function(model, fits, level, rounds, context) {
   fits <- Map(function(fit, best) {
     fit$best <- best
     fit$trust <- fit_trust(fit)
-    if (is.null(fit$check)) fit$trust <- not_checked()
+    if (is.null(fit$check)) fit$trust <- not_checked(context)
     fit$rounds <- rounds
     fit$runs_made <- runs_spent(context)
     fit$modes <- model$modes
@@ -364,7 +365,10 @@ best_runs <- function(model) {
   }, model$own, model$rows)
 }
 
-not_checked <- function() new_trust(FALSE, "the budget left no runs to check the emulator")
+not_checked <- function(context) {
+  new_trust(FALSE, if (is_spent(context)) "the budget left no runs to check the emulator"
+                   else "the simulator failed at every draw of the posterior that was run")
+}
 
 # Of searches from several starts no two led to one mode: there may be a better one.
 not_agreed <- function(trust, modes) {

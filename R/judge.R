@@ -54,8 +54,12 @@ doubts <- list(
     }
   }, "what is adopted later may make it needless"),
   edge = doubt(function(case) {
-    if (any(edge_of_prior(case$model$fit)[case$new]))
-      "its value lies at the edge of what was thought possible"
+    edge <- edge_of_prior(case$model$fit)
+    beside <- case$confounded[edge[case$confounded]]
+    if (any(edge[case$new])) "its value lies at the edge of what was thought possible"
+    else if (length(beside))
+      sprintf("%s, with which it is correlated, lies at the edge of what was thought possible",
+              listed(parameter_labels(case$model$fit, beside)))
   }, "it may make up for something else"),
   remains = doubt(function(case) {
     if (case$remains) "a good part of the error remains"

@@ -183,10 +183,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
   }
   calibrate <- chosen_rows(calibrate, columns_known, clock, "calibrate")
   validate <- chosen_rows(validate, columns_known, clock, "validate")
-  calibrate <- rows_flag(calibrate, nrow(data), "calibrate",
-                         default = is.null(validate) | !isTRUE(any(validate)))
-  if (is.null(calibrate)) calibrate <- !validate
-  validate <- rows_flag(validate, nrow(data), "validate", default = FALSE)
+  validate <- rows_flag(validate, nrow(data), "validate") %||% rep(FALSE, nrow(data))
+  calibrate <- rows_flag(calibrate, nrow(data), "calibrate") %||% !validate
   if (any(calibrate & validate)) {
     abort_input(c(paste("{sum(calibrate & validate)} row{?s} both calibrate{?s/} and",
                         "validate{?s/}; the first is row {which(calibrate & validate)[1]}."),
@@ -237,7 +235,7 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                                                             c(target, terms$name)),
                                    use = use_given,
                                    noise_sd = noise$sd * sqrt(coarse$per_step),
-                                   per_step = coarse$per_step))
+                                   per_step = coarse$per_step, no_codes = identical(missing, NA)))
   structure(list(format_version = format_version, name = name, target = target, unit = unit,
                  label = label, noise_sd = noise$sd, noise = noise[-1], raw = raw,
                  per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time,
@@ -354,9 +352,8 @@ in_zone <- function(zone, code) {
   code
 }
 
-rows_flag <- function(rows, n, what, default, call = rlang::caller_env()) {
-  if (is.null(rows))
-    return(if (isTRUE(default)) rep(TRUE, n) else if (what == "calibrate") NULL else rep(FALSE, n))
+rows_flag <- function(rows, n, what, call = rlang::caller_env()) {
+  if (is.null(rows)) return(NULL)
   check_input(checkmate::check_logical(rows, len = n, any.missing = FALSE), what,
               "One TRUE or FALSE for every row of the data.", call = call)
   if (!any(rows)) abort_input("{.arg {what}} picks no row.", call = call)

@@ -150,15 +150,19 @@ extend <- function(simulator, mechanism, adopted = character(), record = NULL,
   extended
 }
 
-# Two mechanisms as one. `of`: their names.
-paired_mechanism <- function(a, b) {
+# Two mechanisms of a catalogue as one, under a name that no other has. `of`: their names.
+paired_mechanism <- function(names, catalogue) {
+  a <- catalogue[[names[1]]]
+  b <- catalogue[[names[2]]]
   both <- function(simulator, record) {
     first <- extend(simulator, a, record = record)
     brought <- setdiff(names(free_parameters(first)), names(free_parameters(simulator)))
     extend(first, b, brought, record)
   }
-  pair <- mechanism(paste(a$name, "+", b$name), both, union(a$boundary, b$boundary),
-                    paste(a$sentence, b$sentence))
+  name <- paste(a$name, "+", b$name)
+  while (!is.null(catalogue[[name]]) && !identical(catalogue[[name]]$of, names))
+    name <- paste(name, "together")
+  pair <- mechanism(name, both, union(a$boundary, b$boundary), paste(a$sentence, b$sentence))
   pair$of <- c(a$name, b$name)
   pair
 }

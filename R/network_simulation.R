@@ -140,7 +140,9 @@ coefficient_table <- function(network) {
 coefficient_values <- function(table, values) {
   out <- matrix(table$value, nrow(table), nrow(values))
   free <- which(!is.na(table$parameter))
-  out[free, ] <- table$factor[free] * t(values[, table$parameter[free], drop = FALSE])
+  if (length(free)) {
+    out[free, ] <- table$factor[free] * t(values[, table$parameter[free], drop = FALSE])
+  }
   out[table$inverse, ] <- 1 / out[table$inverse, ]
   out
 }

@@ -42,13 +42,16 @@ promising_pairs <- function(state, trials) {
   none <- left(character())
   alone <- none - vapply(names(changes), left, 0)
   pairs <- utils::combn(names(changes), 2, simplify = FALSE)
+  known <- names(present$parameters)
+  brought <- lapply(trials, function(trial) setdiff(names(trial$parameters), known))
+  pairs <- Filter(function(pair) !any(brought[[pair[1]]] %in% brought[[pair[2]]]), pairs)
+  if (!length(pairs)) return(list())
   after <- vapply(pairs, left, 0)
   together <- none - after
   apart <- vapply(pairs, function(pair) sum(alone[pair]), 0)
   enough <- after - 1 < rules$cause_leaves * (none - 1)
   promising <- pairs[order(after)][(enough & apart < rules$pair_share * together)[order(after)]]
-  entries <- lapply(utils::head(promising, rules$pairs), function(pair)
-    paired_mechanism(state$catalogue[[pair[1]]], state$catalogue[[pair[2]]]))
+  entries <- lapply(utils::head(promising, rules$pairs), paired_mechanism, state$catalogue)
   names(entries) <- vapply(entries, `[[`, "", "name")
   Filter(function(entry) can_be_made(entry, state), entries)
 }

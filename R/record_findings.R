@@ -47,7 +47,8 @@ record_column <- function(record, name) {
   label <- record$labels[name]
   # For sentences: whoever mends the record needs the name of its column too.
   x$told <- if (length(label) && !is.na(label)) labels_with_names(label, name) else name
-  c(list(v = v), x, record[c("use", "noise_sd", "per_step")])
+  c(list(v = v, no_codes = isTRUE(record$no_codes)), x,
+    record[c("use", "noise_sd", "per_step")])
 }
 
 column_findings <- function(x) {
@@ -89,7 +90,7 @@ stands_for_missing <- function(v, codes) {
 }
 
 code_finding <- function(x) {
-  rows <- coded_rows(x$v, x$is_circular)
+  rows <- if (!x$no_codes) coded_rows(x$v, x$is_circular)
   if (!length(rows)) return(NULL)
   codes <- unique(x$v[rows])
   list(rows = rows, value = codes[1],

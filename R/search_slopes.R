@@ -119,7 +119,17 @@ along <- function(bent, way) {
 }
 
 secant_slopes <- function(model, at, reference) {
-  along(bent_line(model, at, reference), numeric(length(reference$z)))$slopes
+  slopes <- along(bent_line(model, at, reference), numeric(length(reference$z)))$slopes
+  steep <- too_steep(model, at, slopes)
+  slopes[, steep] <- reference$slopes[, steep]
+  slopes
+}
+
+# Slopes that would move the output farther, over a standard deviation of the prior, than runs ever
+# differ: those of a jump between two runs that lie close to one another.
+too_steep <- function(model, at, slopes) {
+  differ <- model$runs$outputs[, succeeded(model), drop = FALSE] - model$runs$outputs[, at]
+  over_noise(model, slopes) > rules$steepest * max(over_noise(model, differ))
 }
 
 # Slopes about a run by regression on all runs over the priors, nearer ones weighing more.

@@ -23,6 +23,9 @@ constexpr double kTolerance = 1e-5;  // of a fit, relative: a few thousandths of
 // log t_s below the log variance of the whole error, white or not, where fits begin: an autocorrelated error
 // can do what responses do, so that the likelihood has more than one maximum.
 constexpr double kStarts[] = {1.0, 4.0, 8.0};
+// Least log variance of an error, below that of the stated noise: a millionth of its standard deviation. A
+// simulator that reproduces its record leaves nothing, and nothing responds.
+constexpr double kLeastError = -28.0;
 constexpr double kNegligible = 0.02;  // nats: a condition that matters less need not be fitted again without
 
 struct Fit {
@@ -48,9 +51,12 @@ double log_likelihood(const HistoryModel& model, const WhitenedData& data, const
 double log_error_scale(const HistoryModel& model, const WhitenedData& data) {
   constexpr int kIterations = 5;
   const VectorXd none = VectorXd::Zero(model.conditions());
-  double log_variance = 2.0 * std::log(model.priors().noise_sd);
-  for (int k = 0; k < kIterations; ++k)
-    log_variance += std::log(model.quadratic(data, log_variance, none) / static_cast<double>(data.size));
+  const double least = log_unit(model) + kLeastError;
+  double log_variance = log_unit(model);
+  for (int k = 0; k < kIterations; ++k) {
+    const double ratio = model.quadratic(data, log_variance, none) / static_cast<double>(data.size);
+    log_variance = ratio > 0.0 ? std::max(least, log_variance + std::log(ratio)) : least;
+  }
   return log_variance;
 }
 
@@ -87,7 +93,7 @@ VectorXd drop_losses(const HistoryModel& model, const std::vector<WhitenedData>&
     log_scale.push_back(log_error_scale(model, settings[g]) - log_unit(model));
     const int error = model.error_of(options.settings[g]);
     const double whole = log_scale.back() + std::log1p(model.priors().error.setting(error).sum());
-    Fit highest;
+    Fit highest{-std::numeric_limits<double>::infinity(), VectorXd::Constant(1 + model.conditions(), whole)};
     for (double below : kStarts) {
       VectorXd start = VectorXd::Constant(1 + model.conditions(), whole - below);
       start[0] = log_scale.back() - 0.5;
