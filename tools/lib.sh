@@ -31,7 +31,7 @@ install_package() {
     tar -C "$copy" -x
   [[ ! -d "$root/build/doc" ]] || cp -r "$root/build/doc" "$copy/inst/doc"  # see tools/vignettes
   state="$(cd "$copy" && { printf '%s\n' "$native" "$blas"; R --version; g++ --version; grep LinkingTo DESCRIPTION; cat src/Makevars "$root/tools/Makevars";
-    find src -name '*.cpp' | sort; find src -name '*.hpp' | sort | xargs cat; } | sha256sum)"
+    find src -name '*.cpp' | sort; find src -name '*.hpp' -o -name '*.h' | sort | xargs cat; } | sha256sum)"
   if [[ "$(cat "$copy/.state" 2>/dev/null)" != "$state" ]]; then
     find "$copy/src" -name '*.o' -delete
     printf '%s\n' "$state" > "$copy/.state"
