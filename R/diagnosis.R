@@ -153,6 +153,11 @@ open_verdict <- function(upgrade) {
                 headline = paste0("No mechanism is called for, but the numbers behind this are ",
                                   "not to be trusted: ", base$fit$trust$verdict, ".")))
   }
+  if (identical(upgrade$stopped_id, "none_computed")) {
+    return(list(verdict = "nothing", tag = "No mechanism could be tried",
+                headline = paste("No mechanism of the catalogue could be tried: mend them first.",
+                                 "The remaining error responds to no boundary condition.")))
+  }
   nothing <- paste("no mechanism is called for, and the remaining error responds to no boundary",
                    "condition")
   held_out <- held_out_excess(base, upgrade$measurements)

@@ -16,8 +16,11 @@ improves_held_out <- function(upgrade) {
   !isFALSE(held_out_gain(upgrade$models[[1]], last)$improves)
 }
 
+is_too_rough <- function(row)
+  !isTRUE(row$trusted) && row$upper95 - row$lower95 > rules$too_rough
+
 evidence_sentence <- function(row) {
-  if (!isTRUE(row$trusted) && row$upper95 - row$lower95 > rules$too_rough) {
+  if (is_too_rough(row)) {
     return(sprintf("The numbers for %s are too rough for odds.", row$mechanism))
   }
   sprintf("The evidence for %s over no change is %s: odds of %s%s.", row$mechanism, row$word,
@@ -117,6 +120,7 @@ trust_sentence <- function(upgrade, best) {
                                   "see what to inspect next."),
                             listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
   }
+  if (base$trusted && is_too_rough(best)) return(NULL)
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
   why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
   sprintf(

@@ -16,6 +16,11 @@ doubts <- list(
     if (length(case$rivals))
       sprintf("this record does not distinguish it from %s", listed(rival_words(case$rivals), "or"))
   }, "others may have more than 5 % of the probability"),
+  open = doubt(function(case) {
+    if (length(case$open))
+      sprintf("%s %s as near to the record, by numbers that are not trusted", listed(case$open),
+              if (length(case$open) > 1) "come" else "comes")
+  }, "a number that is not trusted rules nothing out"),
   untried = doubt(function(case) {
     twins <- untried_twins(case$parent, case$entry, case$catalogue)
     told <- function(names) condition_label(case$measurements, names)
@@ -117,6 +122,7 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads, l
        entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain,
        no_gain = isFALSE(gain$improves),
        rivals = rivals_of(trials, c(model$mechanism, later)),
+       open = open_rivals(trials, row, c(model$mechanism, later)),
        unsettled = later[vapply(models[-seq_len(k)],
                                 function(m) model$mechanism %in% m$may_replace, NA)],
        confounded = confounded_parameters(model$fit, new),
@@ -130,6 +136,13 @@ rivals_of <- function(trials, adopted) {
                            c(trials$mechanism, "no change"))
   share <- sort(share[setdiff(names(share), adopted)], decreasing = TRUE)
   share[rev(cumsum(rev(share))) > rules$rival_probability]
+}
+
+# Mechanisms whose numbers are not trusted, and with which the simulation comes as near to the
+# record as with the one adopted (`row`).
+open_rivals <- function(trials, row, adopted) {
+  near <- trials$error_ratio <= row$error_ratio / rules$fallen_error
+  trials$mechanism[which(near & !trials$trusted & !trials$mechanism %in% adopted)]
 }
 
 rival_words <- function(rivals) paste0(names(rivals), " (", percent(unname(rivals)), ")")

@@ -72,7 +72,29 @@ run_at <- function(model, z, context) {
     }, each, model$records)))
   }
   colnames(z) <- names(model$parameters)
-  list(z = z, outputs = part(TRUE), held = part(FALSE))
+  outputs <- part(TRUE)
+  outputs[abs(outputs / model$noise) > largest_over_noise] <- NaN
+  list(z = z, outputs = outputs, held = part(FALSE))
+}
+
+# An output so far beyond the noise is none: its square could not be computed with.
+largest_over_noise <- 1e50
+
+# What the simulators say of a run that failed, made again: their first warning, or NULL.
+failure_words <- function(model, at) {
+  said <- NULL
+  for (k in seq_along(model$simulators)) {
+    own <- model$own[[k]]
+    unit <- to_unit(model$runs$z[at, own, drop = FALSE], model$space[own, ])
+    withCallingHandlers(
+      simulate_measured(model$simulators[[k]], unit_to_values(unit, model$parameters[own]),
+                        model$records[[k]]$measurements, "calibrate", 1L),
+      amiss_warning_input = function(w) {
+        said <<- said %||% conditionMessage(w)
+        rlang::cnd_muffle(w)
+      })
+  }
+  said
 }
 
 succeeded <- function(model) colSums(!is.finite(model$runs$outputs)) == 0

@@ -74,9 +74,11 @@ check_some_succeeded <- function(model, call = rlang::caller_env()) {
   n <- nrow(model$runs$z)
   failed <- which(!succeeded(model))
   unit <- to_unit(model$runs$z[failed[1], , drop = FALSE], model$space)
-  abort_input(c("{length(failed)} of {n} runs over the priors hold values that are not finite.",
+  said <- failure_words(model, failed[1])
+  abort_input(c("{length(failed)} of {n} runs over the priors failed.",
                 x = paste("The first is run {failed[1]} at",
                           "{point_words(unit_to_values(unit, model$parameters))}."),
+                x = if (length(said)) "{said}",
                 i = paste("Find out why the simulator fails there, or narrow the priors. If every",
                           "run fails, look for a mistake in the simulator first.")), call = call)
 }

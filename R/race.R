@@ -106,13 +106,17 @@ race <- function(present, trials, context) {
 report_trial <- function(trial, present, context) {
   what <- switch(trial$level, silent = "changes nothing", failed = "could not be computed",
                  untried = "could not be tried: its runs failed", missed = "the budget ended",
-                 sprintf("log10 Bayes factor %s%s", signed(log10_factor(trial, present)),
-                         if (trial$level == "verified") ", verified by runs" else ""))
+                 unchecked = "its runs failed where its posterior lies",
+                 paste0(if (is_emulated(trial))
+                          paste("log10 Bayes factor", signed(log10_factor(trial, present)))
+                        else "its numbers are too rough yet",
+                        if (trial$level == "verified") ", verified by runs"))
   context$say("  {trial$mechanism}: {what}")
   if (trial$level == "silent") warn_no_response(trial$mechanism)
   if (trial$level == "untried") {
+    said <- failure_words(trial, 1)
     warn_result(c(paste("Mechanism {.val {trial$mechanism}} could not be tried: every run of its",
-                        "first look failed."),
+                        "first look failed."), x = if (length(said)) "{said}",
                   i = "Run its simulator at a point of its priors, and see what it returns."),
                 class = "amiss_warning_trial")
   }

@@ -28,9 +28,10 @@ run_search <- function(search, context) {
     if (search$status %in% c("budget", "arrived")) return(search)
     if (is_futile(search, context)) return(replace(search, "status", "futile"))
     if (promised_by(search) < rules$search_gain) return(replace(search, "status", "converged"))
-    search <- utils::modifyList(search, list(
-      weighted = TRUE, status = "going", failed = 0, step = search$step * search$weighted,
-      trusted = search$trusted * rules$trust_changes))
+    # At least half of its steps are left for the mode of the posterior.
+    if (!search$weighted) search$step <- min(search$step, search$steps / 2)
+    search <- utils::modifyList(search, list(weighted = TRUE, status = "going", failed = 0,
+                                             trusted = search$trusted * rules$trust_changes))
     search["gains"] <- list(NULL)
     search <- look(descend(search, context), context)
     if (search$status != "converged") return(search)

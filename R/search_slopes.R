@@ -125,11 +125,14 @@ secant_slopes <- function(model, at, reference) {
   slopes
 }
 
-# Slopes that would move the output farther, over a standard deviation of the prior, than runs ever
-# differ: those of a jump between two runs that lie close to one another.
+# Slopes far beyond those of the ways to runs that lie apart: those of a jump between two runs that
+# lie close to one another.
 too_steep <- function(model, at, slopes) {
-  differ <- model$runs$outputs[, succeeded(model), drop = FALSE] - model$runs$outputs[, at]
-  over_noise(model, slopes) > rules$steepest * max(over_noise(model, differ))
+  apart <- sqrt(rowSums(sweep(model$runs$z, 2, model$runs$z[at, ])^2))
+  far <- which(succeeded(model) & apart >= rules$search_difference)
+  if (!length(far)) return(logical(ncol(slopes)))
+  differ <- model$runs$outputs[, far, drop = FALSE] - model$runs$outputs[, at]
+  over_noise(model, slopes) > rules$steepest * max(over_noise(model, differ) / apart[far])
 }
 
 # Slopes about a run by regression on all runs over the priors, nearer ones weighing more.

@@ -462,11 +462,11 @@ simulated_rows <- function(measurements, rows) {
   })
 }
 
-check_driver_columns <- function(simulator, measurements, call) {
+check_driver_columns <- function(simulator, measurements, call, who = "The simulator") {
   present <- colnames(measurements$raw$drivers)
   absent <- setdiff(named_drivers(simulator), present)
   if (!length(absent)) return(invisible())
-  abort_input(c(paste("The simulator needs {cli::qty(absent)}column{?s} {.val {absent}}, which the",
+  abort_input(c(paste(who, "needs {cli::qty(absent)}column{?s} {.val {absent}}, which the",
                       "measurements do not have."), i = "Columns there: {.val {present}}."),
               call = call)
 }

@@ -223,9 +223,11 @@ report_model <- function(model, context) {
   }
   table <- told_by_model(model)$table
   first <- utils::head(table[table$significant, ], 1)
+  error <- function(use) signif(model$scores[[use]][["rmse"]], 3)
   context$say(paste(
-    "{.strong {model$name}}: RMSE {signif(model$scores$calibrate[['rmse']], 3)} in calibration,",
-    "{signif(model$scores$validate[['rmse']], 3)} held out; {runs_spent(context)} runs so far;",
+    "{.strong {model$name}}: RMSE {error('calibrate')} in calibration,",
+    if (is.na(error("validate"))) "no data held out;" else "{error('validate')} held out;",
+    "{runs_spent(context)} runs so far;",
     "discrepancy",
     if (nrow(first)) paste("responds most to {.field {first$boundary}}",
                            "(log10 Bayes factor {round(first$log10_bf_dropped, 1)})")

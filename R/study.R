@@ -134,7 +134,6 @@ run_study <- function(path, out = NULL, seed = NULL, threads = 1, quiet = FALSE,
   if (!is.null(seed)) pick_seed(seed)
   check_threads(threads)
   study <- read_study(path, quiet, trust)
-  check_study_control(study)
   stages <- NULL
   if (!is.null(out)) {
     check_report_tools()
@@ -185,9 +184,12 @@ read_study <- function(path, quiet = TRUE, trust = FALSE) {
   pieces <- if (is.null(study$models)) upgrade_pieces(of_each, measured)
             else comparison_pieces(files, study$method)
   code <- content_hash(lapply(files[is_code(files)], study_code))
-  structure(c(list(study = study$study, title = study$title %||% study$study, seed = study$seed,
-                   runs = study$runs, control = study$control),
-              pieces, list(measurements = measured, code = code)), class = "amiss_study")
+  read <- c(list(study = study$study, title = study$title %||% study$study, seed = study$seed,
+                 runs = study$runs, control = study$control),
+            pieces, list(measurements = measured, code = code))
+  check_study_control(read)
+  if (!is.null(study$seed)) pick_seed(study$seed)
+  structure(read, class = "amiss_study")
 }
 
 #' @rdname run_study

@@ -38,6 +38,14 @@ check_years <- function(time, values, name, call) {
               call = call)
 }
 
+# Whether the one time that stands twice is an hour that its zone has twice.
+doubled_hour <- function(time) {
+  if (!inherits(time, "POSIXct")) return(FALSE)
+  at <- time[duplicated(time)][1]
+  daylight <- function(t) as.POSIXlt(t, tz = attr(time, "tzone")[1] %||% "")$isdst
+  daylight(at - 3600) + daylight(at + 3600) == 1 || daylight(at) != daylight(at + 3600)
+}
+
 # What to do about time that does not run on.
 order_hint <- function(time, hours, steps) {
   dated <- !is.numeric(time)
@@ -47,6 +55,10 @@ order_hint <- function(time, hours, steps) {
                  "again with one format for all, such as {.val %d/%m/%Y %H:%M}."))
   }
   again <- mean(duplicated(hours))
+  if (dated && all(steps >= 0) && sum(steps == 0) == 1 && doubled_hour(time)) {
+    return(paste("This is an hour of the end of daylight saving, which a clock shows twice: give",
+                 "local text and {.arg time_zone}, or UTC. Do not delete it."))
+  }
   if (all(steps >= 0) && again <= 0.05) return("Keep one row for each time.")
   if (all(steps >= 0)) {
     return(paste("Do not delete rows: if the stamps are rounded, give them to the second; if",

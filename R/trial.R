@@ -101,7 +101,7 @@ look_at_mechanism <- function(model, present, off, context) {
   if (!length(fine)) return(list(model = model, silent = FALSE))
   base <- present$runs$outputs[, present$present$at]
   change <- over_noise(model, model$runs$outputs[, fine, drop = FALSE] - base)
-  looked_whole <- length(made$at) == nrow(values)
+  looked_whole <- length(fine) == nrow(values)
   if (setequal(kept, old) && looked_whole && all(change == 0))
     return(list(model = model, silent = TRUE))
   off <- off %||% switched_off(model, fine, new, change)

@@ -165,6 +165,7 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, contr
   started <- upgrade_start(simulator, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", "Make it with {.fun catalogue}.")
   check_given_models(started$simulator, catalogue, started$measurements)
+  check_edits(started, catalogue)
   control <- fill_upgrade_control(control, started$measurements)
   check_scouts(runs, started)
   warn_absent_drivers(catalogue, started$measurements)
@@ -253,6 +254,20 @@ check_given_models <- function(simulator, catalogue, measurements, call = rlang:
                   "returns the runs.")), call = call)
   }
   for (name in names(simulator)) check_given(simulator[name], measurements$records[[name]], call)
+}
+
+# A mechanism that cannot be applied is told before the base model has cost any run.
+check_edits <- function(started, catalogue, call = rlang::caller_env()) {
+  simulators <- if (is_several(started$measurements)) started$simulator else list(started$simulator)
+  records <- each_record(started$measurements)
+  for (entry in Filter(function(entry) is.function(entry$edit), catalogue)) {
+    for (k in seq_along(simulators)) {
+      extended <- extend(simulators[[k]], entry, record = started$record[k], call = call)
+      if (is_given(extended)) next
+      check_driver_columns(extended, records[[k]], call,
+                           paste0("The simulator with mechanism {.val ", entry$name, "}"))
+    }
+  }
 }
 
 fill_upgrade_control <- function(control, measurements, call = rlang::caller_env()) {

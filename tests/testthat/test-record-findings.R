@@ -63,7 +63,7 @@ test_that("missing sets codes to NA, or says that there are none", {
   expect_identical(which(is.na(m$y)), 40:41)
   expect_true(all(abs(m$raw$drivers[, "Te"]) < 50))
   expect_identical(ids(weather(Te = function(v) replace(v, 40, 999)), missing = NA),
-                   "Te missing_code")
+                   "Te far_outside")
   expect_error(measure(data, missing = "none"), "missing", class = "amiss_error_input")
   # A column that is not analysed may hold codes.
   other <- cbind(weather(), spare = replace(rnorm(288), 9, -9999))

@@ -92,16 +92,18 @@ interrupted_loop <- function() {
                     seed = 4, quiet = TRUE, checkpoint = checkpoint)
     }
     edits <- new.env()
-    edits$broken <- TRUE
+    edits$broken <- FALSE
     fragile <- catalogue(mechanism("sun", boundary = "Gv", sentence = "Sun.",
                                    edit = function(model) {
       if (edits$broken) stop("power cut")
+      edits$broken <- is.null(edits$mended)  # it could be applied when the loop began
       study$catalogue$sun$edit(model)
     }))
     stopped <- rlang::catch_cnd(loop(fragile, kept), "error")
     before <- list.files(kept, full.names = TRUE)
     times <- file.mtime(before)
     edits$broken <- FALSE
+    edits$mended <- TRUE
     resumed <- loop(fragile, kept)
     study_cache$loop <- list(study = study, loop = loop, kept = kept, stopped = stopped,
                              before = before,
