@@ -22,9 +22,10 @@
 #'   function, [with_template()] of a program or [with_fmu()] of an FMU.
 #' @param boundary Names of the boundary conditions that drive the mechanism; `character()` for
 #'   none. Without them it would do nothing, or always the same. If the mechanism acts on a state,
-#'   give the conditions that drive the state. They decide the order of trials, what is reported as
-#'   the cause, and one doubt (`vignette("algorithm", "amiss")`, *Naming*). They do not change the
-#'   evidence.
+#'   give the conditions that drive the state. `log10_bf` is the factor without an unknown response
+#'   to them, so that a wrong name here changes it ([upgrade_model()], *Candidates*). They also
+#'   decide the order of trials, what is reported as the cause, and one doubt
+#'   (`vignette("algorithm", "amiss")`, *Naming*). `beside_unknown` does not depend on them.
 #' @param sentence One sentence for a person: what it means if this mechanism is the cause.
 #' @return `mechanism()`: an object of class `amiss_mechanism`; `catalogue()`: of class
 #'   `amiss_catalogue`.
