@@ -1,10 +1,5 @@
 # Tables of the diagnosis, as the report and the inspections show them.
 
-parameter_labels <- function(fit, names) {
-  rows <- parameter_rows(fit)
-  rows$label[match(names, rows$name)]
-}
-
 # Parameters that shorter steps would move beyond their uncertainty.
 step_moved <- function(model) {
   moved <- step_moves(model)

@@ -361,8 +361,8 @@ tidy.amiss_emulator <- function(x, ...) {
 #' lapply(predict(train_emulator(runs, room), cbind(gain = c(0.2, 0.4))), head, 3)
 #' @export
 predict.amiss_emulator <- function(object, newdata, ...) {
-  check_arguments()
   check_whole(object, "object")
+  check_arguments()
   rlang::check_dots_empty()
   newdata <- as_number_matrix(newdata)
   check_input(checkmate::check_matrix(newdata, "numeric", any.missing = FALSE, min.rows = 1),

@@ -83,8 +83,9 @@ residuals.amiss_fit <- function(object, ...) {
 
 #' @rdname fit
 #' @export
-nobs.amiss_fit <- function(object, ...) {  # sigma() gives it `use.fallback`
+nobs.amiss_fit <- function(object, ...) {
   check_whole(object, "object")
+  if (!identical(...names(), "use.fallback")) rlang::check_dots_empty()  # sigma() gives it that
   length(object$rows)
 }
 

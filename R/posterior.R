@@ -208,6 +208,11 @@ equal_draws <- function(fit, n, call = rlang::caller_env()) {
   fit$values[drawn[order(place[drawn])], , drop = FALSE]
 }
 
+parameter_labels <- function(fit, names) {
+  rows <- parameter_rows(fit)
+  rows$label[match(names, rows$name)]
+}
+
 # Parameters of a calibration with their priors; `at_edge` as edge_of_prior() has it.
 parameter_rows <- function(fit) {
   table <- parameter_table(fit)

@@ -48,7 +48,7 @@ remainder_pattern <- function(r, rows, measurements, answers) {
   profile <- tapply(r, clock, mean)
   peak <- which.max(abs(profile - mean(r)))
   hour <- as.numeric(names(profile)[peak])
-  list(what = sprintf("every day around %s the measured %s is on average %s %s than simulated",
+  list(what = sprintf("around %s the measured %s is in the mean of all days %s %s than simulated",
                       clock_words(hour), target_label(measurements),
                       with_unit(short(abs(profile[[peak]])), unit),
                       if (profile[[peak]] > 0) "higher" else "lower"),

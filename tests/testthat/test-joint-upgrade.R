@@ -169,7 +169,7 @@ test_that("what an upgrade is asked is answered for several records", {
   expect_output(print(upgrade$measurements), "2 records")
   left <- base_only(upgrade)
   expect_match(summary(left)$headline, "Gv")
-  expect_match(summary(left)$remains, "in a: every day around", all = FALSE)
+  expect_match(summary(left)$remains, "in a: around", all = FALSE)
   expect_output(print(left), "0 mechanisms")
 })
 

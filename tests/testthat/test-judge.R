@@ -233,7 +233,7 @@ test_that("a record with times as text is judged without a warning", {
   expect_no_warning(own <- judged(as_text))
   expect_match(own$doubts, "a good part of the error remains", all = FALSE)
   pattern <- remaining_error(as_text(small_upgrade())$models[[2]], m)$pattern
-  expect_match(pattern$what, "every day around")
+  expect_match(pattern$what, "in the mean of all days")
 })
 
 test_that("what drives a mechanism is still answered to with more than half of its evidence", {

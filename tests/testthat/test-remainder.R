@@ -21,7 +21,7 @@ test_that("what comes back every day is told with its hour, what drifts with its
   door <- model_of(noise - 8 * (hours %% 24 == 10), hours)
   expect_true(door$large)
   expect_match(door$pattern$what,
-               "every day around 10:00 the measured Ti is on average [78].* K lower than simulated")
+               "around 10:00 the measured Ti is in the mean of all days [78].* K lower")
   drift <- model_of(noise + 8 * (hours / 240)^2 - 3, hours)
   expect_match(drift$pattern$what, "it drifts, by \\+[78].*K from the beginning")
   expect_null(model_of(3 * noise, hours)$pattern)
@@ -61,7 +61,7 @@ test_that("a large error that responds to nothing makes the verdict unexplained"
     withr::with_seed(1, rnorm(nrow(p), 0, 0.05)) + r
   verdict <- amiss:::diagnosis_verdict(upgrade)
   expect_equal(verdict$verdict, "unexplained")
-  expect_match(verdict$headline, "every day around")
+  expect_match(verdict$headline, "in the mean of all days")
   upgrade$models[[1]]$prediction$observed <- p$mean + withr::with_seed(1, rnorm(nrow(p), 0, 0.05))
   expect_equal(amiss:::diagnosis_verdict(upgrade)$verdict, "nothing")
   # Silence of numbers that are not trusted is told as such.
