@@ -165,10 +165,10 @@ upgrade_model <- function(simulator, measurements, catalogue, runs = NULL, contr
   started <- upgrade_start(simulator, measurements)
   check_object(catalogue, "amiss_catalogue", "catalogue", "Make it with {.fun catalogue}.")
   check_given_models(started$simulator, catalogue, started$measurements)
-  check_edits(started, catalogue)
   control <- fill_upgrade_control(control, started$measurements)
   check_scouts(runs, started)
   warn_absent_drivers(catalogue, started$measurements)
+  check_edits(started, catalogue)
   seed <- kept_seed(seed, checkpoint)
   key <- list(measurements = started$measurements, control = control, seed = seed)
   context <- new_context(seed, check_threads(threads), control, checkpoint_keeper(checkpoint, key),

@@ -29,6 +29,7 @@ hostile_pieces <- function(word) {
   record <- stats::setNames(small_record(), c("time", columns))
   k <- c(word(), word(), word())
   own <- function(name, prior) free(name, prior, word(), word())
+  third <- NULL
   f <- function(values, drivers) values[[k[1]]] + values[[k[2]]] * lagged(drivers[, columns[1]], 6)
   with_sun <- function(values, drivers, base)
     base(values) + values[[k[3]]] * lagged(drivers[, columns[2]], 3)
@@ -40,7 +41,8 @@ hostile_pieces <- function(word) {
     model = function_simulator(f, own(k[1], uniform(10, 20)), own(k[2], uniform(0, 2)),
                                boundary = columns[1], name = word()),
     sun = mechanism(word(), boundary = columns[2], sentence = word(), edit = function(model) {
-      with_parameters(model, own(k[3], uniform(0, 0.02)), boundary = columns[2], f = with_sun)
+      third <<- third %||% own(k[3], uniform(0, 0.02))  # an edit is made more than once
+      with_parameters(model, third, boundary = columns[2], f = with_sun)
     }))
 }
 
