@@ -82,19 +82,17 @@ largest_over_noise <- 1e50
 
 # What the simulators say of a run that failed, made again: their first warning, or NULL.
 failure_words <- function(model, at) {
-  said <- NULL
   for (k in seq_along(model$simulators)) {
     own <- model$own[[k]]
     unit <- to_unit(model$runs$z[at, own, drop = FALSE], model$space[own, ])
-    withCallingHandlers(
-      simulate_measured(model$simulators[[k]], unit_to_values(unit, model$parameters[own]),
-                        model$records[[k]]$measurements, "calibrate", 1L),
-      amiss_warning_input = function(w) {
-        said <<- said %||% conditionMessage(w)
-        rlang::cnd_muffle(w)
-      })
+    values <- unit_to_values(unit, model$parameters[own])
+    said <- tryCatch({
+      simulate_measured(model$simulators[[k]], values, model$records[[k]]$measurements,
+                        "calibrate", 1L)
+      NULL
+    }, amiss_warning_input = conditionMessage)
+    if (!is.null(said)) return(said)
   }
-  said
 }
 
 succeeded <- function(model) colSums(!is.finite(model$runs$outputs)) == 0

@@ -462,12 +462,13 @@ simulated_rows <- function(measurements, rows) {
   })
 }
 
-check_driver_columns <- function(simulator, measurements, call, who = "The simulator") {
+check_driver_columns <- function(simulator, measurements, call, mechanism = NULL) {
   present <- colnames(measurements$raw$drivers)
   absent <- setdiff(named_drivers(simulator), present)
   if (!length(absent)) return(invisible())
-  abort_input(c(paste(who, "needs {cli::qty(absent)}column{?s} {.val {absent}}, which the",
-                      "measurements do not have."), i = "Columns there: {.val {present}}."),
+  abort_input(c(paste("The simulator", if (!is.null(mechanism)) "with mechanism {.val {mechanism}}",
+                      "needs {cli::qty(absent)}column{?s} {.val {absent}}, which the measurements",
+                      "do not have."), i = "Columns there: {.val {present}}."),
               call = call)
 }
 

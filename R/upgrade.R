@@ -264,8 +264,7 @@ check_edits <- function(started, catalogue, call = rlang::caller_env()) {
     for (k in seq_along(simulators)) {
       extended <- extend(simulators[[k]], entry, record = started$record[k], call = call)
       if (is_given(extended)) next
-      check_driver_columns(extended, records[[k]], call,
-                           paste0("The simulator with mechanism {.val ", entry$name, "}"))
+      check_driver_columns(extended, records[[k]], call, entry$name)
     }
   }
 }

@@ -199,8 +199,8 @@ test_that("a candidate whose emulator was too coarse is not ruled out in silence
 test_that("numbers that are not trusted come first", {
   upgrade <- small_upgrade()
   upgrade$models[[1]]$fit$check[c("passed", "verdict")] <- list(FALSE, "half of the noise")
-  upgrade$models[[2]]$fit$posterior[c("trusted", "why")] <- list(FALSE,
-                                                                           "chains stand still")
+  upgrade$models[[2]]$fit$posterior$trusted <- FALSE
+  upgrade$models[[2]]$fit$posterior$why <- "chains stand still"
   told <- inspected(upgrade)
   expect_identical(names(told)[1:2], c("emulator", "sampler"))
   runs <- nrow(upgrade$models[[1]]$fit$emulator$processes$inputs)
