@@ -29,7 +29,7 @@ run_search <- function(search, context) {
     if (is_futile(search, context)) return(replace(search, "status", "futile"))
     if (promised_by(search) < rules$search_gain) return(replace(search, "status", "converged"))
     # At least half of its steps are left for the mode of the posterior.
-    if (!search$weighted) search$step <- min(search$step, search$steps / 2)
+    if (!search$weighted) search$step <- min(search$step, search$steps %/% 2)
     search <- utils::modifyList(search, list(weighted = TRUE, status = "going", failed = 0,
                                              trusted = search$trusted * rules$trust_changes))
     search["gains"] <- list(NULL)

@@ -438,3 +438,22 @@ test_that("why the one of highest evidence was not adopted is told", {
   upgrade$candidates$error_ratio[other] <- 0.9
   expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "not adopted first")
 })
+
+test_that("a parameter beside it at its prior's end, or another not ruled out, is a doubt", {
+  expect_doubt("with which it is correlated, lies at the edge", function(u) {
+    fit <- u$models[[2]]$fit
+    sun <- fit$posterior$unit[, match("sun_gain", colnames(fit$values))]
+    fit$posterior$unit[, match("offset", colnames(fit$values))] <- 1 - 0.001 * sun
+    u$models[[2]]$fit <- fit
+    u
+  })
+  not_trusted <- function(u, error_ratio) {
+    drift <- u$candidates$mechanism == "drift"
+    u$candidates$trusted[drift] <- FALSE
+    u$candidates$error_ratio[drift] <- error_ratio * u$candidates$error_ratio[!drift]
+    u
+  }
+  expect_doubt("drift comes as near to the record, by numbers that are not trusted", not_trusted,
+               error_ratio = 1)
+  expect_length(judged(function(u) not_trusted(u, error_ratio = 1.1))$doubts, 0)
+})

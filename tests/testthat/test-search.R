@@ -348,3 +348,19 @@ test_that("directions that are known ten million times better than others can be
   expect_equal(found$mean[1], 1, tolerance = 1e-6)
   expect_true(all(is.finite(solve(amiss:::conditioned(found$precision)))))
 })
+
+test_that("least squares that take all steps leave half of them for the mode of the posterior", {
+  curved <- function_simulator(function(values, drivers) {
+    values[["offset"]] + exp(3 * values[["gain"]]) * drivers[, "Te"] / 8
+  }, free("offset", uniform(10, 30)), free("gain", uniform(0, 1)), boundary = "Te")
+  data <- linear_data()
+  data$Ti <- data$Ti + 0.02 * data$Gv
+  model <- run_model(curved, linear_measurements(data),
+                     rbind(c(-1.5, 1.5), c(-1.2, 1.5), c(-1.5, 1.2)))
+  found <- amiss:::run_search(
+    amiss:::begin_search(model, 1, amiss:::regression_slopes(model, 1), 1, steps = 4),
+    search_context())
+  # The fourth step is that of least squares, which promise half a nat of the weighted error more.
+  expect_identical(found$status, "converged")
+  expect_equal(runs_of(found$model), 8)
+})
