@@ -360,7 +360,7 @@ test_that("least squares that take all steps leave half of them for the mode of 
   found <- amiss:::run_search(
     amiss:::begin_search(model, 1, amiss:::regression_slopes(model, 1), 1, steps = 4),
     search_context())
-  # The fourth step is that of least squares, which promise half a nat of the weighted error more.
+  # After four steps of least squares another 1.3 nats are promised.
   expect_identical(found$status, "converged")
   expect_equal(runs_of(found$model), 8)
 })
