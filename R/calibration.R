@@ -56,7 +56,7 @@ calibration_control <- list(
 #'   * `reach`: see *Model* (`c(13, 300, Inf)`; in the region of a mode 13).
 #'   * `time_constants`: time constants of the filter bank in hours (0, 2, 4, 8, ... 64 steps of the
 #'     record, up to a sixth of the calibration rows). Give longer ones if the system is slower.
-#'   * `error_times`: time constants of the autocorrelated error in hours (2 and 8 steps).
+#'   * `error_times`: time constants of the autocorrelated error in hours (2 and 32 steps).
 #'   * `error_ratios`: variance of the autocorrelated error relative to the white noise (`c(0, 0.3,
 #'     1, 3, 10, 30, 100)`).
 #'   * `error_draws`: posterior draws kept for the discrepancy over time (32).
@@ -210,7 +210,9 @@ fill_calibration_control <- function(control, measurements, n, what = "control",
     taus <- step * 2^(1:6)
     control[["time_constants"]] <- c(0, taus[taus <= n * step / 6])
   }
-  if (is.null(control$error_times)) control[["error_times"]] <- c(2, 8) * step
+  if (is.null(control$error_times)) {
+    control[["error_times"]] <- c(rules$error_short, rules$error_long) * step
+  }
   check_input(checkmate::check_number(control$confidence, lower = 2 / n - 1e-12, upper = 1),
               named("confidence"),
               "It lies between 2/N (hardly believed) and 1 (as firm as N values).", call = call)
