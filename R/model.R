@@ -54,14 +54,15 @@ bind_runs <- function(runs, more) {
        held = cbind(runs$held, more$held))
 }
 
-# A record is run once at points that differ in nothing of its own.
-run_at <- function(model, z, context) {
+# A record is run once at points that differ in nothing of its own. `kept_as`: under which name runs
+# are kept.
+run_at <- function(model, z, context, kept_as = "runs") {
   unit <- to_unit(z, model$space)
   each <- Map(function(simulator, record, own) {
     values <- unit_to_values(unit[, own, drop = FALSE], model$parameters[own])
     key <- apply(values, 1, rlang::hash)
     apart <- values[!duplicated(key), , drop = FALSE]
-    made <- context$keep(list("runs", plain(simulator), apart), suppress_run_warnings(
+    made <- context$keep(list(kept_as, plain(simulator), apart), suppress_run_warnings(
       simulate_measured(simulator, apart, record$measurements, c("calibrate", "validate"),
                         context$threads)))
     made[, match(key, unique(key)), drop = FALSE]

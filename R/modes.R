@@ -4,6 +4,7 @@
 # list(model, modes, agree): the base model after scouts and searches, the best mode first.
 find_modes <- function(model, context) {
   model <- with_scouts(model, context)
+  check_repeats(model, context)
   starts <- start_runs(model)
   first <- from_images(more_modes(model, list(), starts[1], context), context)
   more_modes(first$model, first$modes, starts[-1], context)
@@ -35,8 +36,7 @@ told_modes <- function(found) {
   model <- found$model
   list(agree = found$agree, searches = length(found$modes), ends = ends,
        heights = vapply(found$modes, function(mode) mode$value %||% NA_real_, 0),
-       points = unit_to_values(to_unit(model$runs$z[ends, , drop = FALSE], model$space),
-                               model$parameters),
+       points = values_of_runs(model, ends),
        covariances = lapply(found$modes, `[[`, "covariance"))
 }
 
@@ -69,15 +69,36 @@ with_scouts <- function(model, context) {
 wanted_scouts <- function(model)
   model$scouts %||% (rules$scouts_base + rules$scouts_parameter * length(model$parameters))
 
+# A run that is made again must give what it gave: no slope could be trusted otherwise. The package's
+# own simulators do. What a cache had says nothing.
+check_repeats <- function(model, context, call = rlang::caller_env()) {
+  at <- which(succeeded(model))[1]
+  known <- vapply(model$simulators, inherits, NA, c("amiss_zone", "amiss_network"))
+  if (all(known) || runs_left(context) < length(known)) return(invisible())
+  found <- found_so_far()
+  again <- run_at(model, model$runs$z[at, , drop = FALSE], context, "repeated")
+  change <- over_noise(model, again$outputs - model$runs$outputs[, at])
+  if (found_so_far() > found || !isTRUE(change > rules$random_change)) return(invisible())
+  abort_input(c(paste("The simulator is random: two runs at the same values differ by",
+                      "{short(change)} times the noise."),
+                x = "These values are {point_words(values_of_runs(model, at))}.",
+                i = paste("Let it draw the same random numbers in each run, so that runs differ by",
+                          "their parameters alone."),
+                i = paste("If runs were made elsewhere, check that the simulator at hand is the one",
+                          "that made them.")), call = call)
+}
+
+values_of_runs <- function(model, at)
+  unit_to_values(to_unit(model$runs$z[at, , drop = FALSE], model$space), model$parameters)
+
 check_some_succeeded <- function(model, call = rlang::caller_env()) {
   if (sum(succeeded(model)) >= min(rules$least_succeeded, nrow(model$runs$z))) return(invisible())
   n <- nrow(model$runs$z)
   failed <- which(!succeeded(model))
-  unit <- to_unit(model$runs$z[failed[1], , drop = FALSE], model$space)
   said <- failure_words(model, failed[1])
   abort_input(c("{length(failed)} of {n} runs over the priors failed.",
                 x = paste("The first is run {failed[1]} at",
-                          "{point_words(unit_to_values(unit, model$parameters))}."),
+                          "{point_words(values_of_runs(model, failed[1]))}."),
                 x = if (length(said)) "{said}",
                 i = paste("Find out why the simulator fails there, or narrow the priors. If every",
                           "run fails, look for a mistake in the simulator first.")), call = call)

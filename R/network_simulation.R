@@ -30,7 +30,7 @@ slopes.amiss_network <- function(simulator, values, drivers, step_h, hold = NULL
 
 # What the engine is given beside numbers.
 network_request <- function(network, drivers, step_h, hold, call) {
-  check_network_joined(network, call)
+  check_network_joined(network, hold, call)
   needed <- named_drivers(network)
   drivers <- drivers[, needed, drop = FALSE]
   storage.mode(drivers) <- "double"
@@ -47,11 +47,12 @@ network_request <- function(network, drivers, step_h, hold, call) {
 }
 
 # A node that nothing joins to a driver or to a known state has no steady state to start from.
-check_network_joined <- function(network, call) {
+check_network_joined <- function(network, hold, call) {
   parts <- network$components
   nodes <- Filter(function(part) part$type == "node", parts)
   known <- vapply(nodes, function(node) !is.null(node$start) || identical(node$capacity, Inf), NA)
-  loose <- setdiff(names(nodes), c(names(nodes)[known], if (network$hold) network$output))
+  held <- network$hold && any(is.finite(hold))
+  loose <- setdiff(names(nodes), c(names(nodes)[known], if (held) network$output))
   joins <- Filter(function(part) part$type == "link" || part$type == "flow", parts)
   repeat {
     joined <- loose[vapply(loose, function(node) any(vapply(joins, leaves, NA, node, loose)), NA)]

@@ -12,6 +12,11 @@
 #' stack in any order. Make every [mechanism()] of a function in this way. An edit that writes the
 #' model anew would lose what was adopted before it.
 #'
+#' # Random numbers
+#'
+#' Every run draws the same random numbers of R, so that runs differ by their parameters alone. A
+#' result therefore stands for one random course; to see others, let `f` set a seed of its own.
+#'
 #' # Steps
 #'
 #' A simulator that integrates in steps should take their length from `info$step_h`.
@@ -314,6 +319,9 @@ free_parameters.amiss_function_simulator <- function(simulator) simulator$parame
 #' @export
 driver_names.amiss_function_simulator <- function(simulator) simulator$boundary
 
+# Common random numbers: what differs between two runs is what their parameters do.
+run_seed <- 1L
+
 #' @export
 simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, step_h, hold = NULL,
                                                    threads = 1L,
@@ -327,7 +335,7 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
   stopped <- list()
   for (m in seq_len(nrow(values))) {
     point <- stats::setNames(values[m, ], colnames(values))
-    out <- tryCatch(call_run_function(simulator$f, point, drivers, info = info),
+    out <- tryCatch(with_seed(run_seed, call_run_function(simulator$f, point, drivers, info = info)),
                     error = function(e) e)
     piece_done()
     if (inherits(out, "amiss_error_input")) rlang::cnd_signal(out)

@@ -101,6 +101,7 @@ number_format <- function(numbers, name, zone, call) {
   hours <- max(abs(known), 0) < largest_hours
   if (length(known) < 3 && hours) return("hours")
   dated <- dated_formats(known)
+  if (!length(dated)) refuse_periods(known, name, call)
   fits <- fit_of(dated, known)
   if (any(fits > 0.5)) dated <- dated[fits > 0.5 & fits > 0.95 * max(fits)]
   if (any(startsWith(dated, "%Y"))) dated <- dated[startsWith(dated, "%Y")]
@@ -163,9 +164,24 @@ fitting_widths <- function(numbers) {
   digit_formats[width >= 0 & width <= lost]
 }
 
+name_words <- function(name) strsplit(tolower(name), "[^a-z]+")[[1]]
+
+# Months and years are of no one length, and a number of a week says no year.
+refuse_periods <- function(numbers, name, call) {
+  words <- name_words(name)
+  periods <- c("week", "weeks", "month", "months", "quarter", "year", "years", "yr", "yrs")
+  counted <- intersect(words, periods)
+  if (!length(counted) || any(c("hour", "hours", "h", "day", "days") %in% words))
+    return(invisible())
+  abort_input(c(paste("Time column {.val {name}} holds numbers such as {format(numbers[1])}: a",
+                      "{counted[1]} has no fixed length in hours."),
+                i = paste("Give dates, for example {.val 2024-03-01}, or days with",
+                          "{.code time_format = \"days\"}.")), call = call)
+}
+
 # The unit that a column's name says, if it is not hours: "seconds", "t_min", "Time [d]", "doy".
 named_unit <- function(name) {
-  words <- strsplit(tolower(name), "[^a-z]+")[[1]]
+  words <- name_words(name)
   said <- c(s = "seconds", sec = "seconds", secs = "seconds", second = "seconds",
             seconds = "seconds", min = "minutes", mins = "minutes", minute = "minutes",
             minutes = "minutes", d = "days", day = "days", days = "days", doy = "days",

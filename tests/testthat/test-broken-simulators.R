@@ -94,3 +94,37 @@ test_that("a jump between two runs that lie close is no slope", {
   # 5 K over 0.002 standard deviations are 2500 K for one.
   expect_lt(max(abs(amiss:::secant_slopes(model, 1, reference))), 20)
 })
+
+test_that("a random function is run with the same random numbers each time", {
+  noisy <- function_simulator(function(values, drivers) {
+    20 + values[["gain"]] * drivers[, "Te"] + stats::rnorm(nrow(drivers), 0, 0.05)
+  }, free("gain", uniform(0, 1)), boundary = "Te")
+  m <- linear_measurements(linear_data(90))
+  calibrated <- function() {
+    calibrate_refined(simulate_design(noisy, m, runs = 5, seed = 1), m, seed = 1, quiet = TRUE)
+  }
+  set.seed(3)
+  first <- calibrated()
+  drawn <- stats::runif(1)
+  set.seed(4)
+  second <- calibrated()
+  expect_identical(second$log_evidence, first$log_evidence)
+  expect_true(first$trust$trusted)
+  # R's own generator stays as it was.
+  set.seed(3)
+  expect_identical(stats::runif(1), drawn)
+})
+
+test_that("a simulator whose randomness is its own is refused, and it is said why", {
+  calls <- 0
+  restless <- function_simulator(function(values, drivers) {
+    calls <<- calls + 1
+    20 + values[["gain"]] * drivers[, "Te"] + sin(calls * seq_len(nrow(drivers))^2)
+  }, free("gain", uniform(0, 1)), boundary = "Te")
+  expect_error(loop_with(sun_by(adding_sun), restless), class = "amiss_error_input",
+               "The simulator is random: two runs at the same values differ by [0-9.]+ times")
+  expect_lt(calls, 10)
+  m <- linear_measurements(linear_data(90))
+  expect_error(calibrate_refined(simulate_design(restless, m, runs = 5, seed = 1), m, seed = 1),
+               class = "amiss_error_input", "check that the simulator at hand is the one")
+})

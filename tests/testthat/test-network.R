@@ -151,6 +151,10 @@ test_that("what does not fit together is refused, by name", {
   refused(component(house(), "attic"), "no part")
   loose <- add_component(house(), network_node("mass", 2))
   refused(simulate_runs(loose, house_values(), house_drivers(), 1), "no steady state")
+  store <- network(network_node("soil", 1), network_gain("soil", "rain"), output = "soil")
+  refused(simulate_runs(store, matrix(0, 1, 0), cbind(rain = c(0, 3)), 1), "no steady state")
+  expect_true(all(is.finite(simulate_runs(store, matrix(0, 1, 0), cbind(rain = c(0, 3)), 1,
+                                          hold = c(2, NA)))))
   gap <- house_drivers()
   gap[3, "Te"] <- NA
   refused(simulate_runs(house(), house_values(), gap, 1), "missing or infinite")

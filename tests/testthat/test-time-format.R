@@ -61,6 +61,14 @@ test_that("numbers that could be hours and something else are refused with the f
     expect_identical(reading(step * 0:99, "day", format = "hours")$time, step * 0:99)
 })
 
+test_that("numbers of weeks, months and years are refused", {
+  refused("holds numbers such as 1: a month has no fixed length", 1:12, "month")
+  refused("such as 2001: a year has no fixed length", 2001 + 0:99 / 12, "decimal year")
+  refused("a week has no fixed length", 1:52, "Week")
+  expect_identical(reading(24 * 0:99, "hour of the year")$format, "hours")
+  refused("%Y%m", 202001 + 0:9, "year_month")
+})
+
 test_that("hours in usual steps stay hours", {
   for (step in c(5 / 3600, 1 / 60, 0.05, 0.1, 1 / 6, 0.25, 0.5, 1, 2, 3, 6, 12, 24, 168, 7.3)) {
     expect_identical(reading(step * 0:99, "hour")$time, step * 0:99)
