@@ -69,8 +69,8 @@ with_scouts <- function(model, context) {
 wanted_scouts <- function(model)
   model$scouts %||% (rules$scouts_base + rules$scouts_parameter * length(model$parameters))
 
-# A run that is made again must give what it gave: no slope could be trusted otherwise. The package's
-# own simulators do. What a cache had says nothing.
+# A run that is made again must give what it gave: no slope could be trusted otherwise. The
+# package's own simulators do. What a cache had says nothing.
 check_repeats <- function(model, context, call = rlang::caller_env()) {
   at <- which(succeeded(model))[1]
   known <- vapply(model$simulators, inherits, NA, c("amiss_zone", "amiss_network"))
@@ -84,8 +84,8 @@ check_repeats <- function(model, context, call = rlang::caller_env()) {
                 x = "These values are {point_words(values_of_runs(model, at))}.",
                 i = paste("Let it draw the same random numbers in each run, so that runs differ by",
                           "their parameters alone."),
-                i = paste("If runs were made elsewhere, check that the simulator at hand is the one",
-                          "that made them.")), call = call)
+                i = paste("If runs were made elsewhere, check that the simulator at hand is the",
+                          "one that made them.")), call = call)
 }
 
 values_of_runs <- function(model, at)

@@ -335,8 +335,9 @@ simulate_runs.amiss_function_simulator <- function(simulator, values, drivers, s
   stopped <- list()
   for (m in seq_len(nrow(values))) {
     point <- stats::setNames(values[m, ], colnames(values))
-    out <- tryCatch(with_seed(run_seed, call_run_function(simulator$f, point, drivers, info = info)),
-                    error = function(e) e)
+    out <- tryCatch(
+      with_seed(run_seed, call_run_function(simulator$f, point, drivers, info = info)),
+      error = function(e) e)
     piece_done()
     if (inherits(out, "amiss_error_input")) rlang::cnd_signal(out)
     if (inherits(out, "error")) {
