@@ -83,7 +83,7 @@ runs_elsewhere <- function(fit, values, use, threads, record) {
 # takes over what parameters at the ends of their priors cannot do, draws lie off the best.
 about_best <- function(runs, best) runs + (as.numeric(best) - rowMeans(runs))
 
-predicted_samples <- 200  # of each row, from which its band and score are taken
+predicted_samples <- 400  # of each row, from which its band and score are taken
 
 # `sd` is that of the error: one number, or one for each row and sample.
 summarise_prediction <- function(m, rows, runs, sd, interval, level) {

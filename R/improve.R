@@ -251,6 +251,7 @@ verify_model <- function(model, context, before = NULL,
                          rounds = context$control$rounds %||% rules$verify_rounds) {
   least <- least_local(model)
   best <- NULL
+  ratios <- numeric()
   for (round in seq_len(max(1, rounds))) {
     checks <- if (is.null(before)) rules$first_check else rules$check_runs
     before_check <- leaving(context, checks)
@@ -271,12 +272,14 @@ verify_model <- function(model, context, before = NULL,
       model <- moved_to_least(model, context)
       least <- least_local(model)
       best <- before <- NULL
+      ratios <- numeric()
       next
     }
     settled <- has_settled(found$fits, before)
     found$score <- check_score(found$fits)
     if (settled || is.null(best) || found$score > best$score) best <- found
-    if (settled || is_spent(context)) break
+    ratios <- c(ratios, largest_ratio(found$fits))
+    if (settled || is_spent(context) || !is_on_course(ratios, rounds - round)) break
     before <- found$fits[[1]]$log_evidence
     passed <- isTRUE(found$fits[[1]]$check$passed)
     least <- filled + length(model$checked$at) + if (passed) 0 else rules$more_runs
@@ -319,6 +322,19 @@ has_settled <- function(fits, before) {
       isTRUE(check$passed) && !surely_exceeds(check$border, rules$border_intervals, fit) &&
         check$effective >= rules$effective_intervals && fit$standard_error <= rules$evidence_error
     }, NA))
+}
+
+# The emulator's error at draws over the noise, of the record where it is worst.
+largest_ratio <- function(fits) max(vapply(fits, function(fit) fit$check$ratio %||% Inf, 0))
+
+# Whether the emulator's error, if it goes on falling as in the last two rounds, passes in those
+# that are left.
+is_on_course <- function(ratios, left) {
+  k <- length(ratios)
+  if (k < 3) return(TRUE)
+  recent <- min(ratios[k - 1:0])
+  falls <- recent / min(ratios[seq_len(k - 2)])
+  isTRUE(recent * min(falls, 1)^(left / 2) <= rules$error_ratio)
 }
 
 # Whether more than a share of a posterior lies somewhere, by so many draws: at two standard errors.

@@ -182,3 +182,13 @@ test_that("where later rounds are worse, the one before them stays", {
   expect_equal(fit$check$effective, 0.3)
   expect_equal(fit$rounds, 3)
 })
+
+test_that("verification ends if the emulator's error falls too slowly to pass in the rounds left", {
+  on_course <- amiss:::is_on_course
+  expect_true(on_course(c(40, 30), 6))  # too early to tell
+  expect_true(on_course(c(40, 2.5, 0.85), 5))
+  expect_false(on_course(c(43, 34, 9, 38), 4))
+  expect_false(on_course(c(40, 2.5, 0.85, 0.67, 0.6), 3))
+  expect_true(on_course(c(4, 0.4, 0.33), 5))
+  expect_false(on_course(c(0.5, 1, 2), 5))
+})
