@@ -210,9 +210,10 @@ step_sentence <- function(upgrade, model) {
 }
 
 gain_words <- function(gain) {
-  if (gain$standard_error > 0)
-    sprintf("a gain of %s standard errors", short(gain$mean / gain$standard_error))
-  else "a gain"
+  if (gain$standard_error == 0) return("a gain")
+  errors <- gain$mean / gain$standard_error
+  if (errors < 1) return("no clear gain")
+  sprintf("a gain of %s standard errors", short(errors))
 }
 
 doubt_sentence <- function(model) {

@@ -232,7 +232,7 @@ nearest_inspection <- function(upgrade) {
     else sprintf(" in which %s strongly",
                  paste(listed(drivers), if (length(drivers) > 1) "change" else "changes")),
     longer_words(best, upgrade),
-    if (NROW(new)) sprintf(", or a look for %s on site", called_for(new)) else ""))
+    if (NROW(new)) sprintf(", or a check on site whether there is %s", called_for(new)) else ""))
 }
 
 # The nearest trial, if its numbers and those of the model are good enough to speak of.
