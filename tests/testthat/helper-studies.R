@@ -49,3 +49,6 @@ write_comparison_study <- function(folder, ...) {
                                                  importance_draws = 200))),
     ..., drop = c("model", "catalogue"))
 }
+
+# expect_match() would escape a page of megabytes to quote it, which takes a minute.
+expect_on_page <- function(page, told) expect_true(grepl(told, page, fixed = TRUE), info = told)

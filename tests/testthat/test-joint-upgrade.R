@@ -328,6 +328,6 @@ test_that("a study of several records runs to its report, whose figures are of e
   page <- paste(readLines(file.path(out, "report.html"), encoding = "UTF-8"), collapse = "\n")
   for (told in c("fit of a: ", "fit of b: ", "discrepancy of b: ", "times the noise",
                  "Sun enters both rooms")) {
-    expect_match(page, told, fixed = TRUE)
+    expect_on_page(page, told)
   }
 })

@@ -225,8 +225,7 @@ test_that("a report is one file that names the cause and needs nothing from outs
                    character())
   expect_lt(file.size(file), 3e6)
   html <- paste(readLines(file, warn = FALSE), collapse = "\n")
-  expect_match(html, "Sun enters through a window &lt;that&gt; the model *leaves* out.",
-               fixed = TRUE)
+  expect_on_page(html, "Sun enters through a window &lt;that&gt; the model *leaves* out.")
   links <- regmatches(html, gregexpr("(src|srcset|href)=\"[^\"]{0,20}", html))[[1]]
   expect_true(all(grepl("=\"(data:|#)", links)))
   expect_gte(sum(grepl("src=\"data:image/png", links)), length(figure_names))

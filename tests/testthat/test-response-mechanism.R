@@ -184,6 +184,6 @@ test_that("a study of given runs and responses runs from its file", {
                                      "--quiet")), 0)
   result <- jsonlite::read_json(file.path(out, "result.json"))
   expect_equal(result$models[[2]]$mechanism, "response to Gv")
-  expect_match(paste(readLines(file.path(out, "report.html"), warn = FALSE), collapse = " "),
-               "describes and does not explain")
+  page <- paste(readLines(file.path(out, "report.html"), warn = FALSE), collapse = " ")
+  expect_on_page(page, "describes and does not explain")
 })

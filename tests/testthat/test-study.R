@@ -297,7 +297,7 @@ test_that(
   "a comparison study's report says for which model the record is, and needs no other file", {
   html <- paste(readLines(file.path(ran_comparison()$out, "report.html"), warn = FALSE),
                 collapse = "\n")
-  expect_match(html, "The record is decisively for line among 2 models", fixed = TRUE)
+  expect_on_page(html, "The record is decisively for line among 2 models")
   links <- regmatches(html, gregexpr("(src|href)=\"[^\"]{0,20}", html))[[1]]
   expect_gt(length(links), 0)
   expect_true(all(grepl("=\"(data:|#)", links)))
