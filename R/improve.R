@@ -333,6 +333,7 @@ is_on_course <- function(ratios, left) {
   k <- length(ratios)
   if (k < 3) return(TRUE)
   recent <- min(ratios[k - 1:0])
+  if (recent <= rules$error_ratio) return(TRUE)
   falls <- recent / min(ratios[seq_len(k - 2)])
   isTRUE(recent * min(falls, 1)^(left / 2) <= rules$error_ratio)
 }

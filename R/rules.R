@@ -37,7 +37,7 @@ rule_table <- list(
   error_short = rule(2, "steps", "the shorter time constant of the autocorrelated error",
                      "what lasts less is white", "bench/slow_noise.R"),
   error_long = rule(32, "steps", "the longer one",
-                    "a sensor wanders for a day; eight steps believe it to be the parameters",
+                    "a sensor may wander for a day: with a shorter one intervals are too narrow",
                     "bench/slow_noise.R"),
   random_change = rule(0.3, "noise", paste("change of a run that is made again beyond which a",
                                            "simulator is random"),

@@ -190,5 +190,6 @@ test_that("verification ends if the emulator's error falls too slowly to pass in
   expect_false(on_course(c(43, 34, 9, 38), 4))
   expect_false(on_course(c(40, 2.5, 0.85, 0.67, 0.6), 3))
   expect_true(on_course(c(4, 0.4, 0.33), 5))
+  expect_true(on_course(c(0, 0, 0), 5))  # an emulator without error, whose region is not settled
   expect_false(on_course(c(0.5, 1, 2), 5))
 })
