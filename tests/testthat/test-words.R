@@ -24,3 +24,10 @@ test_that("what rounds to zero has no sign, and a clock no sixtieth minute", {
 test_that("odds up to a million are told in figures", {
   expect_equal(amiss:::power_of_ten(c(1, 4.6, 5.9, 6.2)), c("10", "40,000", "790,000", "10^6"))
 })
+
+test_that("a gain within its standard error is no clear one", {
+  said <- function(mean, error) amiss:::gain_words(list(mean = mean, standard_error = error))
+  expect_identical(said(0.5, 1), "no clear gain")
+  expect_identical(said(3, 1), "a gain of 3 standard errors")
+  expect_identical(said(0.5, 0), "a gain")
+})
