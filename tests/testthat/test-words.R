@@ -28,6 +28,6 @@ test_that("odds up to a million are told in figures", {
 test_that("a gain within its standard error is no clear one", {
   said <- function(mean, error) amiss:::gain_words(list(mean = mean, standard_error = error))
   expect_identical(said(0.5, 1), "no clear gain")
-  expect_identical(said(3, 1), "a gain of 3 standard errors")
+  expect_identical(said(3, 1), "a gain of 3.0 standard errors")
   expect_identical(said(0.5, 0), "a gain")
 })
