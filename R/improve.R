@@ -279,7 +279,7 @@ verify_model <- function(model, context, before = NULL,
     found$score <- check_score(found$fits)
     if (settled || is.null(best) || found$score > best$score) best <- found
     ratios <- c(ratios, largest_ratio(found$fits))
-    if (settled || is_spent(context) || !is_on_course(ratios, rounds - round)) break
+    if (settled || is_spent(context) || has_stalled(ratios)) break
     before <- found$fits[[1]]$log_evidence
     passed <- isTRUE(found$fits[[1]]$check$passed)
     least <- filled + length(model$checked$at) + if (passed) 0 else rules$more_runs
@@ -327,27 +327,26 @@ has_settled <- function(fits, before) {
 # The emulator's error at draws over the noise, of the record where it is worst.
 largest_ratio <- function(fits) max(vapply(fits, function(fit) fit$check$ratio %||% Inf, 0))
 
-# Whether the emulator's error, if it goes on falling as in the last two rounds, passes in those
-# that are left.
-is_on_course <- function(ratios, left) {
+# Whether two rounds in a row have not made the emulator better than it was.
+has_stalled <- function(ratios) {
   k <- length(ratios)
-  if (k < 3) return(TRUE)
-  recent <- min(ratios[k - 1:0])
-  if (recent <= rules$error_ratio) return(TRUE)
-  falls <- recent / min(ratios[seq_len(k - 2)])
-  isTRUE(recent * min(falls, 1)^(left / 2) <= rules$error_ratio)
+  if (k < 3) return(FALSE)
+  best <- min(ratios[seq_len(k - 2)])
+  best > rules$error_ratio && all(ratios[k - 1:0] >= best)
 }
 
 # Whether more than a share of a posterior lies somewhere, by so many draws: at two standard errors.
 surely_exceeds <- function(seen, share, fit)
   seen > share + 2 * sqrt(share * (1 - share) / fit$posterior$ess)
 
-# Passed ones first, among them by the effective share of the runs.
+# Passed ones first, among them by the effective share of the runs; the others by how well the
+# evidence is known.
 check_score <- function(fits) {
   min(vapply(fits, function(fit) {
     check <- fit$check
-    if (is.null(check)) return(-1)
-    isTRUE(check$passed) + (if (is.na(check$effective)) 1 / (1 + check$ratio) else check$effective)
+    if (is.null(check)) -1
+    else if (isTRUE(check$passed) && !is.na(check$effective)) 1 + check$effective
+    else isTRUE(check$passed) + 1 / (1 + fit$standard_error)
   }, 0))
 }
 

@@ -220,7 +220,9 @@ still_answers <- function(parent, model, boundary) {
 confounded_parameters <- function(fit, new) {
   others <- setdiff(colnames(fit$values), new)
   if (!length(new) || !length(others)) return(character())
-  r <- stats::cov.wt(posterior_unit(fit), fit$weights, cor = TRUE)$cor
+  together <- stats::cov.wt(posterior_unit(fit), fit$weights)$cov
+  sd <- sqrt(pmax(diag(together), .Machine$double.eps))  # of rounding alone: no correlation
+  r <- together / outer(sd, sd)
   dimnames(r) <- list(colnames(fit$values), colnames(fit$values))
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > rules$confounded]
 }

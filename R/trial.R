@@ -259,14 +259,23 @@ searched_again <- function(trial, present, context) {
   counting <- counting_modes(found$modes)
   ends <- vapply(counting, `[[`, 0, "at")
   if (any(straight_distance(trial)[ends] > 1)) {
-    trial <- verify_trial(with_modes(trial, counting, context$seed), present, context)
+    all <- verify_trial(with_modes(trial, counting, context$seed), present, context)
+    # The evidence of one mode is a lower bound, if there is no emulator of all.
+    may_stay <- has_passed(all) || !is.null(to_adopt(list(all), present, context))
+    trial <- if (may_stay) all else beside_modes(replace(trial, "runs", all["runs"]), context)
   } else {
-    fits <- record_fits(trial$fit)
-    trial$modes <- confirmed_modes(trial, trial$modes, fits)
-    trial <- with_fit(trial, fits, trial$level, fits[[1]]$rounds, context)
+    trial <- beside_modes(trial, context)
   }
   trial$own_runs <- trial$own_runs + runs_spent(context) - before
   trial
+}
+
+# Its posterior as it stands, beside the modes that searches found since.
+beside_modes <- function(trial, context) {
+  fits <- record_fits(trial$fit)
+  trial <- with_least(trial, context)
+  trial$modes <- confirmed_modes(trial, trial$modes, fits)
+  with_fit(trial, fits, trial$level, fits[[1]]$rounds, context)
 }
 
 # The present model was searched from several starts; what its mechanism brought is new: its slopes

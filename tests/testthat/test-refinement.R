@@ -183,13 +183,13 @@ test_that("where later rounds are worse, the one before them stays", {
   expect_equal(fit$rounds, 3)
 })
 
-test_that("verification ends if the emulator's error falls too slowly to pass in the rounds left", {
-  on_course <- amiss:::is_on_course
-  expect_true(on_course(c(40, 30), 6))  # too early to tell
-  expect_true(on_course(c(40, 2.5, 0.85), 5))
-  expect_false(on_course(c(43, 34, 9, 38), 4))
-  expect_false(on_course(c(40, 2.5, 0.85, 0.67, 0.6), 3))
-  expect_true(on_course(c(4, 0.4, 0.33), 5))
-  expect_true(on_course(c(0, 0, 0), 5))  # an emulator without error, whose region is not settled
-  expect_false(on_course(c(0.5, 1, 2), 5))
+test_that("verification ends after two rounds without progress", {
+  stalled <- amiss:::has_stalled
+  expect_false(stalled(c(40, 50)))  # too early to tell
+  expect_false(stalled(c(12.6, 9.4, 6.6)))
+  expect_false(stalled(c(43, 34, 9, 38)))
+  expect_true(stalled(c(43, 34, 9, 38, 12)))
+  expect_false(stalled(c(0, 0, 0)))  # an emulator without error, whose region is not settled
+  expect_false(stalled(c(0.1, 0.2, 0.3)))
+  expect_true(stalled(c(0.5, 1, 2)))
 })

@@ -25,6 +25,7 @@ world_in <- function(scale = 1, origin = 0, driver = 1) {
 # So many draws, and runs at them, that what chains amplify shows as little as below.
 many_draws <- list(ais = c(quick_ais$ais, importance_draws = 10000, precision = 0.02), check = 400,
                    exact = 400)
+exact_ais <- list(pilot_chains = 200, chains = 100, max_groups = 64, precision = 0.05)
 
 # All that a world leads to, in the units of the first.
 without_units <- function(world) {
@@ -32,8 +33,7 @@ without_units <- function(world) {
   m <- world$measurements
   emulator <- world$emulator
   fit <- calibrate(emulator, m, many_draws, seed = 3)
-  attributed <- attribute_discrepancy(fit, list(surrogates = 39, ais = list(precision = 0.1)),
-                                      seed = 1)
+  attributed <- attribute_discrepancy(fit, list(surrogates = 39, ais = exact_ais), seed = 1)
   seen <- predict(emulator, cbind(offset = world$origin + world$scale * c(12, 25), a = c(0.2, 0.8)))
   ahead <- predict(fit, use = "validate", draws = 400)
   list(emulator = list(trusted = emulator$trust$trusted,
