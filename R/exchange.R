@@ -19,10 +19,13 @@ with_exchanges <- function(model, mode, context) {
 
 # Where two parts of a model are alike, its other modes lie near to where they have exchanged a
 # parameter. If the simulator gives its slopes, searches from there cost a few runs each:
-# list(model, modes, agree) with what they find beside the only mode that is known.
-from_images <- function(found, context) {
+# list(model, modes, agree) with what they find beside the only mode that is known. Of an extension
+# only exchanges with a `new` parameter are searched: the others were with the model before.
+from_images <- function(found, context, new = names(found$model$parameters)) {
   found$model <- with_exchanges(found$model, found$modes[[1]], context)
-  for (at in found$model$images) {
+  moved <- abs(t(found$model$runs$z[found$model$images, , drop = FALSE]) -
+                 found$model$runs$z[found$modes[[1]]$at, ])
+  for (at in found$model$images[colSums(moved[new, , drop = FALSE]) > 1e-6]) {  # not by rounding
     slopes <- given_slopes(found$model, found$model$runs$z[at, ])
     if (is.null(slopes) || is_spent(context)) break
     search <- begin_search(found$model, at, slopes, 0, alone = TRUE)

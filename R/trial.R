@@ -245,7 +245,8 @@ searched_again <- function(trial, present, context) {
   if (trial$level == "given") return(trial)
   before <- runs_spent(context)
   found <- list(model = trial, modes = list(own_mode(trial, context)), agree = FALSE)
-  found <- from_images(found, context)
+  new <- setdiff(names(trial$parameters), names(present$parameters))
+  found <- from_images(found, context, new)
   for (z in far_points(trial, context)) {
     made <- with_runs(found$model, rbind(z), context)
     found$model <- made$model
