@@ -339,14 +339,14 @@ has_stalled <- function(ratios) {
 surely_exceeds <- function(seen, share, fit)
   seen > share + 2 * sqrt(share * (1 - share) / fit$posterior$ess)
 
-# Passed ones first, among them by the effective share of the runs; the others by how well the
-# evidence is known.
+# Passed ones first, among them by the effective share of the runs, or if there is none by the
+# emulator's error; the others by how well the evidence is known.
 check_score <- function(fits) {
   min(vapply(fits, function(fit) {
     check <- fit$check
     if (is.null(check)) -1
-    else if (isTRUE(check$passed) && !is.na(check$effective)) 1 + check$effective
-    else isTRUE(check$passed) + 1 / (1 + fit$standard_error)
+    else if (!isTRUE(check$passed)) 1 / (1 + fit$standard_error)
+    else 1 + (if (is.na(check$effective)) 1 / (1 + check$ratio) else check$effective)
   }, 0))
 }
 

@@ -17,6 +17,7 @@ upgrade_inspections <- function(upgrade) {
             driver_inspections(upgrade),
             edge_inspections(last$fit),
             sensor_inspections(upgrade, adopted, last),
+            part_inspection(last, upgrade$measurements),
             spike_inspection(last, upgrade$measurements),
             if (upgrade$stopped_id == "steps") {
               c(steps = paste("Further causes were not looked for: raise control$max_steps and run",
@@ -40,6 +41,7 @@ calibration_inspections <- function(fit, model = NULL) {
     if (!is.null(model)) held_out_inspection(model, fit$measurements),
     edge_inspections(fit), tied_inspections(fit), loose_inspections(fit),
     if (!is.null(model)) remainder_inspection(model, fit$measurements),
+    if (!is.null(model)) part_inspection(model, fit$measurements),
     if (!is.null(model)) spike_inspection(model, fit$measurements),
     cause = paste("A calibration does not show what its error responds to, or what may cause it:",
                   "attribute_discrepancy() asks the first, upgrade_model() with a catalogue of",

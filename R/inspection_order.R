@@ -7,9 +7,9 @@ inspections_first <- 3L
 inspection_ranks <- function() {
   list(verdict = c("emulator", "sampler", "record", setdiff(names(fault_words), "constant"),
                    "held_out", "step"),
-       cause = c("separate", "rival", "site", "drift", "stand_in", "description", "nearest",
-                 "undecided", "group", "answer", "answers", "noise", "pattern", "driver",
-                 "constant"),
+       cause = c("separate", "rival", "site", "drift", "parts", "stand_in", "description",
+                 "nearest", "undecided", "group", "answer", "answers", "noise", "pattern",
+                 "driver", "constant"),
        parameters = c("tied", "edge", "loose"),
        rest = c("steps", "spikes", "small_noise", "cause", "nothing"))
 }

@@ -45,14 +45,6 @@ nearest_first <- function(trials) {
   names(searched)[order(vapply(searched, least_error, 0))]
 }
 
-# The row of the mechanism to adopt, or NULL.
-to_adopt <- function(trials, present, context) {
-  if (!length(trials)) return(NULL)
-  decisive <- context$control$decisive
-  best <- best_trial(trial_table(trials, present, names(trials), decisive), decisive)
-  if (may_be_adopted(best, decisive)) best
-}
-
 # Whether a trial may be adopted that takes the error away.
 has_cause <- function(trials, present, context) {
   best <- to_adopt(trials, present, context)

@@ -190,7 +190,7 @@ value_runs <- function(v) {
 # either end of its range.
 stuck_finding <- function(x) {
   runs <- value_runs(x$v)
-  if (length(runs$length) < rules$few_values) return(NULL)
+  if (length(runs$length) < rules$few_values) return(if (x$is_target) at_rest_finding(x))
   usual <- stats::quantile(runs$length, 0.9, type = 1)
   long <- runs$length > max(rules$stuck_runs * usual, if (!x$is_target) rules$stuck_rows)
   if (!x$is_target) long <- long & !runs$value %in% range(x$v, na.rm = TRUE)
@@ -200,6 +200,17 @@ stuck_finding <- function(x) {
   list(rows = rows, value = runs$value[long][1], says = sprintf(
     "%s is %s in all of %s: its sensor seems to be stuck. Set these readings to NA.", x$told,
     listed(format_each(unique(runs$value[long]))), rows_words(rows)))
+}
+
+# A target that hardly ever changes.
+at_rest_finding <- function(x) {
+  runs <- rle(sort(x$v))
+  most <- which.max(runs$lengths)
+  value <- runs$values[most]
+  if (value == 0 || runs$lengths[most] < rules$at_rest * sum(runs$lengths)) return(NULL)
+  list(value = value,
+       says = sprintf("%s is %s in %d of %d rows: its sensor seems to be stuck.", x$told,
+                      format(value), runs$lengths[most], sum(runs$lengths)))
 }
 
 # Changes of value stand a whole number of rows apart.
@@ -272,21 +283,24 @@ circle_jumps <- function(v) {
   if (close && all(tabulate(floor((v %% 360) / 90) + 1, 4) > 0)) sum(over) else 0
 }
 
-# It never falls but to where it began; what rises by equal steps is a clock.
+# It never falls but to where it began; what rises by equal steps is a clock, and what rises evenly,
+# as a room that warms up, may be measured.
 counter_finding <- function(x) {
   v <- x$v[!is.na(x$v)]
   change <- diff(v)
   fall <- which(change < 0)
   rise <- change[change > 0]
-  if (!length(fall) || length(rise) < rules$counter_rises ||
-      length(fall) > rules$counter_falls * length(rise)) return(NULL)
-  if (length(unique(signif(rise, 6))) <= rules$clock_rises) return(NULL)
+  if (length(rise) < rules$counter_rises || length(fall) > rules$counter_falls * length(rise) ||
+      length(unique(signif(rise, 6))) <= rules$clock_rises) return(NULL)
+  is_rough <- stats::sd(diff(change)) > rules$counter_rough * stats::sd(change)
+  if (!length(fall) && !(x$is_condition && is_rough)) return(NULL)
   to_start <- v[fall + 1] <= min(v) + rules$counter_start * diff(range(v))
   resets <- to_start & -change[fall] > rules$counter_reset * max(rise)
   if (!all(resets)) return(NULL)
+  often <- if (length(fall) > 1) sprintf(", and is reset %d times", length(fall))
+           else if (length(fall)) ", and is reset once" else ""
   list(value = length(fall), says = sprintf(
-    paste("%s only rises, and is reset %s: it is a counter. Give its change over each row."),
-    x$told, if (length(fall) > 1) paste(length(fall), "times") else "once"))
+    "%s only rises%s: it is a counter. Give its change over each row.", x$told, often))
 }
 
 # What calibration cannot show, though the held-out rows have it.

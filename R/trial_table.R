@@ -93,3 +93,11 @@ best_trial <- function(table, decisive) {
 may_be_adopted <- function(best, decisive) {
   nrow(best) > 0 && best$log10_bf >= decisive && best$lower95 > 0
 }
+
+# The row of the mechanism to adopt, or NULL.
+to_adopt <- function(trials, present, context) {
+  if (!length(trials)) return(NULL)
+  decisive <- context$control$decisive
+  best <- best_trial(trial_table(trials, present, names(trials), decisive), decisive)
+  if (may_be_adopted(best, decisive)) best
+}

@@ -98,6 +98,12 @@ test_that("readings at the end of a sensor's range are found, and left out if as
 })
 
 test_that("a sensor that is stuck is found", {
+  resting <- weather(Ti = function(v) replace(rep(21.5, length(v)), 150, 22))
+  expect_identical(ids(resting), "Ti stuck")
+  expect_match(measure(resting)$findings$says, "Ti is 21.5 in 287 of 288 rows")
+  # No flow may last.
+  dry <- function(v) replace(numeric(length(v)), 150:153, c(1.013, 3.27, 2.1, 0.94))
+  expect_identical(ids(weather(Ti = dry)), character())
   held <- function(n) function(v) replace(v, 99 + seq_len(n), v[100])
   expect_identical(ids(weather(Ti = held(7))), "Ti stuck")
   expect_identical(ids(weather(Te = held(24))), "Te stuck")
@@ -128,6 +134,12 @@ test_that("values that stand in several rows are found, unless averages are of a
 test_that("a counter and a direction are found", {
   counter <- function(v) (cumsum(v) %% 9000)
   expect_identical(ids(weather(Gv = counter)), "Gv counter")
+  expect_identical(ids(weather(Gv = cumsum)), "Gv counter")
+  expect_match(measure(weather(Gv = cumsum))$findings$says, "Gv only rises: it is a counter. Give")
+  # What warms up rises evenly, and a clock by equal steps.
+  warming <- function(v) 20 - 10 * exp(-seq_along(v) / 24)
+  expect_identical(ids(weather(Te = warming)), character())
+  expect_identical(ids(weather(Te = seq_along)), character())
   expect_identical(ids(weather(), boundary = ~ Te + Gv + Wd), "Wd direction")
   expect_identical(ids(weather(Wd = function(v) ifelse(v > 180, v - 360, v)), boundary = ~ Te + Wd),
                    "Wd direction")

@@ -163,6 +163,9 @@ test_that("of rounds the one with the best check is the better one", {
   expect_gt(score(checked_by_hand(effective = NA, ratio = 0.1)),
             score(checked_by_hand(effective = NA, ratio = 0.2)))
   expect_gt(score(checked_by_hand(passed = FALSE, effective = 0.01)), score(list(check = NULL)))
+  # The share of a few runs that are all off is large: one of four, one of sixteen.
+  expect_gt(score(checked_by_hand(passed = FALSE, effective = 0.06, standard_error = 1)),
+            score(checked_by_hand(passed = FALSE, effective = 0.25, standard_error = 1e5)))
   # Of several records the worst check counts.
   expect_gt(score(checked_by_hand(), checked_by_hand(effective = 0.4)),
             score(checked_by_hand(effective = 0.9), checked_by_hand(effective = 0.3)))

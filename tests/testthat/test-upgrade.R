@@ -286,6 +286,39 @@ test_that("a trial that ended at a poor mode is searched again from runs over it
   expect_lt(amiss:::least_error(better), 0.5 * amiss:::least_error(poor))
 })
 
+# Its evidence is a lower bound then, and the run of least squares that of all searches.
+test_that("a mode that was verified stays if there is no emulator of all modes", {
+  skip_on_cran()  # second tier: tools/test --quick
+  bump <- function(place) 0.6 * exp(-((place - 0.2) / 0.25)^2) + exp(-((place - 0.85) / 0.08)^2)
+  hidden <- adding("hidden",
+                   function(values, drivers) 0.01 * bump(values[["place"]]) * drivers[, "Gv"],
+                   free("place", uniform(0, 1)), boundary = "Gv")
+  present <- present_model()
+  bar <- list(factor = 2, standing = -Inf, leader = present$model)
+  poor <- amiss:::try_mechanism(present$model, "hidden",
+                                list(amiss:::extend(linear_simulator(), hidden)), NULL, bar,
+                                present$context)
+  one <- amiss:::verify_trial(poor, present$model, present$context)
+  expect_true(one$fit$trust$trusted)
+  far <- amiss:::to_unit(one$runs$z[one$mode, , drop = FALSE], one$space)
+  far[, match("place", names(one$parameters))] <- 0.83
+  stand_in(far_points = function(...) list(amiss:::from_unit(far, one$space)[1, ]))
+  all <- amiss:::searched_again(one, present$model, present$context)
+  expect_gt(all$fit$log_evidence, one$fit$log_evidence + 3)
+  refuted <- function(model, ...) {
+    model$fit$log_evidence <- -1e3
+    model$fit$standard_error <- 1e6
+    model$fit$check$passed <- FALSE
+    model
+  }
+  stand_in(verify_trial = refuted)
+  kept <- amiss:::searched_again(one, present$model, present$context)
+  expect_identical(kept$fit$log_evidence, one$fit$log_evidence)
+  expect_false(kept$fit$trust$trusted)
+  expect_equal(kept$fit$modes$lost, 1)
+  expect_lt(amiss:::least_error(kept), 0.5 * amiss:::least_error(one))
+})
+
 test_that("a mechanism that changes nothing costs its first look, and appears in no odds", {
   alone <- loop(sun)
   expect_warning(upgrade <- loop(nothing, sun), "\"nothing\" changes nothing",
