@@ -78,7 +78,7 @@ diagnosis_verdict <- function(upgrade) {
   faults <- record_doubt_words(ids)
   if (is.null(faults)) return(verdict)
   if (verdict$verdict != "likely") verdict$tag <- paste0(verdict$tag, "; ", faults)
-  verdict$headline <- paste0("Mend the record first: ", record_doubt_words(ids, "it"), ". ",
+  verdict$headline <- paste0("Correct the record first: ", record_doubt_words(ids, "it"), ". ",
                              verdict$headline)
   verdict
 }

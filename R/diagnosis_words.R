@@ -29,7 +29,7 @@ evidence_sentence <- function(row) {
 
 sure_sentences <- function(upgrade) {
   if (is.null(upgrade$candidates))
-    return("No mechanism was tried, so that no cause could be found.")
+    return("No mechanism was tried, so no cause could be found.")
   trials <- first_trials(upgrade)
   if (!nrow(trials)) return(c(missing_sentence(upgrade), "No mechanism could be computed."))
   adopted <- adopted_models(upgrade)
@@ -45,8 +45,8 @@ sure_sentences <- function(upgrade) {
     else if (is_refuted(best)) needed <- refuted_sentence(best)
     else if (is_unverified(best, upgrade))
       needed <- "It was not adopted, because no runs were left to verify it."
-    return(c(missing_sentence(upgrade), probability_sentence(trials), evidence_sentence(best),
-             needed, trust_sentence(upgrade, best)))
+    return(c(missing_sentence(upgrade), if (!is_too_rough(best)) probability_sentence(trials),
+             evidence_sentence(best), needed, trust_sentence(upgrade, best)))
   }
   each <- unlist(lapply(adopted, function(m) {
     row <- upgrade$candidates[upgrade$candidates$from == m$parent &
@@ -54,7 +54,7 @@ sure_sentences <- function(upgrade) {
     evidence_sentence(row)
   }))
   first <- trials[1, ]
-  c(each, probability_sentence(trials),
+  c(each, if (!is_too_rough(best)) probability_sentence(trials),
     if (first$mechanism != best$mechanism) {
       if (keeps_error(first)) raised_sentence(first, " first") else outranked_sentence(first, best)
     },
@@ -62,22 +62,23 @@ sure_sentences <- function(upgrade) {
 }
 
 raised_sentence <- function(row, when = "") {
-  sprintf(paste("It was not adopted%s, because with %s the simulation's own error in calibration",
-                "does not fall (%s times as large): what is gained, the discrepancy gains."),
-          when, row$mechanism, short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
+  sprintf(paste("%s was not adopted%s: with it the simulation's own error in calibration does not",
+                "fall by 1 %% (it is %s times as large). Only the discrepancy fits better."),
+          row$mechanism, when, short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
 }
 
 # Of two that may be adopted, the one with the larger factor need not rank higher.
 outranked_sentence <- function(row, best) {
   if (row$judged_by != "runs" || is_refuted(row) || row$log10_bf <= best$log10_bf) return(NULL)
-  sprintf(paste("%s has larger odds over no change. With no unknown response to any condition,",
-                "%s explains the record better: odds of %s."),
+  sprintf(paste("%s has larger odds over no change. But if no model may respond to the conditions",
+                "in an unknown way, %s explains the record better: odds of %s."),
           row$mechanism, best$mechanism, odds(best$standing - row$standing))
 }
 
 refuted_sentence <- function(row) {
-  sprintf(paste("It was not adopted, because an unknown response to what drives it does better:",
-                "beside that, its log10 Bayes factor is %s."), signed(row$beside_unknown))
+  sprintf(paste("%s was not adopted, because an unknown response to what drives it explains the",
+                "error better: if both models have such a response, its log10 Bayes factor is %s."),
+          row$mechanism, signed(row$beside_unknown))
 }
 
 unjudged_sentence <- function(fit) {
@@ -92,8 +93,9 @@ unjudged_sentence <- function(fit) {
 missing_sentence <- function(upgrade) {
   if (unjudged(upgrade)) return(NULL)
   left <- remaining_error(upgrade$models[[1]], upgrade$measurements)
-  if (left$large) sprintf(paste("That something is missing is plain: the error is %s times the",
-                                "stated noise. What it is stays open."), short(left$ratio))
+  if (!left$large) return(NULL)
+  sprintf(paste("The error is %s times the stated noise, so something is missing, or the noise is",
+                "understated. This record does not show what is missing."), short(left$ratio))
 }
 
 probability_sentence <- function(trials) {
@@ -102,10 +104,10 @@ probability_sentence <- function(trials) {
   all <- sort(all, decreasing = TRUE)
   near <- all[-1][all[-1] >= 0.01]
   told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
-  paste0("The most probable of ",
-         if (nrow(trials) == 1) "the mechanism tried" else paste(nrow(trials), "mechanisms tried"),
-         " and \"no change\", all equally likely beforehand, is ", told(all[1]),
-         if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))), ".")
+  tried <- if (nrow(trials) == 1) "the mechanism" else paste("the", nrow(trials), "mechanisms")
+  then <- if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))) else ""
+  sprintf("If %s and \"no change\" were equally likely beforehand, the most probable is now %s%s.",
+          tried, told(all[1]), then)
 }
 
 # Whether the numbers behind the first decision can be trusted, in words; if not, whether the
@@ -114,7 +116,7 @@ trust_sentence <- function(upgrade, best) {
   base <- upgrade$models[[1]]$fit$trust
   if (base$trusted && best$trusted) {
     open <- open_trials(upgrade)
-    return(paste0("The numbers behind this can be trusted: the sampler passed its own checks.",
+    return(paste0("These numbers can be trusted: they passed all checks.",
                   if (NROW(open))
                     sprintf(paste(" The numbers behind %s, which %s not adopted, are not trusted:",
                                   "see what to inspect next."),
@@ -126,7 +128,7 @@ trust_sentence <- function(upgrade, best) {
   sprintf(
     "The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
     if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
-    else "The decision may depend on it: more runs or chains would settle it.")
+    else "The decision may depend on these numbers: more runs or chains would settle it.")
 }
 
 # How large the matter is, beside the noise and on data held out.
@@ -140,10 +142,11 @@ size_note <- function(upgrade) {
   if (length(seen) < 2) return(sprintf("The model's typical error is %s; %s.", told(seen), noise))
   change <- if (length(upgrade$models) > 2) "changes" else "change"
   if (!improves_held_out(upgrade)) {
-    return(sprintf(paste("The %s not improve predictions of data the model has not seen (typical",
-                         "error %s before, %s after; %s). Take it as a hint, not as a repair."),
+    return(sprintf(paste("The %s not clearly improve predictions of data the model has not seen",
+                         "(typical error %s before, %s after; %s). Take %s as a hint, not as a",
+                         "repair."),
                    if (length(upgrade$models) > 2) "changes do" else "change does", told(held[1]),
-                   told(held[2]), noise))
+                   told(held[2]), noise, if (length(upgrade$models) > 2) "them" else "it"))
   }
   if (anyNA(held))
     sprintf("With the %s the typical error %s; %s.", change, change_words(seen[1], seen[2], m$unit),
@@ -238,8 +241,8 @@ gain_sentences <- function(upgrade) {
   c(paste0("The typical error (RMSE) ", told(seen), " in calibration",
            if (!anyNA(held)) paste0(", and ", told(held), " on held-out data"), "."),
     nearest_run_sentence(upgrade),
-    if (anyNA(held)) paste("No data were held out, so that it is not known how well the model",
-                           "predicts what it has not seen."),
+    if (anyNA(held)) paste("No data were held out, so it is not known how well the model predicts",
+                           "what it has not seen."),
     sprintf("%d %% of the %s measurements lie in the band meant for 95 %%%s.", inside,
             if (anyNA(held)) "calibration" else "held-out",
             if (inside < 88) paste0(": ", narrow_words(upgrade))
@@ -255,9 +258,9 @@ nearest_run_sentence <- function(upgrade) {
   nearest <- min(vapply(list(base$fit$emulator, emulator_over_priors(base$fit$emulator)),
                         nearest_run, 0, base$fit))
   if (nearest > 0.9 * base$scores$calibrate[["rmse"]]) return(NULL)
-  sprintf(paste("A part of this fall is not due to the change: the base model has a run that errs",
-                "by only %s in calibration, and may have better ones. Calibrated it errs by more,",
-                "as a part of its error was left to the discrepancy."),
+  sprintf(paste("Part of this fall is not due to the change: one run of the base model has an",
+                "error of only %s in calibration. The calibrated base model has a larger one,",
+                "because the discrepancy takes up a part of it."),
           with_unit(short(nearest), upgrade$measurements$unit))
 }
 
@@ -296,7 +299,8 @@ remaining_sentences <- function(upgrade) {
     if (last$large) sprintf(
       "In calibration the remaining error is %s times the stated noise%s", short(last$ratio),
       if (is.null(last$pattern))
-        paste0(": either the stated noise is too small, or something else is missing",
+        paste0(": either the stated noise is too small, or something ",
+               if (length(upgrade$models) > 1) "else ", "is missing",
                if (isFALSE(model$fit$check$passed)) ", or the parameters were not found", ".")
       else paste0("; ", last$pattern$what, ". ", last$pattern$where)),
     reach_sentence(model$fit) %||% if (last$large) bias_sentence(model$fit),
@@ -306,7 +310,7 @@ remaining_sentences <- function(upgrade) {
     vapply(group_words(model$attribution), paste0, "", "."),
     mode_words(model$fit),
     edge_sentence(model$fit) %||% no_edge,
-    sprintf("The search stopped because %s%s.",
+    sprintf("The loop stopped because %s%s.",
             upgrade$stopped_reason,
             if (upgrade$stopped_id == "steps") "; further causes were not looked for" else ""))
 }

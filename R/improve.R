@@ -327,12 +327,12 @@ has_settled <- function(fits, before) {
 # The emulator's error at draws over the noise, of the record where it is worst.
 largest_ratio <- function(fits) max(vapply(fits, function(fit) fit$check$ratio %||% Inf, 0))
 
-# Whether two rounds in a row have not made the emulator better than it was.
+# Whether two rounds in a row have not made an emulator better that is not good enough.
 has_stalled <- function(ratios) {
   k <- length(ratios)
   if (k < 3) return(FALSE)
   best <- min(ratios[seq_len(k - 2)])
-  best > rules$error_ratio && all(ratios[k - 1:0] >= best)
+  isTRUE(best > rules$error_ratio && all(ratios[k - 1:0] >= best))
 }
 
 # Whether more than a share of a posterior lies somewhere, by so many draws: at two standard errors.
@@ -345,7 +345,7 @@ check_score <- function(fits) {
   min(vapply(fits, function(fit) {
     check <- fit$check
     if (is.null(check)) -1
-    else if (!isTRUE(check$passed)) 1 / (1 + fit$standard_error)
+    else if (!isTRUE(check$passed)) 1 / (1 + max(fit$standard_error, 0, na.rm = TRUE))
     else 1 + (if (is.na(check$effective)) 1 / (1 + check$ratio) else check$effective)
   }, 0))
 }

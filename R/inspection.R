@@ -118,7 +118,7 @@ sampler_inspection <- function(models) {
 record_inspection <- function(upgrade) {
   ids <- names(record_faults(upgrade))
   if (length(ids)) {
-    c(record = sprintf("Mend the record before anything else, and run the loop again: it has %s.",
+    c(record = sprintf("Correct the record first, then run the loop again. The record has %s.",
                        listed(unique(unname(fault_words[ids])))))
   }
 }
@@ -126,8 +126,8 @@ record_inspection <- function(upgrade) {
 held_out_inspection <- function(model, measurements) {
   if (is.na(model$scores$validate[["rmse"]])) {
     return(c(held_out = sprintf(
-      paste("No data were held out, so that no change could fail a test. Measure %s more of %s and",
-            "its conditions and hold them out (argument validate of measurements()), or keep a",
+      paste("No data were held out, so no change was tested on other data. Measure %s more of %s",
+            "and its conditions and hold them out (argument validate of measurements()), or keep a",
             "part of this record from calibration."),
       calibrated_words(measurements, rules$held_out_length) %||% "some days",
       target_label(measurements))))
@@ -212,10 +212,10 @@ tied_inspections <- function(fit) {
   b <- label[pairs[, 2]]
   if (!nrow(pairs)) return(NULL)
   c(tied = if (nrow(pairs) == 1) {
-    sprintf("The parameters %s and %s are correlated (%.2f): a measurement of either settles both.",
-            a, b, r[pairs])
+    sprintf(paste("The estimates of %s and %s are correlated (%.2f): a measurement of either would",
+                  "narrow both."), a, b, r[pairs])
   } else {
-    sprintf("Parameters are correlated: %s. A measurement of one of a pair settles both.",
+    sprintf("Estimates are correlated: %s. A measurement of one of a pair would narrow both.",
             listed(sprintf("%s with %s (%.2f)", a, b, r[pairs])))
   })
 }
@@ -248,9 +248,10 @@ drift_inspection <- function(upgrade, adopted) {
   }
   drift <- doubted("drift")
   shows <- c(if (length(drift))
-               sprintf("a drift of it would explain as much as %s", listed(drift, "or")),
+               sprintf("a drift of the sensor would explain the error as well as %s",
+                       listed(drift, "or")),
              if (length(doubted("slow")))
-               "that shows whether the sensor changes or what it measures")
+               "the comparison shows whether the sensor drifts or what it measures changes")
   if (!length(shows)) return(NULL)
   over <- calibrated_words(upgrade$measurements)
   c(drift = sprintf("Compare the sensor of %s with a second one from time to time%s: %s.",
@@ -322,9 +323,9 @@ separation_inspection <- function(comparison) {
   name <- names(which.max(abs(conditions)))
   at <- which.max(apart)
   c(separate = sprintf(paste("The record does not clearly distinguish %s from %s. Their",
-                             "simulations differ most (by %s) at %s, and the more so the %s %s is:",
-                             "measure under such conditions."),
+                             "simulations differ most (by %s) at %s. The difference grows if %s is",
+                             "%s: measure under such conditions."),
                        best$model, best$against, with_unit(short(apart[at]), m$unit),
                        paste0(if (is.numeric(a$time)) "hour ", format(a$time[at])),
-                       if (conditions[[name]] > 0) "higher" else "lower", name))
+                       name, if (conditions[[name]] > 0) "higher" else "lower"))
 }

@@ -28,11 +28,12 @@ step_inspection <- function(upgrade, adopted, last = NULL) {
   if (!length(doubted) && !length(times) && !coarse) return(NULL)
   mended <- c(doubted, names(times))
   reasons <- c(
-    if (length(doubted)) sprintf("Its steps may be what %s.", mends_words(doubted)),
+    if (length(doubted)) sprintf("%s may only correct for its coarse steps.", listed(doubted)),
     if (length(times))
-      sprintf("%s about a step of the record, and a simulator with coarse steps errs alike.",
-              listed(sprintf("The time that %s brings (%s) is", names(times),
-                             vapply(times, listed, "")))),
+      sprintf(paste("The time%s of %s %s about a step of the record, and coarse steps make an",
+                    "error of the same shape."), if (length(times) > 1) "s" else "",
+              listed(sprintf("%s (%s)", names(times), vapply(times, listed, ""))),
+              if (length(times) > 1) "are" else "is"),
     if (coarse)
       paste0("With steps a quarter as long the simulator's output changes by ", short(error),
              " of the noise beyond what its parameters can take up",
@@ -41,8 +42,6 @@ step_inspection <- function(upgrade, adopted, last = NULL) {
                   if (length(mended)) paste(" before you believe in", listed(mended, "or")), ". ",
                   paste(reasons, collapse = " ")))
 }
-
-mends_words <- function(names) paste(listed(names), if (length(names) > 1) "mend" else "mends")
 
 # The times that a mechanism brings and that are about a step or less, if its parent's own steps
 # could not be tried.
@@ -109,11 +108,11 @@ looked_words <- function(pairs) {
     asks <- asks[!duplicated(names(asks))]
     respond <- if (nzchar(same)) "respond to the same conditions"
                else "respond to no condition that was measured"
-    sprintf("Because %s %s, only a look on site distinguishes them: %s.", listed(names(asks)),
+    sprintf("%s %s, so only a check on site can distinguish them: %s.", listed(names(asks)),
             respond,
-            if (length(asks) == 2) sprintf("the first asks for %s, the second for %s", asks[[1]],
+            if (length(asks) == 2) sprintf("the first needs %s, the second %s", asks[[1]],
                                            asks[[2]])
-            else paste0(names(asks), " asks for ", asks, collapse = "; "))
+            else paste0(names(asks), " needs ", asks, collapse = "; "))
   }, "")
 }
 
@@ -163,10 +162,11 @@ confounded_tie <- function(model, upgrade) {
 stand_in_inspection <- function(models) {
   if (!length(models)) return(NULL)
   names <- vapply(models, `[[`, "", "mechanism")
-  c(stand_in = sprintf(paste("Take %s as %s and look for something that acts alike but shows on",
-                             "held-out data too: which days gain by it in calibration, and which",
-                             "lose held out?"),
-                       listed(names), if (length(names) > 1) "signs" else "a sign"))
+  c(stand_in = sprintf(paste("%s probably %s in for another cause. Compare the days in calibration",
+                             "on which the error falls with %s to the held-out days on which it",
+                             "rises, and look for what differs."),
+                       listed(names), if (length(names) > 1) "stand" else "stands",
+                       if (length(names) > 1) "them" else "it"))
 }
 
 described_inspection <- function(upgrade, models) {
@@ -223,7 +223,7 @@ nearest_inspection <- function(upgrade) {
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf(
-    "The mechanism %s remains undecided (odds of %s%s): a longer record%s%s would decide it%s.",
+    "The mechanism %s is not established (odds of %s%s): a longer record%s%s would decide%s.",
     best$mechanism, odds(best$log10_bf),
     if (isTRUE(best$error_ratio < rules$clearly_fallen))
       sprintf("; with it the error falls to %s", percent(best$error_ratio))
@@ -258,6 +258,7 @@ calibrated_words <- function(measurements, times = 1) {
 # Mechanisms that a larger budget would decide: the nearest one, if it was not verified, and those
 # of which the numbers are too rough to rule them out.
 budget_inspections <- function(upgrade) {
+  if (unjudged(upgrade)) return(NULL)
   best <- near_trial(upgrade)
   unverified <- if (NROW(best) && is_unverified(best, upgrade)) best
   open <- open_trials(upgrade)
@@ -278,11 +279,10 @@ budget_inspections <- function(upgrade) {
 
 rough_words <- function(open) {
   vapply(seq_len(nrow(open)), function(k) {
-    ends <- c(open$lower95[k], open$upper95[k])
+    wide <- open$upper95[k] - open$lower95[k]
     paste0(open$mechanism[k], " is not ruled out: ",
-           if (diff(ends) > rules$too_rough) "its numbers are too rough for odds"
-           else sprintf("odds of %s%s, by numbers that are not trusted", odds(open$log10_bf[k]),
-                        odds_interval(ends)))
+           if (wide > rules$too_rough) "its numbers are too rough for odds"
+           else "its numbers are not trusted")
   }, "")
 }
 
@@ -344,11 +344,14 @@ fallen_words <- function(conditions, falls) {
   vapply(names(conditions), function(mechanism) {
     of <- listed(conditions[[mechanism]])
     best <- falls[match(mechanism, falls$mechanism), ]
-    sprintf(paste("The error still responds to %s. With %s, which %s, it falls to %s, but the",
-                  "evidence (odds of %s) does not distinguish that from an unknown response to %s:",
-                  "look for %s on site."),
+    sprintf(paste("The error still responds to %s. With %s, which %s, the error falls to %s of",
+                  "what it is, but an unknown response to %s would explain this as well (log10",
+                  "Bayes factor beside it: %s).%s"),
             of, mechanism, if (length(conditions[[mechanism]]) > 1) "they drive" else "it drives",
-            percent(best$error_ratio), odds(best$log10_bf), of, called_for(best$parameters[[1]]))
+            percent(best$error_ratio), of, signed(best$beside_unknown),
+            if (NROW(best$parameters[[1]]))
+              sprintf(" Check on site whether there is %s.", called_for(best$parameters[[1]]))
+            else "")
   }, "")
 }
 
@@ -356,10 +359,10 @@ tried_words <- function(driven) {
   if (!length(driven)) return(NULL)
   tried <- unique(unlist(driven))
   several <- length(driven) > 1
-  sprintf(paste("The error still responds to %s. Among the mechanisms that %s, %s %s tried but not",
-                "adopted: look for another way in which %s. The best days for this are those on",
-                "which %s changes and the other conditions hardly change."),
-          listed(names(driven)), if (several) "they drive" else "it drives", listed(tried),
+  sprintf(paste("The error still responds to %s. %s, which %s, %s tried but not adopted: look for",
+                "another way in which %s. The best days for this are those on which %s changes",
+                "and the other conditions hardly change."),
+          listed(names(driven)), listed(tried), if (several) "they drive" else "it drives",
           if (length(tried) > 1) "were" else "was",
           if (several) "they act" else paste(names(driven), "acts"),
           if (several) "one of them" else "it")
@@ -369,9 +372,9 @@ undriven_words <- function(conditions, catalogue) {
   if (!length(conditions)) return(NULL)
   drivers <- unlist(lapply(catalogue, `[[`, "boundary"))
   sprintf(paste("The error still responds to %s, and no mechanism %s the catalogue is driven by",
-                "%s: think of what acts with %s, and add it."),
+                "%s: add one that is."),
           listed(conditions), if (any(conditions %in% drivers)) "left in" else "of",
-          if (length(conditions) > 1) "these" else "it", listed(conditions, "or"))
+          listed(conditions, "or"))
 }
 
 # Drivers of mechanisms that are not among the conditions analysed: left out as constant, or never
@@ -386,14 +389,16 @@ driver_inspections <- function(upgrade) {
       vapply(upgrade$catalogue, function(m) any(m$boundary %in% conditions), NA)])
   }
   c(if (length(constant)) {
-      c(constant = sprintf(paste("%s did not vary in calibration, so that %s cannot be judged:",
+      c(constant = sprintf(paste("%s did not vary in calibration, so %s cannot be judged:",
                                  "calibrate on rows with changes."),
                            listed(constant), driven_by(constant)))
     },
     if (length(absent)) {
       c(driver = sprintf(
-        paste("Not among the boundary conditions analysed: %s, which %s %s. Add to boundary of",
-              "measurements(), so that the error can respond to it."),
-        listed(absent), if (length(absent) > 1) "drive" else "drives", driven_by(absent)))
+        paste("%s %s %s, but %s not analysed: name %s in boundary of measurements(), to see",
+              "whether the error responds to %s."),
+        listed(absent), if (length(absent) > 1) "drive" else "drives", driven_by(absent),
+        if (length(absent) > 1) "are" else "is", if (length(absent) > 1) "them" else "it",
+        if (length(absent) > 1) "them" else "it"))
     })
 }

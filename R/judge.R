@@ -221,7 +221,7 @@ confounded_parameters <- function(fit, new) {
   others <- setdiff(colnames(fit$values), new)
   if (!length(new) || !length(others)) return(character())
   together <- stats::cov.wt(posterior_unit(fit), fit$weights)$cov
-  sd <- sqrt(pmax(diag(together), .Machine$double.eps))  # of rounding alone: no correlation
+  sd <- pmax(sqrt(diag(together)), 1e-12)  # of rounding alone: no correlation
   r <- together / outer(sd, sd)
   dimnames(r) <- list(colnames(fit$values), colnames(fit$values))
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > rules$confounded]

@@ -2,20 +2,27 @@
 # one reading to the next by much more, or much less, than before. Changes do not see a drift.
 
 # The moment after which the changes of the errors r are likeliest of another size: list(row,
-# before, after), the root mean squares of the changes; NULL if they are not far apart.
+# before, after), the root mean squares of the changes; NULL if they are not far apart, or if
+# either part is short. Readings that stand apart are left out.
 changed_size <- function(r, hours, step_h) {
-  rows <- which(diff(hours) < rules$unbroken * step_h & is.finite(diff(r)))
-  squares <- diff(r)[rows]^2
+  r[spikes(r, hours, step_h)] <- NA
+  rows <- which(diff(hours) < rules$unbroken * step_h & is.finite(diff(r))) + 1
+  squares <- diff(r)[rows - 1]^2
   n <- length(squares)
-  first <- seq_len(n)
-  first <- first[first >= rules$least_part * n & n - first >= rules$least_part * n]
-  if (!length(first)) return(NULL)
-  before <- cumsum(squares)[first] / first
-  after <- (sum(squares) - cumsum(squares)[first]) / (n - first)
+  if (n < 2 * rules$suspect_rows || !any(squares > 0)) return(NULL)
+  first <- seq(2, n - 2)
+  least <- 1e-6 * mean(squares)
+  before <- pmax(least, cumsum(squares)[first] / first)
+  after <- pmax(least, rev(cumsum(rev(squares)))[first + 1] / (n - first))
   best <- which.min(first * log(before) + (n - first) * log(after))
+  k <- first[best]
+  lasts <- c(hours[rows[k]] - hours[1], hours[length(hours)] - hours[rows[k]])
+  is_short <- min(k, n - k) < max(rules$suspect_rows, rules$least_part * n) ||
+    min(lasts) < 24 * rules$part_days
   size <- sqrt(c(before[best], after[best]))
-  if (!isTRUE(max(size) > rules$part_size * min(size))) return(NULL)
-  list(row = rows[first[best]] + 1, before = size[1], after = size[2])
+  if (is_short || max(size) <= rules$part_size * min(size)) return(NULL)
+  # The first change of another size leads to the first reading that is: the last is as before.
+  list(row = rows[k + 1], before = size[1], after = size[2])
 }
 
 part_inspection <- function(model, measurements) {
@@ -28,13 +35,18 @@ part_inspection <- function(model, measurements) {
   }
   p <- model$prediction
   rows <- match(p$time, measurements$time)
-  found <- changed_size(p$observed - p$mean, measurements$hours[rows], measurements$step_h)
+  r <- ifelse(rows %in% measurements$faulty, NA, p$observed - p$mean)
+  found <- changed_size(r, measurements$hours[rows], measurements$step_h)
   if (is.null(found)) return(NULL)
   at <- p$time[found$row]
   sizes <- with_unit(short(c(found$before, found$after)), measurements$unit)
+  answers <- significant_conditions(model$attribution$table)
   c(parts = sprintf(paste("Ask what %s at %s: from one reading to the next the error changes by %s",
-                          "before, and by %s after. What acts in one part of a record alone is no",
-                          "property of the model. Judge the parts one by one."),
+                          "before, and by %s after. %s"),
                     if (found$before < found$after) "began" else "ended",
-                    paste0(if (is.numeric(at)) "hour ", format(at)), sizes[1], sizes[2]))
+                    paste0(if (is.numeric(at)) "hour ", format(at)), sizes[1], sizes[2],
+                    if (length(answers))
+                      sprintf("It may be %s, to which the error responds.", listed(answers, "or"))
+                    else paste("What acts in one part of a record alone may be no property of the",
+                               "model.")))
 }

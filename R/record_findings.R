@@ -17,8 +17,11 @@ record_checks <- list(
   direction = function(x) if (x$is_condition && !x$is_circular) direction_finding(x),
   counter = function(x) if (!x$is_circular) counter_finding(x),
   constant = function(x) if (!x$is_target) constant_finding(x),
-  range_end = function(x) if (x$is_target) range_finding(x),
-  stuck = function(x) if (x$is_target || !has_few_levels(x$v)) stuck_finding(x),
+  range_end = function(x) if (x$is_target && is.null(at_rest(x$v))) range_finding(x),
+  stuck = function(x) {
+    if (x$is_target) at_rest_finding(x) %||% stuck_finding(x)
+    else if (!has_few_levels(x$v) && !never_falls(x$v)) stuck_finding(x)
+  },
   quantised = function(x) if (x$is_target) quantised_finding(x),
   repeated = function(x) if (x$is_target || !has_few_levels(x$v)) repeated_finding(x))
 
@@ -190,7 +193,7 @@ value_runs <- function(v) {
 # either end of its range.
 stuck_finding <- function(x) {
   runs <- value_runs(x$v)
-  if (length(runs$length) < rules$few_values) return(if (x$is_target) at_rest_finding(x))
+  if (length(runs$length) < rules$few_values) return(NULL)
   usual <- stats::quantile(runs$length, 0.9, type = 1)
   long <- runs$length > max(rules$stuck_runs * usual, if (!x$is_target) rules$stuck_rows)
   if (!x$is_target) long <- long & !runs$value %in% range(x$v, na.rm = TRUE)
@@ -202,16 +205,27 @@ stuck_finding <- function(x) {
     listed(format_each(unique(runs$value[long]))), rows_words(rows)))
 }
 
-# A target that hardly ever changes.
-at_rest_finding <- function(x) {
-  runs <- rle(sort(x$v))
+# The value that nearly all readings of a target have, unless it is zero: list(value, rows, of).
+at_rest <- function(v) {
+  runs <- rle(sort(v))
+  n <- sum(runs$lengths)
+  if (n < rules$suspect_rows) return(NULL)
   most <- which.max(runs$lengths)
   value <- runs$values[most]
-  if (value == 0 || runs$lengths[most] < rules$at_rest * sum(runs$lengths)) return(NULL)
-  list(value = value,
-       says = sprintf("%s is %s in %d of %d rows: its sensor seems to be stuck.", x$told,
-                      format(value), runs$lengths[most], sum(runs$lengths)))
+  if (value != 0 && runs$lengths[most] >= rules$at_rest * n)
+    list(value = value, rows = runs$lengths[most], of = n)
 }
+
+at_rest_finding <- function(x) {
+  found <- at_rest(x$v)
+  if (is.null(found)) return(NULL)
+  list(value = found$value,
+       says = sprintf("%s is %s in %d of %d rows: its sensor seems to be stuck.", x$told,
+                      format(found$value), found$rows, found$of))
+}
+
+# As a meter, which stands while nothing is used.
+never_falls <- function(v) all(diff(v[!is.na(v)]) >= 0)
 
 # Changes of value stand a whole number of rows apart.
 repeated_finding <- function(x) {
@@ -283,24 +297,21 @@ circle_jumps <- function(v) {
   if (close && all(tabulate(floor((v %% 360) / 90) + 1, 4) > 0)) sum(over) else 0
 }
 
-# It never falls but to where it began; what rises by equal steps is a clock, and what rises evenly,
-# as a room that warms up, may be measured.
+# It never falls but to where it began; what rises by equal steps is a clock.
 counter_finding <- function(x) {
   v <- x$v[!is.na(x$v)]
   change <- diff(v)
   fall <- which(change < 0)
   rise <- change[change > 0]
-  if (length(rise) < rules$counter_rises || length(fall) > rules$counter_falls * length(rise) ||
-      length(unique(signif(rise, 6))) <= rules$clock_rises) return(NULL)
-  is_rough <- stats::sd(diff(change)) > rules$counter_rough * stats::sd(change)
-  if (!length(fall) && !(x$is_condition && is_rough)) return(NULL)
+  if (!length(fall) || length(rise) < rules$counter_rises ||
+      length(fall) > rules$counter_falls * length(rise)) return(NULL)
+  if (length(unique(signif(rise, 6))) <= rules$clock_rises) return(NULL)
   to_start <- v[fall + 1] <= min(v) + rules$counter_start * diff(range(v))
   resets <- to_start & -change[fall] > rules$counter_reset * max(rise)
   if (!all(resets)) return(NULL)
-  often <- if (length(fall) > 1) sprintf(", and is reset %d times", length(fall))
-           else if (length(fall)) ", and is reset once" else ""
   list(value = length(fall), says = sprintf(
-    "%s only rises%s: it is a counter. Give its change over each row.", x$told, often))
+    paste("%s only rises, and is reset %s: it is a counter. Give its change over each row."),
+    x$told, if (length(fall) > 1) paste(length(fall), "times") else "once"))
 }
 
 # What calibration cannot show, though the held-out rows have it.

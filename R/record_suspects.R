@@ -434,10 +434,11 @@ fault_words <- c(
   missing_code = "a code for missing values", far_outside = "values far outside all others",
   range_end = "readings at the end of a sensor's range", stuck = "a sensor that is stuck",
   quantised = "readings in coarse steps", repeated = "repeated values",
-  direction = "a direction that is not circular()", counter = "a counter",
+  direction = "a direction that is not given as circular()", counter = "a counter",
   constant = "a condition that is constant in calibration", clock = "clocks that differ",
-  daylight = "clocks that differ", start = "a start that is not forgotten",
-  step_change = "a step of a sensor")
+  daylight = "clocks that differ",
+  start = "an initial state that still acts (a warm-up that is too short)",
+  step_change = "a sudden shift of a sensor")
 
 record_doubt_words <- function(ids, subject = "the record itself") {
   if (length(ids)) paste(subject, "has", listed(unique(unname(fault_words[ids]))))

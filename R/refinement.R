@@ -3,7 +3,7 @@
 #' Searches for the mode by runs of the simulator and trains an emulator in the region of the mode.
 #' The posterior is sampled, and the simulator checks the emulator at draws of it. The
 #' runs of a check also train the emulator of the next round. The rounds end when a check passes
-#' with enough to spare, if the rounds left could not pass, or after `rounds`.
+#' with enough to spare, after two rounds without progress, or after `rounds`.
 #'
 #' # Search
 #'

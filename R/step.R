@@ -269,8 +269,8 @@ why_not <- function(table, decisive, context) {
   found <- found_words(best, decisive)
   if (best$log10_bf < decisive) {
     list(id = "not_decisive", words = sprintf(
-      "no mechanism is decisive (%s; %s or more and an interval above zero are needed)", found,
-      format(decisive)))
+      "no mechanism has enough evidence (%s; %s or more and an interval above zero are needed)",
+      found, format(decisive)))
   } else {
     list(id = "uncertain",
          words = sprintf("the evidence for the best mechanism is too uncertain (%s)", found))

@@ -240,7 +240,8 @@ over_priors <- function(model, context) {
 }
 
 # The trial that is to be adopted, searched from other starts as a base model is, until a second
-# search ends at its best mode. It is verified anew if a search ended outside its region.
+# search ends at its best mode. If a search ended outside its region, it is verified in the region
+# of all modes; if there is no emulator of that, it stays as it was verified.
 searched_again <- function(trial, present, context) {
   if (trial$level == "given") return(trial)
   before <- runs_spent(context)
@@ -261,9 +262,8 @@ searched_again <- function(trial, present, context) {
   ends <- vapply(counting, `[[`, 0, "at")
   if (any(straight_distance(trial)[ends] > 1)) {
     all <- verify_trial(with_modes(trial, counting, context$seed), present, context)
-    # The evidence of one mode is a lower bound, if there is no emulator of all.
-    may_stay <- has_passed(all) || !is.null(to_adopt(list(all), present, context))
-    trial <- if (may_stay) all else beside_modes(replace(trial, "runs", all["runs"]), context)
+    trial <- if (may_stay(all, trial, present, context)) all
+             else beside_modes(replace(trial, "runs", all["runs"]), context)
   } else {
     trial <- beside_modes(trial, context)
   }
@@ -271,7 +271,16 @@ searched_again <- function(trial, present, context) {
   trial
 }
 
-# Its posterior as it stands, beside the modes that searches found since.
+# The evidence of one mode is a lower bound of that of all. If runs refute the emulator of all, it
+# must reach that, and may be adopted.
+may_stay <- function(all, one, present, context) {
+  if (is.null(all$fit$check)) return(FALSE)
+  has_passed(all) || !is.null(to_adopt(list(all), present, context)) &&
+    standing_of(all, present) >= standing_of(one, present)
+}
+
+# A trial with the posterior that it has, beside the modes that searches found since, and at the run
+# of least squares of all of them.
 beside_modes <- function(trial, context) {
   fits <- record_fits(trial$fit)
   trial <- with_least(trial, context)

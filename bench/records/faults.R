@@ -77,7 +77,6 @@ faults <- list(
     total <- cumsum(v)
     total - floor(total / (max(total) / 3.5)) * (max(total) / 3.5)
   }, "P"), right = "counter"),
-  meter = list(put = in_driver(function(v, world) cumsum(v), "P"), right = "counter"),
   step_target = list(put = in_target(function(v, world) {
     v + ifelse(seq_along(v) >= at_step(v), stats::runif(1, 4, 10) * world$noise, 0)
   }), right = "step_change"),

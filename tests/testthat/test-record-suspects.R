@@ -46,7 +46,7 @@ test_that("the clock of the target is suspected, and said before all else", {
   upgrade <- expect_suspect(
     suspect_room(function(d) transform(d, Ti = late(Ti, 1))), "clock", "Ti",
     "The clock of Ti seems to be 1.0 h behind.*falls from 0.\\d+ to 0.[01]\\d* K")
-  expect_match(summary(upgrade)$headline, "^Mend the record first: it has clocks that differ")
+  expect_match(summary(upgrade)$headline, "^Correct the record first: it has clocks that differ")
   expect_match(printed(upgrade), "the record itself has clocks that differ.*The clock of Ti")
   expect_match(printed(summary(upgrade)), "Faults of the record: The clock of Ti")
 })

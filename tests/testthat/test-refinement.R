@@ -195,4 +195,14 @@ test_that("verification ends after two rounds without progress", {
   expect_false(stalled(c(0, 0, 0)))  # an emulator without error, whose region is not settled
   expect_false(stalled(c(0.1, 0.2, 0.3)))
   expect_true(stalled(c(0.5, 1, 2)))
+  check <- amiss:::check_by_runs
+  rounds <- 0
+  stand_in(check_by_runs = function(...) {
+    found <- check(...)
+    rounds <<- rounds + 1
+    found$fits[[1]]$check[c("passed", "ratio")] <- list(FALSE, c(1, 2, 2, 0.1)[rounds])
+    found
+  })
+  refined(rounds = 8)
+  expect_equal(rounds, 3)
 })

@@ -55,7 +55,7 @@ test_that("a change without gain on held-out data is a hint, and no cause", {
   told <- summary(rejudged(upgrade))
   expect_identical(told$verdict, "unexplained")
   expect_identical(told$tag, "Unexplained; a stand-in fits")
-  expect_match(told$note, "does not improve predictions of data the model has not seen")
+  expect_match(told$note, "does not clearly improve predictions of data the model has not seen")
   expect_match(told$change, "on held-out data it rises from .*, no gain", all = FALSE)
 })
 

@@ -305,7 +305,8 @@ test_that("a mode that was verified stays if there is no emulator of all modes",
   stand_in(far_points = function(...) list(amiss:::from_unit(far, one$space)[1, ]))
   all <- amiss:::searched_again(one, present$model, present$context)
   expect_gt(all$fit$log_evidence, one$fit$log_evidence + 3)
-  refuted <- function(model, ...) {
+  refuted <- function(model, present, context) {
+    model <- amiss:::with_runs(model, amiss:::from_unit(0.99 * far, model$space), context)$model
     model$fit$log_evidence <- -1e3
     model$fit$standard_error <- 1e6
     model$fit$check$passed <- FALSE
@@ -317,6 +318,19 @@ test_that("a mode that was verified stays if there is no emulator of all modes",
   expect_false(kept$fit$trust$trusted)
   expect_equal(kept$fit$modes$lost, 1)
   expect_lt(amiss:::least_error(kept), 0.5 * amiss:::least_error(one))
+  # The runs that refuted it are kept; what no run has checked does not stay.
+  expect_gt(nrow(kept$runs$z), nrow(one$runs$z) + 1)
+  stays <- function(all) amiss:::may_stay(all, one, present$model, present$context)
+  expect_true(stays(one))
+  unchecked <- one
+  unchecked$fit$check <- NULL
+  expect_false(stays(unchecked))
+  # A refuted one that is decisive stays if it is no less.
+  weak <- one
+  weak$fit$check$passed <- FALSE
+  expect_true(stays(weak))
+  weak$fit$log_evidence <- one$fit$log_evidence - 1
+  expect_false(stays(weak))
 })
 
 test_that("a mechanism that changes nothing costs its first look, and appears in no odds", {
