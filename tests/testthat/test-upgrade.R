@@ -325,12 +325,14 @@ test_that("a mode that was verified stays if there is no emulator of all modes",
   unchecked <- one
   unchecked$fit$check <- NULL
   expect_false(stays(unchecked))
-  # A refuted one that is decisive stays if it is no less.
-  weak <- one
-  weak$fit$check$passed <- FALSE
-  expect_true(stays(weak))
-  weak$fit$log_evidence <- one$fit$log_evidence - 1
-  expect_false(stays(weak))
+  # A refuted one stays if it is decisive beside an unknown response, and no less.
+  refuted_one <- function(more) {
+    one$fit$check$passed <- FALSE
+    one$fit$log_evidence <- one$fit$log_evidence + more
+    one
+  }
+  expect_true(stays(refuted_one(20)))
+  expect_false(stays(refuted_one(-1)))
 })
 
 test_that("a mechanism that changes nothing costs its first look, and appears in no odds", {
