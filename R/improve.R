@@ -344,8 +344,9 @@ surely_exceeds <- function(seen, share, fit)
 check_score <- function(fits) {
   min(vapply(fits, function(fit) {
     check <- fit$check
-    if (is.null(check)) -1
-    else if (!isTRUE(check$passed)) 1 / (1 + max(fit$standard_error, 0, na.rm = TRUE))
+    if (is.null(check)) return(-1)
+    error <- if (is.na(fit$standard_error)) Inf else fit$standard_error
+    if (!isTRUE(check$passed)) 1 / (1 + error)
     else 1 + (if (is.na(check$effective)) 1 / (1 + check$ratio) else check$effective)
   }, 0))
 }

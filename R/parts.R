@@ -24,13 +24,8 @@ changed_size <- function(r, hours, step_h) {
 }
 
 part_inspection <- function(model, measurements) {
-  if (is_several(measurements)) {
-    told <- lapply(each_view(model, measurements),
-                   function(view) part_inspection(view$model, view$measurements))
-    if (length(unlist(told)))
-      return(c(parts = paste(names(unlist(told)), unlist(told), sep = ": ", collapse = " ")))
-    return(NULL)
-  }
+  if (is_several(measurements))
+    return(each_inspection("parts", part_inspection, model, measurements))
   p <- model$prediction
   rows <- match(p$time, measurements$time)
   r <- ifelse(rows %in% measurements$faulty, NA, p$observed - p$mean)

@@ -17,11 +17,9 @@ record_checks <- list(
   direction = function(x) if (x$is_condition && !x$is_circular) direction_finding(x),
   counter = function(x) if (!x$is_circular) counter_finding(x),
   constant = function(x) if (!x$is_target) constant_finding(x),
-  range_end = function(x) if (x$is_target && is.null(at_rest(x$v))) range_finding(x),
-  stuck = function(x) {
-    if (x$is_target) at_rest_finding(x) %||% stuck_finding(x)
-    else if (!has_few_levels(x$v) && !never_falls(x$v)) stuck_finding(x)
-  },
+  at_rest = function(x) if (x$is_target) at_rest_finding(x),
+  range_end = function(x) if (x$is_target) range_finding(x),
+  stuck = function(x) if (x$is_target || !has_few_levels(x$v)) stuck_finding(x),
   quantised = function(x) if (x$is_target) quantised_finding(x),
   repeated = function(x) if (x$is_target || !has_few_levels(x$v)) repeated_finding(x))
 
@@ -192,6 +190,7 @@ value_runs <- function(v) {
 # Much longer than nine in ten of the column's runs. What drives has no noise, and may rest at
 # either end of its range.
 stuck_finding <- function(x) {
+  if (!x$is_target && never_falls(x$v)) return(NULL)
   runs <- value_runs(x$v)
   if (length(runs$length) < rules$few_values) return(NULL)
   usual <- stats::quantile(runs$length, 0.9, type = 1)
@@ -205,23 +204,18 @@ stuck_finding <- function(x) {
     listed(format_each(unique(runs$value[long]))), rows_words(rows)))
 }
 
-# The value that nearly all readings of a target have, unless it is zero: list(value, rows, of).
-at_rest <- function(v) {
-  runs <- rle(sort(v))
+# Nearly all readings of a target are one value, unless it is zero.
+at_rest_finding <- function(x) {
+  runs <- rle(sort(x$v))
   n <- sum(runs$lengths)
   if (n < rules$suspect_rows) return(NULL)
   most <- which.max(runs$lengths)
   value <- runs$values[most]
-  if (value != 0 && runs$lengths[most] >= rules$at_rest * n)
-    list(value = value, rows = runs$lengths[most], of = n)
-}
-
-at_rest_finding <- function(x) {
-  found <- at_rest(x$v)
-  if (is.null(found)) return(NULL)
-  list(value = found$value,
-       says = sprintf("%s is %s in %d of %d rows: its sensor seems to be stuck.", x$told,
-                      format(found$value), found$rows, found$of))
+  if (value == 0 || runs$lengths[most] < rules$at_rest * n) return(NULL)
+  list(value = value,
+       says = sprintf(paste("%s is %s in %d of %d rows: its sensor seems to be stuck or coarse.",
+                            "Use readings that show changes."),
+                      x$told, format(value), runs$lengths[most], n))
 }
 
 # As a meter, which stands while nothing is used.

@@ -21,3 +21,11 @@ each_view <- function(model, measurements) {
     list(model = record_model(model, name), measurements = measurements$records[[name]])
   })
 }
+
+# What `inspect` says of several records, one after the other under one id; NULL if that is nothing.
+each_inspection <- function(id, inspect, model, measurements) {
+  told <- unlist(lapply(each_view(model, measurements),
+                        function(view) unname(inspect(view$model, view$measurements))))
+  if (length(told))
+    stats::setNames(paste(names(told), told, sep = ": ", collapse = " "), id)
+}

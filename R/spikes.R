@@ -12,13 +12,8 @@ spikes <- function(r, hours, step_h) {
 }
 
 spike_inspection <- function(model, measurements) {
-  if (is_several(measurements)) {
-    told <- lapply(each_view(model, measurements),
-                   function(view) spike_inspection(view$model, view$measurements))
-    if (length(unlist(told)))
-      return(c(spikes = paste(names(unlist(told)), unlist(told), sep = ": ", collapse = " ")))
-    return(NULL)
-  }
+  if (is_several(measurements))
+    return(each_inspection("spikes", spike_inspection, model, measurements))
   p <- model$prediction[model$prediction$use == "calibrate", ]
   rows <- model$fit$rows
   r <- p$observed - p$mean

@@ -259,10 +259,10 @@ why_not <- function(table, decisive, context) {
   }
   if (is_refuted(highest) && highest$log10_bf >= decisive) {
     return(list(id = "imitated",
-                words = sprintf(paste("no mechanism is decisive (%s has a log10 Bayes factor of",
-                                      "%.1f, but one of %.1f beside an unknown response to what",
-                                      "drives it)"), highest$mechanism, highest$log10_bf,
-                                highest$beside_unknown)))
+                words = sprintf(paste("no mechanism has enough evidence (%s has a log10 Bayes",
+                                      "factor of %.1f, but one of %.1f beside an unknown",
+                                      "response to what drives it)"), highest$mechanism,
+                                highest$log10_bf, highest$beside_unknown)))
   }
   best <- best_trial(table, decisive)
   if (!nrow(best) || highest$log10_bf < decisive) best <- highest

@@ -271,8 +271,8 @@ searched_again <- function(trial, present, context) {
   trial
 }
 
-# The evidence of one mode is a lower bound of that of all. If runs refute the emulator of all, it
-# must reach that, and may be adopted.
+# The evidence of one mode is a lower bound of that of all. If runs refute the emulator of all, its
+# evidence must reach that bound, and be enough to be adopted.
 may_stay <- function(all, one, present, context) {
   if (is.null(all$fit$check)) return(FALSE)
   has_passed(all) || !is.null(to_adopt(list(all), present, context)) &&

@@ -92,3 +92,27 @@ test_that("a mode without draws is weighed by its mass", {
   expect_lt(abs(log(share(covariance))), 0.7)
   expect_equal(share(covariance / 4), share(covariance) / 2, tolerance = 1e-6)
 })
+
+test_that("of an extension, images are searched in which one of its own parameters has moved", {
+  m <- linear_measurements()
+  z <- rbind(c(1, 2), c(1, 0.5), c(-0.3, 2 + 1e-9))
+  model <- run_model(linear_simulator(), m, z)
+  parameters <- names(model$parameters)
+  searched <- integer()
+  stand_in(with_exchanges = function(model, mode, context) c(model, list(images = 2:3)),
+           given_slopes = function(...) matrix(0),
+           begin_search = function(model, at, ...) list(model = model, at = at),
+           run_search = function(search, context) {
+             searched <<- c(searched, search$at)
+             search
+           }, has_arrived = function(search) TRUE)
+  images_of <- function(...) {
+    searched <<- integer()
+    amiss:::from_images(list(model = model, modes = list(list(at = 1))), search_context(), ...)
+    searched
+  }
+  expect_identical(images_of(), 2:3)
+  expect_identical(images_of(parameters[2]), 2L)
+  expect_identical(images_of(parameters[1]), 3L)
+  expect_identical(images_of(character()), integer())
+})

@@ -259,7 +259,7 @@ test_that("parameters that are correlated with those of a mechanism beyond 0.4 a
               weights = rep(1 / 400, 400), posterior = list(unit = unit))
   expect_identical(amiss:::confounded_parameters(fit, "new"), "close")
   # One that is constant but for rounding is correlated with nothing.
-  fit$posterior$unit[, 3] <- 0.999 + 1e-16 * seq_len(400)
+  fit$posterior$unit[, 3] <- 0.999 + 1e-15 * unit[, 1]
   expect_identical(amiss:::confounded_parameters(fit, "new"), "close")
   expect_identical(amiss:::confounded_parameters(fit, c("new", "close")), character())
   expect_identical(amiss:::confounded_parameters(fit, character()), character())

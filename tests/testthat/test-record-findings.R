@@ -99,12 +99,13 @@ test_that("readings at the end of a sensor's range are found, and left out if as
 
 test_that("a sensor that is stuck is found", {
   resting <- weather(Ti = function(v) replace(rep(21.5, length(v)), 150, 22))
-  expect_identical(ids(resting), "Ti stuck")
+  expect_identical(ids(resting), "Ti at_rest")
   expect_match(measure(resting)$findings$says, "Ti is 21.5 in 287 of 288 rows")
   more <- function(v) replace(rep(21.5, length(v)), seq(10, 100, 10), 21 + seq_len(10))
-  expect_identical(ids(weather(Ti = more)), "Ti stuck")
-  expect_null(amiss:::at_rest(rep(NA_real_, 48)))
-  expect_null(amiss:::at_rest(c(20.1, rep(NA, 47))))
+  expect_identical(ids(weather(Ti = more)), "Ti at_rest")
+  rest <- function(v) amiss:::at_rest_finding(list(v = v, told = "Ti"))
+  expect_null(rest(rep(NA_real_, 48)))
+  expect_null(rest(c(20.1, rep(NA, 47))))
   # No flow may last.
   dry <- function(v) replace(numeric(length(v)), 150:153, c(1.013, 3.27, 2.1, 0.94))
   expect_identical(ids(weather(Ti = dry)), character())
