@@ -1,5 +1,5 @@
 attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05,
-                            least_log10_bf = 0.5,
+                            least_log10_bf = 0.5, decisive = 2,
                             ais = list(pilot_chains = 128, groups = 4, max_groups = 16,
                                        max_sweeps = 12, precision = 0.3, importance_draws = 500))
 
@@ -28,6 +28,10 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #' *Products.* Responses are linear in each condition's history. An effect that is a product of two
 #' conditions shows only as far as one of them indicates it. A mechanism that holds a product is
 #' judged by its own runs ([upgrade_model()]). It can be found even if no condition is significant.
+#'
+#' *Something else with the same rhythm.* If the evidence is decisive but the p-value is high, a
+#' record shifted in time would do nearly as well. In a few days of weather that is so for all that
+#' repeats daily. The error then responds to the condition or to something else with its rhythm.
 #'
 #' *A condition is not yet a cause.* A fault that changes how much a system loses or stores changes
 #' its response to everything. The error may then respond to what moves the output most (in a heated
@@ -60,6 +64,7 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #'   * `smallest_shift`: shortest shift as a share of the record (0.05).
 #'   * `level`: largest p-value that is significant (0.05).
 #'   * `least_log10_bf`: evidence that a condition must earn besides its p-value (0.5).
+#'   * `decisive`: evidence that is significant whatever the p-value (2).
 #'   * `ais`: options of [ais()].
 #' @param seed Seed of the random numbers. It is that of the calibration if none is given, so that
 #'   two calls say the same. `NULL` draws one.
@@ -77,8 +82,8 @@ attribution_control <- list(surrogates = 99, smallest_shift = 0.05, level = 0.05
 #'     error.
 #'   * `share`: its share of the misfit.
 #'   * `p_value`, `p_value_single`: the p-value among all conditions, and by itself.
-#'   * `significant`: a p-value of at most `level` and a loss of at least `least_log10_bf`. A member
-#'     of a group has the value of the group.
+#'   * `significant`: a loss of at least `decisive`, or one of at least `least_log10_bf` with a
+#'     p-value of at most `level`. A member of a group has the value of the group.
 #'   * `trusted`: whether the sampler is trusted.
 #'   * `group`: the group, that is, conditions whose effects this record cannot separate (`NA` for
 #'     none).
@@ -124,7 +129,8 @@ attribute_record <- function(fits, which, control, seed, threads) {
   draws <- engine_draws(fits)
   conditions <- fit$measurements$conditions
   alone <- seq_along(conditions)
-  asked <- c(control, list(least = control$least_log10_bf * log(10)))
+  asked <- utils::modifyList(control, list(least = control$least_log10_bf * log(10),
+                                           decisive = control$decisive * log(10)))
   result <- staged("attributing the discrepancy", call_engine(
     attribute_(records, which, draws, asked, engine_context(seed, threads))))
   log10_bf <- result$sets$lost / log(10)
@@ -150,6 +156,11 @@ attribute_record <- function(fits, which, control, seed, threads) {
                  p_value_own = stats::setNames(result$adjusted[alone], conditions),
                  control = control, labels = fit$measurements$labels, seed = seed),
             class = "amiss_attribution")
+}
+
+# As AttributionOptions::significant() of the engine.
+is_significant <- function(log10_bf, p_value, control) {
+  log10_bf >= control$decisive || log10_bf >= control$least_log10_bf && p_value <= control$level
 }
 
 # Each member of a group is reported with the numbers of the group.
@@ -195,8 +206,10 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
               named("smallest_shift"), call = call)
   check_input(checkmate::check_number(control$level, lower = 0, upper = 1), named("level"),
               call = call)
-  check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE),
-              named("least_log10_bf"), call = call)
+  for (option in c("least_log10_bf", "decisive")) {
+    check_input(checkmate::check_number(control[[option]], finite = TRUE), named(option),
+                call = call)
+  }
   ais <- merge_control(ais, control$ais, named("ais"), names(ais_defaults_()), call)
   control$ais <- fill_ais_control(ais, named("ais"), call)
   control

@@ -288,7 +288,7 @@ attributed_together <- function(fits, each, control, seed, threads) {
     p <- min(1, sum(lengths(at) > 0) * min(1, own))
     list(log10_bf_dropped = dropped$lost / log(10),
          standard_error = dropped$standard_error / log(10), p_value = p,
-         significant = dropped$lost / log(10) >= filled$least_log10_bf && p <= filled$level,
+         significant = is_significant(dropped$lost / log(10), p, filled),
          trusted = dropped$trusted)
   }
   conditions <- unique(unlist(lapply(fits, function(fit) fit$measurements$conditions)))

@@ -191,6 +191,7 @@ AttributionOptions attribution_options(const Rcpp::List& control) {
   AttributionOptions options;
   options.ais = convert::ais_options(control["ais"]);
   options.least = Rcpp::as<double>(control["least"]);
+  options.decisive = Rcpp::as<double>(control["decisive"]);
   options.level = Rcpp::as<double>(control["level"]);
   options.surrogates.surrogates = control["surrogates"];
   options.surrogates.smallest_shift = control["smallest_shift"];

@@ -102,6 +102,18 @@ test_that("shares are plain shares of the variance where conditions do not overl
   expect_true(all(table$share >= 0))
 })
 
+test_that("decisive evidence counts whatever the p-value, weak evidence with a low one", {
+  found <- attribute_discrepancy(plain_linear_fit(), list(surrogates = 19, decisive = -10))$table
+  expect_true(all(found$significant))
+  expect_gt(max(found$p_value), 0.05)
+  counts <- function(evidence, p)
+    amiss:::is_significant(evidence, p, amiss:::attribution_control)
+  expect_true(counts(2, 1))
+  expect_true(counts(0.5, 0.05))
+  expect_false(counts(1.9, 0.06))
+  expect_false(counts(0.4, 0.01))
+})
+
 test_that("two threads give the bits of one", {
   fit <- plain_linear_fit()
   expect_identical(attribute_discrepancy(fit, list(surrogates = 19), seed = 1, threads = 2)$table,

@@ -133,8 +133,8 @@ void test_sets(const std::vector<Record>& records, std::size_t which, const Cali
     surrogates.surrogates = std::min(surrogates.surrogates, kFewSurrogates);
   out.test = surrogate_test(model, own.tangent, sets, surrogates, context);
   for (std::size_t s = 0; s < sets.size(); ++s)
-    out.significant.push_back(out.sets[s].lost >= options.least &&
-                              out.test.adjusted[static_cast<Index>(s)] <= options.level);
+    out.significant.push_back(
+        options.significant(out.sets[s].lost, out.test.adjusted[static_cast<Index>(s)]));
 }
 
 // What the single condition loses that loses most among those that earn their evidence but no p-value;

@@ -11,7 +11,11 @@ struct AttributionOptions {
   AisOptions ais;               ///< of posteriors that are sampled again without a set of conditions
   SurrogateOptions surrogates;  ///< its settings are chosen here
   double least = 1.15;          ///< nats that a set of conditions must earn to matter
+  double decisive = 4.6;        ///< nats that need no test
   double level = 0.05;          ///< of the test
+
+  /// Whether a set is significant that earns `lost` nats and has the adjusted p-value `p`.
+  bool significant(double lost, double p) const { return lost >= decisive || (lost >= least && p <= level); }
 };
 
 /// Conditions that are dropped from the discrepancies together: of each record those that are.

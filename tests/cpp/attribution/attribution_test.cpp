@@ -224,6 +224,15 @@ TEST(Attribute, AConditionThatEarnsItsEvidenceButNoPValueIsSoughtOnceMoreInGroup
   EXPECT_EQ(attribute(record.records(), 0, calibration, options, Context()).sets.size(), 3u);
 }
 
+// In a short record a shifted one does nearly as well as the record itself.
+TEST(Attribute, DecisiveEvidenceNeedsNoPValue) {
+  AttributionOptions options;
+  EXPECT_TRUE(options.significant(options.decisive, 1.0));
+  EXPECT_FALSE(options.significant(options.decisive - 0.01, 0.06));
+  EXPECT_TRUE(options.significant(options.least, 0.05));
+  EXPECT_FALSE(options.significant(options.least - 0.01, 0.01));
+}
+
 TEST(Attribute, WhereNothingActsNothingIsNamedAndFewSurrogatesSuffice) {
   const Copied record(0.0);
   const Calibration calibration = calibrate(record.records(), {}, Context());
