@@ -11,7 +11,7 @@
 #' chains give the estimate. The estimate is unbiased, with an interval by bootstrap over the
 #' groups.
 #'
-#' The second estimator is an importance sample from a Student-t mixture fitted to the draws. If no
+#' The second estimator is an importance sample from a mixture fitted in rounds to the draws. If no
 #' mixture comes close, it is annealing from that mixture. The second estimate must not be larger
 #' than the one reported. Groups or draws are added until the standard error is at most `precision`.
 #'

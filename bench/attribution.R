@@ -1,9 +1,9 @@
 #!/usr/bin/env Rscript
-# How often the discrepancy by itself, before any mechanism is tried, responds most to a condition of
-# what is hidden; how often it responds to one where nothing is hidden, or something that no
-# condition drives. Base models of worlds S, S+1, ... of each family are calibrated as the loop does
-# it, and their discrepancy is attributed. Beside it the rule that asks a p-value of at most 0.05 of
-# all evidence, as a rival.
+# How often the discrepancy by itself, before any mechanism is tried, responds most to a condition
+# of what is hidden; how often it responds to one if nothing is hidden, or something that no
+# condition drives. Base models of worlds S, S+1, ... of each family are calibrated as the loop
+# does it, and their discrepancy is attributed. Beside it the rule that asks a p-value of at most
+# 0.05 of all evidence.
 # Usage: Rscript bench/attribution.R [--family F,F] [--worlds 100] [--seed 1] [--workers 2]
 #                                    [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))

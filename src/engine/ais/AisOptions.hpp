@@ -14,12 +14,11 @@ struct AisOptions {
   double ess_drop = 0.7;   ///< the pilot's next temperature leaves this conditional effective size per chain
   bool gradient = true;    ///< Hamiltonian moves too, where the target has a gradient, or a conditional
   bool resample = true;    ///< resample a group when its effective size falls below half; false: plain AIS
-  int importance_draws = 1000;  ///< of the second estimator, from a fitted Student-t mixture; 0 leaves it out
+  int importance_draws = 1000;  ///< of the second estimator, from a fitted mixture; 0 leaves it out
   int refit_draws =
       0;  ///< of its first round, which only serves to fit the mixture again; 0: importance_draws
   double effective_draws = 0.0;  ///< more are drawn until so many are effective, and the precision is reached
   int max_components = 3;        ///< of that mixture
-  bool skewed = false;           ///< the mixture may be skewed, and is fitted to the draws of all rounds
   int max_temperatures = 400;
 
   void check() const;

@@ -62,48 +62,40 @@ SkewedMixture PopulationMonteCarlo::closer(const CloserOptions& options) {
   return closer(fit(options.max_components, options.dof), options);
 }
 
-StudentTMixture PopulationMonteCarlo::fit_elliptic(const MatrixXd& x, const VectorXd& weights,
-                                                   const AisOptions& options) {
-  return StudentTMixture::fit(x, weights, options.max_components, kImportanceDof, stream_);
-}
-
-// A mixture that comes closer to the posterior, fitted to a weighted sample of it and, if it may be skewed,
-// to all samples before it.
-SkewedMixture PopulationMonteCarlo::refit(const ImportanceSample& sample, const AisOptions& options) {
-  if (!options.skewed) return SkewedMixture(SkewMap(), fit_elliptic(sample.x, sample.weights, options));
-  if (sample.ess > 0) pool_.add(sample.x, sample.weights);  // else the record is impossible at every draw
-  return fit(options.max_components, kImportanceDof);
-}
-
-ImportanceSample PopulationMonteCarlo::sample(const StudentTMixture& first, const AisOptions& options) {
-  constexpr int kRounds = 4;
-  constexpr double kGood = 0.1;     // effective share of the draws at which refitting stops
-  constexpr double kUsable = 20.0;  // effective draws from which a mixture may be fitted
-  constexpr Index kMost = 16;       // times the draws asked for, at most, for the sake of precision
+ImportanceSample PopulationMonteCarlo::sample(const AisOptions& options) {
+  constexpr int kRounds = 12;
+  constexpr double kClose = 0.5;     // effective share of the draws at which refitting stops
+  constexpr double kProgress = 1.1;  // times the best effective size; after two rounds without, they end
+  constexpr double kGood = 0.1;      // effective share below which there is no estimate
+  constexpr double kUsable = 20.0;   // effective draws below which the first round gets the rest of its draws
+  constexpr Index kMost = 16;        // times the draws asked for, at most, for the sake of precision
   constexpr double kLeastAdded = 100.0;
   const Index n = options.importance_draws;
-  SkewedMixture mixture(SkewMap(), first);
+  SkewedMixture mixture = fit(options.max_components, kImportanceDof);
   ImportanceSample sample;
-  const auto add = [&](Index draws) { extend(sample, mixture, draws); };
-  const auto good = [&] { return sample.ess >= kGood * static_cast<double>(sample.size()); };
+  const auto reaches = [&](double share) { return sample.ess >= share * static_cast<double>(sample.size()); };
   const Index few = options.refit_draws > 0 ? std::min<Index>(options.refit_draws, n) : n;
-  add(few);
-  if (few < n && !(sample.ess > kUsable)) add(n - few);
+  extend(sample, mixture, few);
+  if (few < n && !(sample.ess > kUsable)) extend(sample, mixture, n - few);
+  double best = 0.0;  // effective size, of the rounds
+  for (int round = 1, vain = 0; round < kRounds && vain < 2; ++round) {
+    if (sample.ess > 0) pool_.add(sample.x, sample.weights);  // else the record is impossible at every draw
+    mixture = fit(options.max_components, kImportanceDof);
+    sample = ImportanceSample();
+    extend(sample, mixture, n);
+    if (reaches(kClose)) break;
+    vain = sample.ess > kProgress * best ? 0 : vain + 1;
+    best = std::max(best, sample.ess);
+  }
   const auto lacking = [&] {  // draws needed over those there are
     return std::max(std::pow(sample.se / options.precision, 2), options.effective_draws / sample.ess);
   };
-  for (int round = 1; round < kRounds && (options.skewed || sample.ess > kUsable); ++round) {
-    mixture = refit(sample, options);
-    sample = ImportanceSample();
-    add(n);
-    while (good() && lacking() > 1.0 && sample.size() < kMost * n) {
-      const double more = 1.1 * (lacking() - 1.0) * static_cast<double>(sample.size());
-      const double all = static_cast<double>(n);
-      add(static_cast<Index>(std::clamp(more, std::min(kLeastAdded, all), all)));
-    }
-    if (good()) break;
+  while (reaches(kGood) && lacking() > 1.0 && sample.size() < kMost * n) {
+    const double more = 1.1 * (lacking() - 1.0) * static_cast<double>(sample.size());
+    const double all = static_cast<double>(n);
+    extend(sample, mixture, static_cast<Index>(std::clamp(more, std::min(kLeastAdded, all), all)));
   }
-  if (!good()) sample.ess = 0.0;
+  if (!reaches(kGood)) sample.ess = 0.0;
   return sample;
 }
 

@@ -44,19 +44,15 @@ class PopulationMonteCarlo {
   SkewedMixture closer(SkewedMixture mixture, const CloserOptions& options);
   SkewedMixture closer(const CloserOptions& options);
 
-  /// Importance sample from `first`, then from mixtures fitted to its own weighted draws and, if they may be
-  /// skewed, to those added; the last mixture's draws alone are the estimator. Its effective size is 0 where
-  /// no mixture comes close.
-  ImportanceSample sample(const StudentTMixture& first, const AisOptions& options);
-  /// The mixture fitted to weighted draws of the posterior from which such a sample starts.
-  StudentTMixture fit_elliptic(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights,
-                               const AisOptions& options);
+  /// Importance sample from mixtures fitted, in rounds, to the draws there are and to those of the rounds
+  /// before; the last mixture's draws alone are the estimator. Its effective size is 0 if no mixture comes
+  /// close.
+  ImportanceSample sample(const AisOptions& options);
 
   long evaluations() const { return evaluations_; }  ///< of the likelihood, so far
 
  private:
   void extend(ImportanceSample& sample, const SkewedMixture& mixture, Eigen::Index draws);
-  SkewedMixture refit(const ImportanceSample& sample, const AisOptions& options);
 
   const Target& target_;
   const Context& context_;

@@ -52,11 +52,8 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   Stream stream(context.seed, kImportance, 0);
   annealed.gather(result.draws, result.log_likelihood, result.weights);
   PopulationMonteCarlo population(target, context, stream);
-  const StudentTMixture mixture = population.fit_elliptic(result.draws, result.weights, options);
   population.add(result.draws, result.weights);
-  const SkewedMixture close =
-      options.skewed ? population.fit(options.max_components, kBridgeDof) : SkewedMixture(SkewMap(), mixture);
-  ImportanceSample sample = population.sample(mixture, options);
+  ImportanceSample sample = population.sample(options);
   result.evaluations += population.evaluations();
   if (sample.ess > 0) {
     result.second = sample.log_evidence;
@@ -65,6 +62,7 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
     report(result, std::move(sample));
     return;
   }
+  const SkewedMixture close = population.fit(options.max_components, kBridgeDof);
   std::unique_ptr<AnnealedRun> from_close;
   try {
     from_close = std::make_unique<AnnealedRun>(AnnealingPath{target, close}, options, context, kBridged);

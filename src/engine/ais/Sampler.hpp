@@ -55,7 +55,7 @@ struct AisResult {
 /// each, a Student-t proposal, a step length and how many moves the chains need. All are then frozen, and
 /// fresh independent groups of chains are run, so that each group's estimate of the evidence is unbiased. The
 /// chains move by preconditioned Crank-Nicolson steps that are reversible in the fitted Student t, corrected
-/// by Metropolis and Hastings. An importance sample from a Student-t mixture fitted to the draws is the
+/// by Metropolis and Hastings. An importance sample from a mixture fitted in rounds to the draws is the
 /// second estimator; where no mixture comes close, a second annealed run from the mixture to the posterior
 /// ("bridged") is. The importance sample is reported where there is one, else the annealed run that reaches a
 /// standard error at less cost; more groups or draws are added until the standard error is as asked. Where

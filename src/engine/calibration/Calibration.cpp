@@ -122,14 +122,12 @@ AisResult sample_once(const CalibrationTarget& target, const AisOptions& options
   population.add(draws);
   const SkewedMixture mixture = population.closer({kRoundDraws * target.dimension(), kRounds});
   spent += population.evaluations();
-  AisOptions skewed = options;
-  skewed.skewed = true;
   const Context last = context.fork(kPosterior);
   AisResult result;
   try {
-    result = sample_ais(target, mixture, skewed, last);
+    result = sample_ais(target, mixture, options, last);
   } catch (const std::runtime_error&) {  // the mixture has lost the posterior: from where it came
-    result = sample_ais(target, reference, skewed, last);
+    result = sample_ais(target, reference, options, last);
   }
   result.evaluations += spent;
   return result;

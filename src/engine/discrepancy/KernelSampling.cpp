@@ -190,7 +190,6 @@ KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
   if (careful.chains == 0) careful.chains = kChains;
   if (careful.refit_draws == 0) careful.refit_draws = kRefitDraws;
   if (careful.effective_draws == 0) careful.effective_draws = kEffectiveDraws;
-  careful.skewed = true;
   AisOptions rough = careful;
   rough.ess_drop = std::min(careful.ess_drop, kRoughDrop);
   if (options.sweeps == 0) rough.sweeps = kRoughSweeps;  // and more, while likelihoods remember

@@ -31,7 +31,6 @@ struct KernelSample {
 ///
 /// Where `options` leave them open: 64 pilot chains, groups of 16, at least one move while only draws are
 /// needed, 300 draws for the first round of the importance sample, 400 effective draws in the end. Its
-/// mixture is skewed, as the prior limits, on one side, the alpha of every condition that does not act. Its
 /// weights can have a heavy tail, of which its standard error can know too little: bench/micro measures by
 /// how much estimates of several seeds lie further apart than they state.
 KernelSample sample_kernel(const KernelModel& model, const AisOptions& options,
