@@ -63,6 +63,7 @@
 #' * values that are repeated in several rows,
 #' * a direction that is not `circular()`,
 #' * a counter that rises and is reset,
+#' * temperatures whose unit changes at some row,
 #' * a condition that is constant in calibration but not in the held-out rows.
 #'
 #' Zeros, columns of few levels (switches, schedules) and the ends of what drives are no faults.

@@ -12,6 +12,7 @@ direction_codes <- c(990, 991)  # variable, calm
 # Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The next looks
 # at what is left: at the other rows, and at nothing if all are concerned.
 record_checks <- list(
+  unit = function(x) if (!x$is_circular && !are_amounts(x$v)) unit_finding(x),
   missing_code = function(x) code_finding(x),
   far_outside = function(x) far_finding(x),
   direction = function(x) if (x$is_condition && !x$is_circular) direction_finding(x),

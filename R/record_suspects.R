@@ -433,7 +433,7 @@ read_findings <- function(models, measurements) {
 fault_words <- c(
   missing_code = "a code for missing values", far_outside = "values far outside all others",
   range_end = "readings at the end of a sensor's range", stuck = "a sensor that is stuck",
-  at_rest = "a target that hardly ever changes",
+  at_rest = "a target that hardly ever changes", unit = "a unit that changes",
   quantised = "readings in coarse steps", repeated = "repeated values",
   direction = "a direction that is not given as circular()", counter = "a counter",
   constant = "a condition that is constant in calibration", clock = "clocks that differ",

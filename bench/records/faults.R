@@ -80,6 +80,12 @@ faults <- list(
   step_target = list(put = in_target(function(v, world) {
     v + ifelse(seq_along(v) >= at_step(v), stats::runif(1, 4, 10) * world$noise, 0)
   }), right = "step_change"),
+  unit_target = list(put = in_target(function(v, world) {
+    ifelse(seq_along(v) >= at_step(v), 32 + 1.8 * v, v)
+  }), right = "unit"),
+  unit_driver = list(put = in_driver(function(v, world) {
+    ifelse(seq_along(v) >= at_step(v), 273.15 + v, v)
+  }), right = "unit"),
   clock_target = list(
     put = visible(in_target(function(v, world) late(v, world, clock_hours(world)))),
     right = "clock"),

@@ -97,6 +97,26 @@ test_that("readings at the end of a sensor's range are found, and left out if as
                class = "amiss_error_input")
 })
 
+test_that("a unit that changes at some row is found, with the row", {
+  late <- function(change, from = 150) function(v) ifelse(seq_along(v) >= from, change(v), v)
+  fahrenheit <- late(function(v) 1.8 * v + 32)
+  expect_identical(ids(weather(Ti = fahrenheit)), "Ti unit")
+  expect_match(measure(weather(Ti = fahrenheit))$findings$says,
+               "Ti seems to change its unit at row 150, from Celsius to Fahrenheit: give all rows")
+  expect_identical(ids(weather(Te = fahrenheit)), "Te unit")
+  expect_match(measure(weather(Te = late(function(v) v + 273.15)))$findings$says,
+               "at row 150, from Celsius to kelvin")
+  back <- function(v) ifelse(seq_along(v) < 150, v + 273.15, v)
+  expect_match(measure(weather(Te = back))$findings$says, "from kelvin to Celsius")
+  # What jumps or grows in other ways is none, nor is what gets there step by step.
+  for (change in list(function(v) v + 20, function(v) 2 * v, function(v) v + 48 * 0.7))
+    expect_false("unit" %in% measure(weather(Ti = late(change)))$findings$id)
+  slowly <- function(v) v + 273.15 * pmin(1, pmax(0, (seq_along(v) - 120) / 40))
+  expect_false("unit" %in% measure(weather(Te = slowly))$findings$id)
+  expect_null(amiss:::unit_finding(list(v = c(NA, 1, 1000), told = "Te")))
+  expect_null(amiss:::unit_finding(list(v = numeric(100), told = "Te")))
+})
+
 test_that("a sensor that is stuck is found", {
   resting <- weather(Ti = function(v) replace(rep(21.5, length(v)), 150, 22))
   expect_identical(ids(resting), "Ti at_rest")
