@@ -210,6 +210,8 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
     check_input(checkmate::check_number(control[[option]], finite = TRUE), named(option),
                 call = call)
   }
+  check_input(checkmate::check_number(control$decisive, lower = control$least_log10_bf),
+              named("decisive"), "It must not be less than {.code least_log10_bf}.", call = call)
   ais <- merge_control(ais, control$ais, named("ais"), names(ais_defaults_()), call)
   control$ais <- fill_ais_control(ais, named("ais"), call)
   control

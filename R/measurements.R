@@ -234,6 +234,8 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                                    target = target, conditions = terms$name, circular = circular,
                                    labels = stats::setNames(c(label %||% target, terms$label),
                                                             c(target, terms$name)),
+                                   units = stats::setNames(c(unit, terms$unit),
+                                                           c(target, terms$name)),
                                    use = use_given,
                                    noise_sd = noise$sd * sqrt(coarse$per_step),
                                    per_step = coarse$per_step, no_codes = identical(missing, NA)))

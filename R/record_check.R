@@ -69,7 +69,7 @@ table_findings <- function(columns, target = "", circular = character(), noise_s
   found <- record_findings(list(
     columns = columns, target = target, conditions = setdiff(names(columns), target),
     circular = circular, use = rep("validate", rows), noise_sd = noise_sd, per_step = per_step))
-  told <- found$id %in% c("missing_code", "far_outside", "counter", "stuck")
+  told <- found$id %in% c("missing_code", "far_outside", "unit", "counter", "at_rest", "stuck")
   found$says <- sub(" Give missing = .*", "", found$says)
   found[told & !paste(found$id, found$column) %in% paste(known$id, known$column), ]
 }

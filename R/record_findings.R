@@ -12,9 +12,9 @@ direction_codes <- c(990, 991)  # variable, calm
 # Each gives list(value, says), with `rows` if it is of some rows only, or nothing. The next looks
 # at what is left: at the other rows, and at nothing if all are concerned.
 record_checks <- list(
-  unit = function(x) if (!x$is_circular && !are_amounts(x$v)) unit_finding(x),
   missing_code = function(x) code_finding(x),
   far_outside = function(x) far_finding(x),
+  unit = function(x) if (may_be_temperature(x)) unit_finding(x),
   direction = function(x) if (x$is_condition && !x$is_circular) direction_finding(x),
   counter = function(x) if (!x$is_circular) counter_finding(x),
   constant = function(x) if (!x$is_target) constant_finding(x),
@@ -26,7 +26,7 @@ record_checks <- list(
 
 # `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of
 # a table by name, the use of each row, the noise of a single reading, and how many rows an average
-# takes; `labels` of columns may be left out. Returns a data frame with a row for each finding: its
+# takes; `labels` and `units` of columns may be left out. Returns a data frame with a row for each finding: its
 # `id`, the `column`, its `rows` (all, if none is listed), the `value`, and what it `says`.
 record_findings <- function(record) {
   found <- lapply(names(record$columns),
@@ -47,11 +47,20 @@ record_column <- function(record, name) {
   # A target that is not compared does no harm.
   if (x$is_target) v[!record$use %in% c("calibrate", "validate")] <- NA
   label <- record$labels[name]
+  x$unit <- c(record$units[name], NA)[[1]]
   # For sentences: whoever mends the record needs the name of its column too.
   x$told <- if (length(label) && !is.na(label)) labels_with_names(label, name) else name
   c(list(v = v, no_codes = isTRUE(record$no_codes)), x,
     record[c("use", "noise_sd", "per_step")])
 }
+
+# By its unit, if one is stated; a quantity that is often zero is none.
+may_be_temperature <- function(x) {
+  !x$is_circular && !are_amounts(x$v) && (is.na(x$unit) || x$unit %in% c("", temperature_units))
+}
+
+temperature_units <- c("K", "C", "F", "degC", "degF", "\u00b0C", "\u00b0F", "kelvin", "celsius",
+                       "Celsius", "Kelvin", "Fahrenheit")
 
 column_findings <- function(x) {
   found <- list()

@@ -3,7 +3,7 @@
 # of what is hidden; how often it responds to one if nothing is hidden, or something that no
 # condition drives. Base models of worlds S, S+1, ... of each family are calibrated as the loop
 # does it, and their discrepancy is attributed. Beside it the rule that asks a p-value of at most
-# 0.05 of all evidence.
+# 0.05 of all evidence (with the same groups).
 # Usage: Rscript bench/attribution.R [--family F,F] [--worlds 100] [--seed 1] [--workers 2]
 #                                    [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
@@ -23,10 +23,11 @@ one_world <- function(family, seed) {
   table <- attribute_discrepancy(fit)$table
   first_of <- function(counts) if (any(counts)) table$boundary[counts][1] else NA
   tested <- table$log10_bf_dropped >= 0.5 & table$p_value <= 0.05
+  at <- c(which(table$significant), 1)[1]
   row <- data.frame(family, seed, kind = world$kind, strength = world$strength,
                     true = paste(world$true_boundary, collapse = ","),
                     condition = first_of(table$significant), tested = first_of(tested),
-                    log10_bf = table$log10_bf_dropped[1], p_value = table$p_value[1],
+                    log10_bf = table$log10_bf_dropped[at], p_value = table$p_value[at],
                     trusted = fit$trust$trusted)
   message(sprintf("%s %d, %s x%g (%s): %s, %.1f, p = %.2f", family, seed, row$kind, row$strength,
                   row$true, row$condition, row$log10_bf, row$p_value))

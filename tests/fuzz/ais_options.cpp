@@ -26,7 +26,6 @@ AisOptions make_options(fuzz::Input& in) {
   AisOptions options;
   options.gradient = in.flag();
   options.resample = in.flag();
-  options.skewed = in.flag();
   for (double* field : {&options.precision, &options.ess_drop, &options.effective_draws}) in.perhaps(*field);
   for (int* field : {&options.pilot_chains, &options.groups, &options.max_groups, &options.chains,
                      &options.sweeps, &options.max_sweeps, &options.importance_draws, &options.refit_draws,

@@ -103,7 +103,8 @@ test_that("shares are plain shares of the variance where conditions do not overl
 })
 
 test_that("decisive evidence counts whatever the p-value, weak evidence with a low one", {
-  found <- attribute_discrepancy(plain_linear_fit(), list(surrogates = 19, decisive = -10))$table
+  found <- attribute_discrepancy(plain_linear_fit(), list(surrogates = 19, decisive = -10,
+                                                         least_log10_bf = -10))$table
   expect_true(all(found$significant))
   expect_gt(max(found$p_value), 0.05)
   counts <- function(evidence, p)

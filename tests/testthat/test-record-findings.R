@@ -113,8 +113,25 @@ test_that("a unit that changes at some row is found, with the row", {
     expect_false("unit" %in% measure(weather(Ti = late(change)))$findings$id)
   slowly <- function(v) v + 273.15 * pmin(1, pmax(0, (seq_along(v) - 120) / 40))
   expect_false("unit" %in% measure(weather(Te = slowly))$findings$id)
-  expect_null(amiss:::unit_finding(list(v = c(NA, 1, 1000), told = "Te")))
-  expect_null(amiss:::unit_finding(list(v = numeric(100), told = "Te")))
+  expect_match(measure(weather(Te = function(v) late(function(v) (v + 459.67) / 1.8)(1.8 * v + 32)
+                               ))$findings$says, "from Fahrenheit to kelvin")
+  # A step of something else, as far as its size or its stated unit say so.
+  power <- withr::with_seed(3, c(rnorm(149, 1000, 100), rnorm(139, 2000, 150)))
+  humid <- withr::with_seed(3, c(rnorm(149, 25, 4), rnorm(139, 70, 5)))
+  others <- cbind(weather(), power, humid)
+  expect_identical(ids(others, boundary = list(power = condition("heat", "W"),
+                                               humid = condition("humidity", "%"))), character())
+  found <- function(v) amiss:::unit_finding(list(v = v, told = "Te"))
+  for (v in list(c(NA, 1, 1000), numeric(100), c(rep(1.7e308, 50), rep(-1.7e308, 50)), rep(NA, 60)))
+    expect_null(found(as.numeric(v)))
+  long <- as.integer(rep(c(20, 21, 22, 24), 25000))
+  expect_null(found(long))
+  expect_match(found(c(long[1:5e4], as.integer(1.8 * long[1:5e4] + 32)))$says, "at row 50001,")
+  # What drives a simulator elsewhere is looked at in the same way, with codes taken out first.
+  coded <- replace(fahrenheit(weather()$Te), c(30, 60), -9999)
+  expect_identical(amiss:::table_findings(list(Te = coded))$id, c("missing_code", "unit"))
+  expect_identical(amiss:::table_findings(list(Ti = replace(rep(21.5, 300), 150, 22)), "Ti")$id,
+                   "at_rest")
 })
 
 test_that("a sensor that is stuck is found", {

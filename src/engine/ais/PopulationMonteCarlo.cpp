@@ -71,7 +71,7 @@ ImportanceSample PopulationMonteCarlo::sample(const AisOptions& options) {
   constexpr Index kMost = 16;        // times the draws asked for, at most, for the sake of precision
   constexpr double kLeastAdded = 100.0;
   const Index n = options.importance_draws;
-  SkewedMixture mixture = fit(options.max_components, kImportanceDof);
+  SkewedMixture mixture = fit(options.max_components, kImportanceDof), closest = mixture;
   ImportanceSample sample;
   const auto reaches = [&](double share) { return sample.ess >= share * static_cast<double>(sample.size()); };
   const Index few = options.refit_draws > 0 ? std::min<Index>(options.refit_draws, n) : n;
@@ -85,7 +85,15 @@ ImportanceSample PopulationMonteCarlo::sample(const AisOptions& options) {
     extend(sample, mixture, n);
     if (reaches(kClose)) break;
     vain = sample.ess > kProgress * best ? 0 : vain + 1;
-    best = std::max(best, sample.ess);
+    if (sample.ess > best) {
+      best = sample.ess;
+      closest = mixture;
+    }
+  }
+  if (!reaches(kGood) && best >= kGood * static_cast<double>(n)) {  // the last round is worse than one before
+    mixture = closest;
+    sample = ImportanceSample();
+    extend(sample, mixture, n);
   }
   const auto lacking = [&] {  // draws needed over those there are
     return std::max(std::pow(sample.se / options.precision, 2), options.effective_draws / sample.ess);

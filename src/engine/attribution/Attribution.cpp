@@ -137,7 +137,7 @@ void test_sets(const std::vector<Record>& records, std::size_t which, const Cali
         options.significant(out.sets[s].lost, out.test.adjusted[static_cast<Index>(s)]));
 }
 
-// What the single condition loses that loses most among those that earn their evidence but no p-value;
+// What the single condition loses that loses most among those that earn some evidence but no p-value;
 // -infinity where there is none.
 double most_hidden(const Attribution& attribution, int conditions, double least) {
   double most = -std::numeric_limits<double>::infinity();

@@ -32,7 +32,7 @@ struct DroppedSet {
 struct Attribution {
   std::vector<DroppedSet> sets;   ///< the S single conditions, then groups that cannot be told apart
   SurrogateTest test;             ///< of the same sets
-  std::vector<bool> significant;  ///< those that earn their evidence and their p-value
+  std::vector<bool> significant;  ///< those of which AttributionOptions::significant() holds
   Eigen::MatrixXd shares;         ///< kept draws x S
 };
 
@@ -44,8 +44,8 @@ struct Attribution {
 /// alone without harm a set is sought that cannot be dropped together, nor be made smaller: a group. As many
 /// groups as there are, each from the conditions that the groups before it have left. Of two that say the
 /// same, one may earn just enough to stay out of that search, and yet no surrogate misses it, as the other
-/// takes its place: where a condition earns its evidence but no p-value, groups are sought once more with it.
-/// What was significant by itself keeps its own name.
+/// takes its place: where a condition earns some evidence but no p-value, groups are sought once more with
+/// it. What was significant by itself keeps its own name.
 ///
 /// @param which  the record whose conditions are dropped; the others keep theirs. Surrogates and shares take
 /// the

@@ -22,7 +22,7 @@ struct KernelSample {
 };
 
 /// Posterior (6) and its evidence, annealed through the record: first from the prior to the posterior of
-/// every k-th time step, then, from a Student-t mixture fitted to its draws and brought closer to it
+/// every k-th time step, then, from a mixture fitted to its draws and brought closer to it
 /// (PopulationMonteCarlo), to that of a finer record, and so on to the full one. Any path of distributions is
 /// valid for annealed importance sampling, so that the evidence is that of the full record. Values come from
 /// a skeleton of the kernel that serves where the coarser posterior's draws lie, from a low rank or the dense

@@ -306,7 +306,7 @@ TEST(SamplePopulation, DrawsHaveThePosteriorsMoments) {
             4 * std::sqrt(2.0 / 250.0));
 }
 
-// Two thin shells: no Student-t mixture comes close, and the chains move slowly at the cold end.
+// Two thin shells: no mixture comes close, and the chains move slowly at the cold end.
 FunctionTarget shells(Index d) {
   return {d, [d](const VectorXd& x) {
             const VectorXd z = 6.0 * x;
