@@ -26,8 +26,9 @@ record_checks <- list(
 
 # `record`: list(columns, target, conditions, circular, use, noise_sd, per_step): numeric columns of
 # a table by name, the use of each row, the noise of a single reading, and how many rows an average
-# takes; `labels` and `units` of columns may be left out. Returns a data frame with a row for each finding: its
-# `id`, the `column`, its `rows` (all, if none is listed), the `value`, and what it `says`.
+# takes; `labels` and `units` of columns may be left out. Returns a data frame with a row for each
+# finding: its `id`, the `column`, its `rows` (all, if none is listed), the `value`, and what it
+# `says`.
 record_findings <- function(record) {
   found <- lapply(names(record$columns),
                   function(name) column_findings(record_column(record, name)))
