@@ -20,7 +20,8 @@ unit_finding <- function(x) {
 
 # The parts of a column whose means lie farthest apart: list(row, rises, jump, lower, upper): the
 # first row of the second part, whether that is the upper one, the change to it from one reading to
-# the next, and the quartiles of either; nothing if the column is short.
+# the next, and the quartiles of either; nothing if the column is short, or changes elsewhere nearly
+# as much from one reading to the next.
 two_parts <- function(v) {
   rows <- which(!is.na(v) & abs(v) < 1e20)
   u <- v[rows]
@@ -29,10 +30,12 @@ two_parts <- function(v) {
   k <- as.numeric(seq(rules$suspect_rows, n - rules$suspect_rows))
   sums <- cumsum(u)
   at <- k[which.max((sums[k] - k * sums[n] / n)^2 / (k * (n - k)))]
+  jumps <- abs(diff(u))
+  if (!isTRUE(jumps[at] > rules$unit_alone * max(jumps[-at]))) return(NULL)
   quarters <- lapply(list(u[seq_len(at)], u[-seq_len(at)]), stats::quantile, c(0.25, 0.5, 0.75))
   rises <- quarters[[2]][2] > quarters[[1]][2]
   if (!rises) quarters <- rev(quarters)
-  list(row = rows[at + 1], rises = rises, jump = abs(u[at + 1] - u[at]), lower = quarters[[1]],
+  list(row = rows[at + 1], rises = rises, jump = jumps[at], lower = quarters[[1]],
        upper = quarters[[2]])
 }
 

@@ -159,17 +159,23 @@ test_that("of a linear simulator the exact evidence is the emulated one", {
 test_that("with a coarse basis the exact evidence comes closer to that of a fine one", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, runs = 40, seed = 2)
-  calibrated <- function(control)
-    suppressWarnings(calibrate(train_emulator(runs, m, control), m, quick_ais, seed = 1))
-  fine <- calibrated(list(explained = 1, noise_fraction = 1e-6))
+  calibrated <- function(control, seed)
+    suppressWarnings(calibrate(train_emulator(runs, m, control), m, quick_ais, seed = seed))
   for (noise_fraction in c(1, 10)) {
-    coarse <- calibrated(list(explained = 0.5, noise_fraction = noise_fraction))
-    expect_lt(ncol(coarse$emulator$basis$vectors), ncol(fine$emulator$basis$vectors))
-    off <- abs(c(coarse$log_evidence, coarse$posterior$log_evidence) - fine$log_evidence)
-    expect_lt(off[1], 0.5 * off[2])
-    # What few draws say of the correction is part of the error.
-    expect_gt(coarse$standard_error, coarse$posterior$standard_error)
-    expect_lt(off[1], 4 * sqrt(coarse$standard_error^2 + fine$standard_error^2))
+    # The correction by a few draws is off by 0.1, a third of what it corrects: the mean over three
+    # seeds is by half of that.
+    off <- vapply(1:3, function(seed) {
+      fine <- calibrated(list(explained = 1, noise_fraction = 1e-6), seed)
+      coarse <- calibrated(list(explained = 0.5, noise_fraction = noise_fraction), seed)
+      expect_lt(ncol(coarse$emulator$basis$vectors), ncol(fine$emulator$basis$vectors))
+      # What few draws say of the correction is part of the error.
+      expect_gt(coarse$standard_error, coarse$posterior$standard_error)
+      exact <- coarse$log_evidence - fine$log_evidence
+      expect_lt(abs(exact), 4 * sqrt(coarse$standard_error^2 + fine$standard_error^2))
+      c(exact = exact, emulated = coarse$posterior$log_evidence - fine$log_evidence)
+    }, c(exact = 0, emulated = 0))
+    off <- abs(rowMeans(off))
+    expect_lt(off[["exact"]], 0.5 * off[["emulated"]])
   }
 })
 

@@ -121,6 +121,8 @@ test_that("a unit that changes at some row is found, with the row", {
   others <- cbind(weather(), power, humid)
   expect_identical(ids(others, boundary = list(power = condition("heat", "W"),
                                                humid = condition("humidity", "%"))), character())
+  cloudy <- cbind(weather(), Gs = weather()$Gv + withr::with_seed(2, rnorm(288, 0, 40)))
+  expect_identical(ids(cloudy, boundary = c("Gv", "Gs")), character())
   found <- function(v) amiss:::unit_finding(list(v = v, told = "Te"))
   for (v in list(c(NA, 1, 1000), numeric(100), c(rep(1.7e308, 50), rep(-1.7e308, 50)), rep(NA, 60)))
     expect_null(found(as.numeric(v)))
