@@ -206,11 +206,10 @@ fill_attribution_control <- function(control, ais, conditions, what = "control",
               named("smallest_shift"), call = call)
   check_input(checkmate::check_number(control$level, lower = 0, upper = 1), named("level"),
               call = call)
-  for (option in c("least_log10_bf", "decisive")) {
-    check_input(checkmate::check_number(control[[option]], finite = TRUE), named(option),
-                call = call)
-  }
-  check_input(checkmate::check_number(control$decisive, lower = control$least_log10_bf),
+  check_input(checkmate::check_number(control$least_log10_bf, finite = TRUE),
+              named("least_log10_bf"), call = call)
+  check_input(checkmate::check_number(control$decisive, lower = control$least_log10_bf,
+                                      finite = TRUE),
               named("decisive"), "It must not be less than {.code least_log10_bf}.", call = call)
   ais <- merge_control(ais, control$ais, named("ais"), names(ais_defaults_()), call)
   control$ais <- fill_ais_control(ais, named("ais"), call)

@@ -77,5 +77,6 @@ figure_candidates <- function(upgrade) {
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"),
                             paste0("   ", signed(table$log10_bf)))
+  figure <- with_keys(figure, unique(table$state))
   with_height(figure, 2.4 + 0.42 * nrow(table) + 0.5 * nlevels(table$panel))
 }

@@ -51,11 +51,13 @@ fit_to_canvas <- function(plot) {
   plot$layers <- lapply(plot$layers, fit_text_layer, scale, family)
   plot$facet <- fit_columns(plot$facet, inches[["width"]])
   right <- margin_points + 72.27 * end_label_width(plot, scale, family)
+  narrow <- inches[["width"]] < 6
+  if (!narrow) plot <- with_key_rows(plot, 0.7 * inside, scale, family)
   plot + ggplot2::theme(
     text = ggplot2::element_text(size = letter_points * scale),
     plot.margin = ggplot2::margin(8, right, 8, 8),
-    legend.direction = if (inches[["width"]] < 6) "vertical" else "horizontal",
-    legend.box = if (inches[["width"]] < 6) "vertical" else "horizontal", legend.box.just = "left")
+    legend.direction = if (narrow) "vertical" else "horizontal",
+    legend.box = if (narrow) "vertical" else "horizontal", legend.box.just = "left")
 }
 
 fit_text_layer <- function(layer, scale, family) {
@@ -82,6 +84,24 @@ with_end_labels <- function(figure, labels) {
 end_label_width <- function(plot, scale, family) {
   labels <- attr(plot, "end_labels")
   if (!length(labels)) 0 else max(text_inches(labels, 4.6 * scale * 72.27 / 25.4, "plain", family))
+}
+
+# Keys of colours, shapes and sizes whose labels are measured; a legend begins at the panel, and has
+# no room for many of them in one row.
+with_keys <- function(figure, labels) {
+  attr(figure, "keys") <- as.character(labels)
+  figure
+}
+
+key_inches <- 0.5  # of a key without its label
+
+with_key_rows <- function(plot, width, scale, family) {
+  labels <- attr(plot, "keys")
+  points <- letter_points * scale * subtitle_size
+  rows <- ceiling(sum(text_inches(labels, points, "plain", family) + key_inches) / width)
+  if (rows < 2) return(plot)
+  keys <- ggplot2::guide_legend(nrow = rows, byrow = TRUE)
+  plot + ggplot2::guides(colour = keys, shape = keys, size = keys)
 }
 
 # ---- measuring

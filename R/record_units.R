@@ -1,6 +1,7 @@
 # Whether a column of temperatures changes its unit at some row. What that does to all that follows
 # is known, and neither weather nor a plant does it from one reading to the next. Factors of a
-# thousand (W and kW) are not looked for: a heater at rest may take that much less, too.
+# thousand (W and kW) are not looked for: a heater at rest may take that much less, too. `lower`:
+# between what the part in the first unit may lie.
 unit_changes <- list(
   list(units = c("Celsius", "Fahrenheit"), slope = 1.8, shift = 32, lower = c(-60, 100)),
   list(units = c("Celsius", "kelvin"), slope = 1, shift = 273.15, lower = c(-60, 100)),

@@ -107,6 +107,8 @@ test_that("decisive evidence counts whatever the p-value, weak evidence with a l
                                                          least_log10_bf = -10))$table
   expect_true(all(found$significant))
   expect_gt(max(found$p_value), 0.05)
+  expect_error(attribute_discrepancy(plain_linear_fit(), list(decisive = 0.4)),
+               "decisive.*0\\.4.*0\\.5", class = "amiss_error_input")
   counts <- function(evidence, p)
     amiss:::is_significant(evidence, p, amiss:::attribution_control)
   expect_true(counts(2, 1))

@@ -101,3 +101,14 @@ test_that("Sobol indices stay on the canvas", {
   indices <- structure(list(format_version = format_version, table = table), class = "amiss_sobol")
   for (width in widths) expect_true(edges_blank(ggplot2::autoplot(indices), width), info = width)
 })
+
+test_that("a legend of many keys stays on the canvas", {
+  skip_without_devices()
+  keys <- c("adopted", "another was better", "held-out too weak", "refused", "too weak",
+            "estimate rough")
+  points <- data.frame(x = 1:6, key = factor(keys, keys), row = "infiltration")
+  figure <- ggplot2::ggplot(points, ggplot2::aes(.data$x, .data$row, colour = .data$key)) +
+    ggplot2::geom_point() + amiss:::figure_theme()
+  figure <- amiss:::with_keys(amiss:::with_height(figure, 4), keys)
+  for (width in widths) expect_true(edges_blank(figure, width), info = width)
+})

@@ -33,8 +33,7 @@ TEST(SampleAis, SkewedMixturesComeCloseToOneSidedPosteriors) {
   EXPECT_GT(result.ess, 0.35 * static_cast<double>(result.draws.cols()));
 }
 
-// Eight coordinates: a ridge bent into a parabola, a thirtieth as wide as long. Rounds of mixtures reach its
-// arms, which the first ones miss.
+// Eight coordinates: a ridge bent into a parabola, a thirtieth as wide as long.
 TEST(SampleAis, MixturesFollowABentRidge) {
   const Index d = 8;
   const double width = 0.03;
@@ -62,6 +61,24 @@ TEST(SampleAis, ImportanceSampleGrowsUntilEnoughDrawsAreEffective) {
   expect_evidence(result, -6.0 * std::log(2.0));
   options.refit_draws = -1;
   EXPECT_THROW(sample_ais(one_sided(6), options, seeded(5)), std::invalid_argument);
+}
+
+// Draws that know only a part of the posterior: the mixture fitted to them has no estimate, those after it
+// do.
+TEST(PopulationMonteCarlo, RoundsReachWhatTheFirstDrawsMiss) {
+  const Index d = 4;
+  const double sd = 0.2;
+  const FunctionTarget target{d, [=](const VectorXd& x) {
+                                return 0.5 * x.squaredNorm() - 0.5 * x.squaredNorm() / (sd * sd) -
+                                       static_cast<double>(d) * std::log(sd);
+                              }};
+  const Context context = seeded(3);
+  Stream stream(3, 0, 0);
+  PopulationMonteCarlo population(target, context, stream);
+  population.add((0.3 * sd * stream.normals(d, 400)).colwise() + VectorXd::Constant(d, sd));
+  const ImportanceSample sample = population.sample({});
+  EXPECT_GT(sample.ess, 500);
+  EXPECT_LT(std::abs(sample.log_evidence), 4 * sample.se);
 }
 
 // A mixture that gives a fiftieth of its mass to a lobe that holds a fifth of the posterior.
