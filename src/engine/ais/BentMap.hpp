@@ -3,11 +3,12 @@
 
 namespace amiss {
 
-/// Straightens a cloud of points that lies about a curved sheet: in the principal axes s of the cloud, the
-/// later (narrower) coordinates are polynomials of the first few (widest), plus what is left,
+/// Straightens a cloud of points that lies about a curved sheet: in orthogonal coordinates s, the later ones
+/// are polynomials of the first few, plus what is left,
 ///     z_j = s_j - g_j(s_1 ... s_k),  k < j.
-/// A shear after a rotation: volumes stay as they are, and densities with them. Where the points give no
-/// reason to bend, g_j = 0 (Schwarz criterion). Points are columns.
+/// The axes are the principal ones of the cloud, widest first; if the others bend along another direction,
+/// that is the first. A shear after a rotation: volumes stay as they are, and densities with them. Where the
+/// points give no reason to bend, g_j = 0 (Schwarz criterion). Points are columns.
 class BentMap {
  public:
   /// The map that changes nothing.
@@ -26,7 +27,7 @@ class BentMap {
   Eigen::MatrixXd monomials(const Eigen::MatrixXd& s) const;  ///< one row for each point
 
   Eigen::VectorXd centre_;
-  Eigen::MatrixXd axes_;          // columns, widest first; none: the identity
+  Eigen::MatrixXd axes_;          // columns; none: the identity
   Eigen::VectorXd per_sd_;        // of the points along each: 1 / standard deviation, 0 where there is none
   Eigen::MatrixXd coefficients_;  // g_j in column j: one row for each monomial
 };

@@ -50,24 +50,40 @@ ArrayXd weighted_quantiles(const VectorXd& values, const VectorXd& weights, cons
   return out;
 }
 
+VectorXd steps(const VectorXd& knots) { return knots.tail(kKnots - 1) - knots.head(kKnots - 1); }
+
+// Where the knots of one coordinate lie: at the quantiles of the values or, if these give no reason for that
+// (Schwarz criterion), at those of a normal distribution.
+VectorXd fitted_knots(const VectorXd& values, const VectorXd& weights) {
+  const VectorXd even = Eigen::Map<const VectorXd>(kNormal, kKnots);
+  const VectorXd knots =
+      weighted_quantiles(values, weights, Eigen::Map<const ArrayXd>(kProbability, kKnots)).matrix();
+  if (!(steps(knots).minCoeff() > 0)) return even;
+  const double effective = 1.0 / weights.squaredNorm(), mean = weights.dot(values);
+  const double sd = std::sqrt(weights.dot(VectorXd((values.array() - mean).square())));
+  const VectorXd slopes = steps(even).cwiseQuotient(steps(knots));
+  double gain = std::log(sd) + 0.5;  // in log density over a normal one, of a point
+  for (Index c = 0; c < values.size(); ++c) {
+    const Index i = piece(knots, values[c]);
+    const double z = even[i] + (values[c] - knots[i]) * slopes[i];
+    gain += weights[c] * (std::log(slopes[i]) - 0.5 * z * z);
+  }
+  const double more = static_cast<double>(kKnots - 2);  // parameters
+  if (effective * gain > 0.5 * more * std::log(effective)) return knots;
+  return mean + (sd * even).array();
+}
+
 }  // namespace
 
 SkewMap SkewMap::fit(const MatrixXd& x, const VectorXd& weights) {
-  const ArrayXd p = Eigen::Map<const ArrayXd>(kProbability, kKnots);
   SkewMap map;
   map.even_knots_ = Eigen::Map<const VectorXd>(kNormal, kKnots);
   map.knots_.resize(kKnots, x.rows());
+  map.slopes_.resize(kKnots - 1, x.rows());
   for (Index j = 0; j < x.rows(); ++j) {
-    auto knots = map.knots_.col(j);
-    knots = weighted_quantiles(x.row(j).transpose(), weights, p);
-    for (Index i = 0; i + 1 < kKnots; ++i) {
-      if (!(knots[i + 1] > knots[i])) knots = map.even_knots_;
-    }
+    map.knots_.col(j) = fitted_knots(x.row(j).transpose(), weights);
+    map.slopes_.col(j) = steps(map.even_knots_).cwiseQuotient(steps(map.knots_.col(j)));
   }
-  const auto steps = [](const MatrixXd& knots) {
-    return (knots.bottomRows(kKnots - 1) - knots.topRows(kKnots - 1)).eval();
-  };
-  map.slopes_ = steps(map.even_knots_).replicate(1, x.rows()).cwiseQuotient(steps(map.knots_));
   return map;
 }
 

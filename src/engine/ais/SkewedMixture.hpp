@@ -11,8 +11,9 @@ class SkewMap {
   /// The map that changes nothing.
   SkewMap() = default;
 
-  /// Sends quantiles of weighted points (columns of x) to those of a standard normal distribution. A
-  /// coordinate of which many points share one value is left as it is.
+  /// Sends quantiles of weighted points (columns of x) to those of a standard normal distribution; linear if
+  /// the points are near enough to normal (Schwarz criterion). A coordinate of which many points share one
+  /// value is left as it is.
   static SkewMap fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights);
 
   Eigen::MatrixXd even(const Eigen::MatrixXd& x) const;    ///< z of x, points as columns

@@ -38,6 +38,25 @@ TEST(BentMap, StraightensACurvedSheet) {
   EXPECT_LT(thinnest(z), 0.4 * thinnest(x));
 }
 
+// Across its axis a parabola is a curve, along it two: at a bend of 0.7 it is as long as wide, and has no
+// widest axis; at 2 that is the wrong one.
+TEST(BentMap, StraightensAParabolaLongerThanWide) {
+  const Index n = 600;
+  const double thickness = 0.02;
+  for (double bend : {0.3, 0.7, 2.0}) {
+    MatrixXd x = normal_matrix(2, n, 305);
+    x.row(1) = bend * x.row(0).array().square() + thickness * x.row(1).array();
+    const MatrixXd turned = Eigen::Rotation2Dd(0.4).toRotationMatrix() * x;
+    const BentMap map = BentMap::fit(turned, VectorXd::Constant(n, 1.0 / n));
+    ASSERT_TRUE(map.bends());
+    const MatrixXd z = map.straight(turned);
+    const auto sd = [&](Index j) { return std::sqrt((z.row(j).array() - z.row(j).mean()).square().mean()); };
+    // The direction across is estimated; what is left of the bend is a part of the thickness.
+    EXPECT_LT(sd(1), 1.5 * thickness) << bend;
+    EXPECT_NEAR(sd(0), 1.0, 0.2) << bend;
+  }
+}
+
 TEST(BentMap, KeepsVolumesAndItsGradientIsTheDerivative) {
   const Index n = 600;
   const MatrixXd x = bent_cloud(n, 0.02);

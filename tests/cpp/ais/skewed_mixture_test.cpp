@@ -40,6 +40,16 @@ TEST(SkewMap, SendsQuantilesToNormalOnesAndBack) {
   }
 }
 
+TEST(SkewMap, IsLinearWherePointsAreNormal) {
+  const Index n = 1000;
+  const MatrixXd x = exponential_and_normal(n);
+  const SkewMap map = SkewMap::fit(x, VectorXd::Constant(n, 1.0 / n));
+  const MatrixXd slopes = map.slope(normal_matrix(2, 50, 88));
+  EXPECT_GT(slopes.row(0).maxCoeff(), 2.0 * slopes.row(0).minCoeff());
+  EXPECT_NEAR(slopes.row(1).maxCoeff(), slopes.row(1).minCoeff(), 1e-12);
+  EXPECT_NEAR(slopes(1, 0), 1.0, 0.1);  // four standard errors of a standard deviation
+}
+
 TEST(SkewMap, WithoutPointsToTellChangesNothing) {
   const VectorXd at = normal_vector(3, 83);
   EXPECT_EQ(SkewMap().even(at), at);
