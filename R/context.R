@@ -13,7 +13,7 @@ runs_left <- function(context) context$budget - runs_spent(context)
 
 runs_spent <- function(context) runs_so_far() - context$began
 
-# Runs that were asked for and not made: a program's cache had them.
+# Those of them that were not made: a program's cache had them.
 runs_found <- function(context) found_so_far() - context$began_found
 
 is_spent <- function(context) points_left(context) < 1

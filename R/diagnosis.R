@@ -217,15 +217,14 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   for (sentence in told) cli::cli_bullets(c("*" = "{sentence}"))
   for (fault in utils::head(record_faults(x), 3)) cli::cli_bullets(c("!" = "{fault}"))
   g <- x$gain
+  found <- if (isTRUE(x$runs_found > 0)) ", {x$runs_found} of them found in its cache"
   errors <- function(rmse)
     if (length(adopted)) paste(signif(rmse, 3), collapse = " -> ") else signif(rmse[1], 3)
   cli::cli_bullets(c("*" = paste0("RMSE {errors(g$rmse_calibration)} in calibration, ",
                                   if (has_validation(x)) "{errors(g$rmse_validation)} held out"
                                   else "no data held out",
                                   if (is_several(x$measurements)) paste(",", noise_unit)),
-                     "*" = if (x$runs_total) paste0("{x$runs_total} runs of the simulator",
-                                                    if (isTRUE(x$runs_found > 0))
-                                                      ", {x$runs_found} found in its cache"),
+                     "*" = if (x$runs_total) paste0("{x$runs_total} runs of the simulator", found),
                      "*" = "stopped because {x$stopped_because}",
                      ">" = "next: {.fun summary}, {.fun plot} or {.fun report}"))
 })

@@ -65,9 +65,10 @@
 #'
 #' A run that succeeds is kept in `cache` at once and never made twice. Its key is what it reads
 #' (files, templates, command, drivers, contents of the files that the command names, `version`) and
-#' how its output is read. Runs that were found in the cache do not count in a budget. What was kept
-#' is checked when it is read, and made again if it is not whole. What else the program reads, such
-#' as a library of its own, is not part of the key: give another `version` when it changes.
+#' how its output is read. Runs found in the cache count in a budget like others, so that a
+#' continued study ends as if it had not been stopped. What was kept is checked when it is read, and
+#' made again if it is not whole. What else the program reads, such as a library of its own, is not
+#' part of the key: give another `version` when it changes.
 #'
 #' @param command The program and its arguments, as a character vector, or a list of several
 #'   [program_step()], which run one after the other. Words that name an existing file become

@@ -393,7 +393,8 @@ check_simulator <- function(simulator, call = rlang::caller_env()) {
   note_checked(simulator, "simulator")
 }
 
-# Runs of simulators in this session, by which a study says what it cost.
+# Runs of simulators that were asked for in this session, by which a study says what it costs, and
+# those of them that a program's cache had. A study that is continued asks for the same runs.
 ledger <- new.env(parent = emptyenv())
 ledger$runs <- 0
 ledger$found <- 0
@@ -403,7 +404,6 @@ runs_so_far <- function() ledger$runs
 
 count_runs <- function(runs) ledger$runs <- ledger$runs + runs
 
-# Runs that were not made, as a program's cache had them.
 found_so_far <- function() ledger$found
 
 count_found <- function(runs) ledger$found <- ledger$found + runs
@@ -418,13 +418,12 @@ note_found <- function(found, seconds) {
 # Seconds of the runs that were counted last, when they were made; 0 for simulators that keep none.
 last_seconds <- function() ledger$seconds
 
-# Evaluates the code that makes `runs` runs, and counts those of which a part had to be made.
-# `found()` is to be called after each part. If the code stops, all count.
+# Evaluates the code that makes `runs` runs, and counts them and those of which no part had to be
+# made. `part()` is to be called for each part.
 counting_runs <- function(runs, code) {
   all_found <- rep(TRUE, runs)
   ledger$seconds <- 0
-  finished <- FALSE
-  on.exit(count_runs(if (finished) sum(!all_found) else runs))
+  count_runs(runs)
   part <- function(made) {
     ledger$last <- NULL
     force(made)
@@ -432,7 +431,6 @@ counting_runs <- function(runs, code) {
     made
   }
   result <- code(part)
-  finished <- TRUE
   count_found(sum(all_found))
   result
 }

@@ -1,6 +1,7 @@
 # A study file is data: UTF-8 whatever the locale, one YAML document, no tags, and of its words only
 # true and false are logical.
 
+longest_text <- 5000L
 deepest_study <- 8
 largest_study <- 10000
 
@@ -98,6 +99,12 @@ check_study_size <- function(study, refuse) {
     values <- before + length(x)
     if (depth > deepest_study) refuse(paste("It is nested deeper than", deepest_study, "levels."))
     if (values > largest_study) refuse(paste("It holds more than", largest_study, "values."))
+    texts <- c(names(x), if (is.character(x)) x)
+    long <- which(nchar(texts, "bytes") > longest_text)
+    if (length(long)) {
+      refuse(sprintf("A text of it, \"%s ...\", has %d characters. At most %d are read.",
+                     trimws(substr(texts[long[1]], 1, 20)), nchar(texts[long[1]]), longest_text))
+    }
     if (is.list(x)) for (part in x) values <- walk(part, depth + 1, values)
     values
   }

@@ -86,6 +86,19 @@ body_lines <- function(lines, header) {
   list(text = lines[kept], number = number[kept])
 }
 
+# What is longer is no value, and patterns take minutes to tell.
+longest_field <- 1000L
+
+check_field_lengths <- function(columns, names, line, refuse) {
+  for (k in seq_along(columns)) {
+    long <- which(nchar(columns[[k]], "bytes") > longest_field)[1]
+    if (is.na(long)) next
+    refuse("Line ", line[long], " has ", nchar(columns[[k]][long]), " characters in field ", k,
+           if (k <= length(names)) paste0(" (", substr(names[k], 1, 40), ")"), ". At most ",
+           longest_field, " are read.")
+  }
+}
+
 # The fields of the body as columns of text: each row has a field for each name of the header.
 body_fields <- function(body, header, refuse) {
   names <- header$fields
@@ -103,6 +116,7 @@ body_fields <- function(body, header, refuse) {
   open <- function(w) refuse("A quotation mark is opened and not closed, perhaps in line ",
                              body$number[c(which(is.na(ends)), 1)[1]], ".")
   columns <- tryCatch(scan_fields(body$text, width, header$separator), warning = open)
+  check_field_lengths(columns, names, line, refuse)
   over <- Reduce(`|`, lapply(columns[-seq_len(length(names))], nzchar), rep(FALSE, length(counts)))
   # Nothing may stand after a last separator, unless what stands first could be a number for each
   # row.

@@ -62,8 +62,8 @@ try_run <- function(simulator, measurements, runs = 200, threads = 1, quiet = FA
     look$study_s <- runs * first$seconds
   }
   look$runs <- runs
-  look$runs_made <- runs_so_far() - began[1]
   look$runs_found <- found_so_far() - began[2]
+  look$runs_made <- runs_so_far() - began[1] - look$runs_found
   structure(look, class = "amiss_first_look")
 }
 

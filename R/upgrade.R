@@ -89,7 +89,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'     as `beside_unknown` of a mechanism.
 #'   * `stopped_because`: why the loop stopped; `stopped_id` is the same in a word.
 #'   * `runs_total`: the runs of the simulator that the loop took.
-#'   * `runs_found`: further runs that a program's cache had.
+#'   * `runs_found`: those of them that a program's cache had, so that they were not made again.
 #'   * `inert`: parameters of the base model that the last model no longer uses.
 #'
 #' @section Candidates: The columns of `candidates` are

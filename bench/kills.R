@@ -134,8 +134,9 @@ left_behind <- function(folder, out) {
   results <- c("figures", "report.html", "result.json", "result.rds")
   c(setdiff(grep("^earlier-", dir(out, all.files = TRUE, no.. = TRUE), value = TRUE, invert = TRUE),
             results),
-    grep("^[0-9a-f]{32}[.]rds$", dir(file.path(folder, "runs"), all.files = TRUE, no.. = TRUE),
-         value = TRUE, invert = TRUE))
+    grep("^[0-9a-f]{8}-[0-9a-f]{32}[.]rds$",
+         dir(file.path(folder, "runs"), all.files = TRUE, no.. = TRUE), value = TRUE,
+         invert = TRUE))
 }
 
 killed_study <- function(kind) {
@@ -155,7 +156,11 @@ killed_study <- function(kind) {
     start(folder, try_out)$wait()
     row$ends <<- row$ends + 1
     same <- file.exists(file.path(try_out, "result.json")) && identical(found(try_out), reference)
-    if (!same) cat("OTHER RESULT:", utils::tail(readLines(file.path(folder, "log")), 5), sep = "\n")
+    if (!same) {
+      differs <- if (file.exists(file.path(try_out, "result.json")))
+        all.equal(reference, found(try_out))
+      cat("OTHER RESULT:", differs, utils::tail(readLines(file.path(folder, "log")), 5), sep = "\n")
+    }
     left <- left_behind(folder, try_out)
     if (length(left)) cat("LEFT:", left, "\n")
     row$other_result <<- row$other_result + !same

@@ -53,7 +53,7 @@ numbers_in <- function(path) {
     bytes <- bytes[bytes != as.raw(0)]
   }
   text <- iconv(rawToChar(bytes[bytes != as.raw(0)]), "latin1", "UTF-8")
-  fields <- unlist(strsplit(text, "[\t\r\n;|\"]+"))
+  fields <- unlist(strsplit(c(text, gsub("\"", "", text, fixed = TRUE)), "[\t\r\n;|\"]+"))
   words <- trimws(unique(c(fields, unlist(strsplit(fields, ",", fixed = TRUE)),
                            unlist(strsplit(fields, "[ ,]+")))))
   plain <- gsub("[ '\u00a0]", "", words)

@@ -131,7 +131,7 @@ test_that("directories of good runs are kept, up to a number, and listed", {
   expect_length(dir(all$cache, "^kept-"), 3)
 })
 
-test_that("runs that the cache has do not count, and those of another segment do", {
+test_that("runs that the cache has count like others, and are told apart", {
   hours <- 1:60
   record <- data.frame(hour = ifelse(hours > 30, hours + 5, hours), Te = 10 + 5 * sin(hours / 4))
   record$Ti <- 20 + 0.4 * record$Te + 0.1 * cos(hours * 1.7)
@@ -145,10 +145,10 @@ test_that("runs that the cache has do not count, and those of another segment do
     c(runs_so_far(), found_so_far()) - before
   }
   expect_equal(spent(c(0.1, 0.2), m), c(2, 0))
-  expect_equal(spent(c(0.1, 0.2, 0.3), m), c(1, 2))
+  expect_equal(spent(c(0.1, 0.2, 0.3), m), c(3, 2))
   unlink(dir(program$cache, "[.]rds$", full.names = TRUE)[1])  # one segment of one run
-  expect_equal(spent(c(0.1, 0.2, 0.3), m), c(1, 2))
+  expect_equal(spent(c(0.1, 0.2, 0.3), m), c(3, 2))
   context <- new_context(1, 1, list(), budget = 5)
   simulate_measured(program, cbind(gain = c(0.1, 0.2)), m, "calibrate", 1)
-  expect_equal(c(runs_left(context), runs_found(context)), c(5, 2))
+  expect_equal(c(runs_left(context), runs_found(context)), c(3, 2))
 })

@@ -85,6 +85,8 @@ test_that("a study file is one document", {
 })
 
 test_that("a study file that is nested too deep or grows too large is refused", {
+  refuse_lines("A text of it, \"model.* has 6006 characters",
+               paste0("a: ['model.", strrep(" ", 6000), "']"))
   refuse_lines("nested deeper", paste0("a: ", strrep("[", 20), strrep("]", 20)))
   levels <- letters[2:9]
   refuse_lines("more than", "a: &a [1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1]",

@@ -75,6 +75,8 @@ test_that("every row has the fields of the header", {
   refused(c("Zeit,Te,Ti", replace(plain, n, when[n])), "Row 30 \\(line 31\\) has 1 field.*cut off")
   refused(c("Zeit,Te,Ti", comma(plain)), "has 5 fields.*decimal comma")
   refused(c("Zeit,Te,Ti", replace(plain, 5, paste0("\"", plain[5]))), "quotation mark.*line 6")
+  refused(c("Zeit,Te,Ti", replace(plain, 5, sub(",", paste0(strrep(" ", 1e5), "x,"), plain[5]))),
+          "Line 6 has 1000[0-9]* characters in field 1 \\(Zeit\\)")
   refused("Zeit,Te,Ti", "no rows below")
   refused("", "holds no lines")
   expect_read(c(",Zeit,Te,Ti", paste(0:(n - 1), plain, sep = ",")))
