@@ -35,7 +35,7 @@ without_units <- function(world) {
   fit <- calibrate(emulator, m, many_draws, seed = 3)
   attributed <- attribute_discrepancy(fit, list(surrogates = 39, ais = exact_ais), seed = 1)
   seen <- predict(emulator, cbind(offset = world$origin + world$scale * c(12, 25), a = c(0.2, 0.8)))
-  ahead <- predict(fit, use = "validate", draws = 400)
+  ahead <- predict(fit, use = "validate", draws = 1600)
   list(emulator = list(trusted = emulator$trust$trusted,
                        coefficients = emulator$diagnostics$coefficients[-1],
                        rmse = emulator$diagnostics$series_rmse / world$scale, mean = of(seen$mean),
@@ -65,7 +65,7 @@ expect_same <- function(a, b, allowed) {
 
 # Powers of two round nothing but logarithms of the target's unit. What else is rounded in the last
 # digit chains amplify until they have nothing in common: what is allowed is some standard errors of
-# what they give, of the evidence four (0.02 each).
+# what they give, of the evidence four (0.02 each). An end of a band has one of 0.004, of 1600 draws.
 bits <- 1e-12
 chains <- c(emulator = 1e-4, evidence = 0.1, fit = 0.15, prediction = 0.03, attribution = 0.15)
 
