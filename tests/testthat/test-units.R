@@ -65,7 +65,7 @@ expect_same <- function(a, b, allowed) {
 
 # Powers of two round nothing but logarithms of the target's unit. What else is rounded in the last
 # digit chains amplify until they have nothing in common: what is allowed is some standard errors of
-# what they give, of the evidence four (0.02 each). An end of a band of 1600 draws has one of 0.004.
+# what they give, of the evidence four (0.02 each). An end of a band has 0.004 (1600 draws).
 bits <- 1e-12
 chains <- c(emulator = 1e-4, evidence = 0.1, fit = 0.15, prediction = 0.03, attribution = 0.15)
 
