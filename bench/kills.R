@@ -155,11 +155,11 @@ killed_study <- function(kind) {
   end <- function() {
     start(folder, try_out)$wait()
     row$ends <<- row$ends + 1
-    same <- file.exists(file.path(try_out, "result.json")) && identical(found(try_out), reference)
+    ended <- if (file.exists(file.path(try_out, "result.json"))) found(try_out)
+    same <- identical(ended, reference)
     if (!same) {
-      differs <- if (file.exists(file.path(try_out, "result.json")))
-        all.equal(reference, found(try_out))
-      cat("OTHER RESULT:", differs, utils::tail(readLines(file.path(folder, "log")), 5), sep = "\n")
+      cat("OTHER RESULT:", all.equal(reference, ended),
+          utils::tail(readLines(file.path(folder, "log")), 5), sep = "\n")
     }
     left <- left_behind(folder, try_out)
     if (length(left)) cat("LEFT:", left, "\n")

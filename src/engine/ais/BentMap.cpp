@@ -68,7 +68,7 @@ Axes with_first_axis(const VectorXd& first, const VectorXd& variance) {
 }
 
 // The direction along which a sheet bends: points of a parabola, however it is turned, lie where a polynomial
-// of second degree is nearly zero, that of least variance; its quadratic part is largest along this
+// of second degree is nearly constant, that of least variance; its quadratic part is largest along this
 // direction. Coordinates t have unit variance.
 VectorXd bending_direction(const MatrixXd& t, const VectorXd& weights) {
   const Index k = t.cols();
@@ -112,7 +112,9 @@ double gain_along_first(const MatrixXd& s, const VectorXd& variance, const Vecto
 void turn(MatrixXd s, const VectorXd& weights, Axes& axes) {
   const Index k = leading_of(s.cols());
   const VectorXd variance = axes.variance.head(k);
-  if (k < 2 || !(axes.variance.tail(1)[0] > 0)) return;
+  const double terms = static_cast<double>(std::max<Index>(kPowers, k + k * (k + 1) / 2));
+  if (k < 2 || !(axes.variance.tail(1)[0] > 0) || terms * kPointsPerTerm * weights.squaredNorm() > 1.0)
+    return;
   const MatrixXd leading = s.leftCols(k);
   const VectorXd per_sd = variance.cwiseSqrt().cwiseInverse();
   std::vector<VectorXd> firsts;
