@@ -65,7 +65,7 @@ bias_sentence <- function(fit) {
 # The 95 % interval of each parameter, or those of its modes.
 intervals_words <- function(fit) {
   modes <- mode_rows(fit)
-  words <- interval_words(modes$lower95, modes$upper95, 3)
+  words <- interval_words(modes$lower, modes$upper, 3)
   unname(vapply(split(words, factor(modes$name, unique(modes$name))), listed, "", "or"))
 }
 

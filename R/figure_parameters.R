@@ -31,7 +31,7 @@ figure_parameters <- function(fits) {
                             colour = "grey88", linewidth = 9) +
     ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower, xmax = .data$upper), physical,
                             linewidth = 0.5) +
-    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower95, xmax = .data$upper95), modes,
+    ggplot2::geom_linerange(ggplot2::aes(xmin = .data$lower, xmax = .data$upper), modes,
                             linewidth = 1.6) +
     ggplot2::geom_point(ggplot2::aes(.data$median), modes, size = 3.6) +
     ggplot2::geom_point(ggplot2::aes(.data$median, shape = "at the edge of its prior"), edge,

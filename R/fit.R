@@ -229,7 +229,8 @@ print.summary.amiss_fit <- function(x, ...) {
   })
 }
 
-# The table of tidy() as people read it: physical values and modes only if they say something.
+# The table of tidy() as people read it: physical values and shares of modes only if they say
+# something.
 tidy_words <- function(table) {
   told <- same_decimals(table$estimate, table$conf.low, table$conf.high)
   physical <- same_decimals(table$estimate, table$physical.low, table$physical.high)
@@ -239,6 +240,6 @@ tidy_words <- function(table) {
                       conf.high = told$upper)
   if (!anyNA(table$physical.low))
     words[c("physical.low", "physical.high")] <- physical[c("lower", "upper")]
-  if (any(table$modes > 1)) words$modes <- table$modes
+  if (any(table$modes > 1)) words$share <- share_words(table)
   words
 }

@@ -128,13 +128,17 @@ with_least <- function(model, context) {
 # what they turn on the way.
 with_exact_least <- function(model, context) {
   model <- with_least(model, context)
-  if (isTRUE(model$least$exact)) return(model)
-  model <- converged_least(model, least_reference(model), context)
-  found <- difference_slopes(model, model$least$at, context)
-  model <- found$model
-  if (is.null(found$slopes)) return(model)
-  model <- converged_least(model, found, context)
-  model$least$exact <- TRUE
+  if (!isTRUE(model$least$exact)) {
+    model <- converged_least(model, least_reference(model), context)
+    found <- difference_slopes(model, model$least$at, context)
+    model <- found$model
+    if (is.null(found$slopes)) return(model)
+    known <- list(z = model$runs$z[model$least$at, ], slopes = found$slopes, stale = found$stale)
+    model <- converged_least(model, found, context)
+    model$least$exact <- TRUE
+    model$least$known <- known
+  }
+  model$least$slopes <- secant_slopes(model, model$least$at, model$least$known)
   model
 }
 
@@ -150,8 +154,8 @@ converged_least <- function(model, known, context) {
 # Where slopes are known, as a search takes them.
 least_reference <- function(model) {
   least <- model$least
-  list(z = model$runs$z[least$at, ], slopes = least$slopes,
-       stale = if (isTRUE(least$exact)) 0 else rules$trial_stale)
+  least$known %||% list(z = model$runs$z[least$at, ], slopes = least$slopes,
+                        stale = rules$trial_stale)
 }
 
 # The simulator about the centre of the region as a line: its `output` there and its `slopes` for a

@@ -71,16 +71,17 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
   check_whole(x, "x")
   rlang::check_dots_empty()
   check_level(conf.level, "conf.level")
-  ends <- stats::confint(x, level = conf.level)
+  rows <- mode_rows(x, conf.level)
+  table <- data.frame(
+    term = rows$name, label = rows$label,
+    unit = vapply(drawn_parameters(x)[rows$name], `[[`, "", "unit"), estimate = rows$median,
+    std.error = rows$sd, conf.low = rows$lower, conf.high = rows$upper, physical.low = NA_real_,
+    physical.high = NA_real_, modes = rows$modes, share = rows$share, row.names = NULL)
   physical <- physical_intervals(x, conf.level)
-  physical <- physical[match(rownames(ends), physical$name), ]
-  declared <- drawn_parameters(x)[rownames(ends)]
-  data.frame(term = rownames(ends), label = distinct_labels(declared),
-             unit = vapply(declared, `[[`, "", "unit"), estimate = unname(stats::coef(x)),
-             std.error = unname(sqrt(diag(stats::vcov(x)))),
-             conf.low = unname(ends[, 1]), conf.high = unname(ends[, 2]),
-             physical.low = physical$lower %||% NA_real_,
-             physical.high = physical$upper %||% NA_real_,
-             modes = vapply(rownames(ends), function(name) length(parameter_modes(x, name)), 0L),
-             row.names = NULL)
+  if (is.null(physical)) return(table)
+  physical <- physical[match(rows$name, physical$name), ]
+  several <- rows$modes > 1  # modes stand as they are
+  table$physical.low <- ifelse(several, rows$lower, physical$lower)
+  table$physical.high <- ifelse(several, rows$upper, physical$upper)
+  table
 }

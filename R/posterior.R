@@ -48,12 +48,13 @@ parameter_table <- function(fit) {
 #'   * `coef()`: the posterior medians.
 #'   * `confint()`: a matrix of the ends of credible intervals.
 #'   * `vcov()`: the covariance of the posterior.
-#'   * `tidy()`: a data frame with one row for each parameter, see below.
+#'   * `tidy()`: a data frame with one row for each parameter or, if its posterior has several
+#'     modes, for each mode.
 #'
 #'   The columns of `tidy()` are `term`, `label`, `unit`, `estimate` (the median), `std.error` (the
-#'   posterior's standard deviation), `conf.low`, `conf.high`, `physical.low`, `physical.high` and
-#'   `modes`, the number of modes of the posterior. If there are several modes, median and interval
-#'   describe none of them.
+#'   posterior's standard deviation), `conf.low`, `conf.high`, `physical.low`, `physical.high`,
+#'   `modes`, the number of modes of this parameter, and `share`, the part of the posterior that the
+#'   row holds. `coef()`, `confint()` and `vcov()` are of all modes together.
 #'
 #'   `conf.low` and `conf.high` are of the calibrated value, by which the simulation is nearest to
 #'   the record. What the simulator lacks may act as a parameter does, and the calibrated value then
@@ -241,13 +242,20 @@ posterior_centre <- function(fit) colSums(fit$weights * to_normal(posterior_unit
 
 # The first parameters of a fit, how many there are besides, and what makes their values doubtful.
 say_parameters <- function(fit, most) {
-  table <- parameter_table(fit)
-  say_first(data.frame(parameter = parameter_titles(drawn_parameters(fit)),
-                       unit = pretty_unit(table$unit),
-                       stats::setNames(same_decimals(table$median, table$lower95, table$upper95),
-                                       c("median", "lower95", "upper95"))), most)
+  rows <- mode_rows(fit)
+  parameters <- drawn_parameters(fit)[rows$name]
+  table <- data.frame(
+    parameter = labels_with_names(rows$label, rows$name),
+    unit = pretty_unit(vapply(parameters, `[[`, "", "unit")),
+    stats::setNames(same_decimals(rows$median, rows$lower, rows$upper),
+                    c("median", "lower95", "upper95")), row.names = NULL)
+  if (any(rows$modes > 1)) table$share <- share_words(rows)
+  say_first(table, most)
   say_bullets(c(mode_words(fit), edge_sentence(fit)), "!")
 }
+
+# Of parameters with several modes.
+share_words <- function(rows) ifelse(rows$modes > 1, percent(rows$share), "")
 
 # The first rows of a table of parameters, without a column of units if there is none.
 say_first <- function(table, most) {
@@ -270,15 +278,20 @@ edge_sentence <- function(fit) {
 
 no_edge <- "No parameter is at the edge of its range."
 
-# Modes of a parameter: parts of its draws that a gap keeps apart, list(median, lower95, upper95,
-# share) each. A gap counts if it is a quarter of the 95 % interval or more, with a twentieth of the
-# posterior on either side.
-parameter_modes <- function(fit, name) {
+# Modes of a parameter: parts of its draws that a gap keeps apart, list(median, sd, lower, upper,
+# share) each. A gap counts if it is a quarter of the 95 % interval or more and holds hardly any of
+# the posterior, with a twentieth of it on either side. A density with one peak has no such gap: it
+# falls from there on, so that three times as much lies beyond at most, and what is outside the
+# interval.
+parameter_modes <- function(fit, name, level = 0.95) {
   lapply(draws_of_modes(fit, name), function(own) {
-    q <- weighted_quantile(own$x, own$w, c(0.5, 0.025, 0.975))
-    list(median = q[1], lower95 = q[2], upper95 = q[3], share = sum(own$w))
+    q <- weighted_quantile(own$x, own$w, c(0.5, 0.5 - level / 2, 0.5 + level / 2))
+    list(median = q[1], sd = weighted_sd(own$x, own$w), lower = q[2], upper = q[3],
+         share = sum(own$w))
   })
 }
+
+weighted_sd <- function(x, w) sqrt(stats::weighted.mean((x - stats::weighted.mean(x, w))^2, w))
 
 # The draws of each mode in their order, list(x, w) each; the weights of all sum to one.
 draws_of_modes <- function(fit, name) {
@@ -287,19 +300,31 @@ draws_of_modes <- function(fit, name) {
   order <- order(x[keep])
   x <- x[keep][order]
   w <- fit$weights[keep][order] / sum(fit$weights[keep])
-  width <- diff(weighted_quantile(x, w, c(0.025, 0.975)))
-  below <- cumsum(w)[-length(w)]
-  gap <- which(diff(x) > rules$mode_gap * width & pmin(below, 1 - below) > rules$mode_part)
-  part <- findInterval(seq_along(x), gap + 1)
+  part <- findInterval(seq_along(x), gaps_between_modes(x, w) + 1)
   lapply(unname(split(seq_along(x), part)), function(own) list(x = x[own], w = w[own]))
 }
 
+# The last of rising draws x before each gap. Gaps that overlap are one, and end at their widest
+# part without a draw.
+gaps_between_modes <- function(x, w) {
+  below <- cumsum(w)
+  end <- pmin(findInterval(below + rules$mode_gap_share, below) + 1, length(x))
+  is_gap <- x[end] - x > rules$mode_gap * diff(weighted_quantile(x, w, c(0.025, 0.975))) &
+    below > rules$mode_part & below[end] - w[end] < 1 - rules$mode_part
+  begin <- which(is_gap)
+  apart <- begin[-1] >= cummax(end[begin])[-length(begin)]
+  vapply(unname(split(begin, cumsum(c(TRUE, apart))[seq_along(begin)])), function(own) {
+    within <- seq(own[1], max(end[own]))
+    within[which.max(diff(x[within]))]
+  }, 1L)
+}
+
 # A row for each mode of each parameter.
-mode_rows <- function(fit) {
+mode_rows <- function(fit, level = 0.95) {
   label <- distinct_labels(drawn_parameters(fit))
   do.call(rbind, lapply(names(label), function(name) {
-    modes <- do.call(rbind.data.frame, parameter_modes(fit, name))
-    data.frame(name, label = label[[name]], modes)
+    modes <- do.call(rbind.data.frame, parameter_modes(fit, name, level))
+    data.frame(name, label = label[[name]], modes, modes = nrow(modes))
   }))
 }
 
@@ -310,7 +335,7 @@ mode_words <- function(fit) {
     modes <- parameter_modes(fit, name)
     if (length(modes) < 2) return(NULL)
     ends <- vapply(modes, function(mode) {
-      sprintf("%s (%s)", interval_words(mode$lower95, mode$upper95), percent(mode$share))
+      sprintf("%s (%s)", interval_words(mode$lower, mode$upper, 3), percent(mode$share))
     }, "")
     sprintf("The posterior of %s has %d modes: %s.", label[[name]], length(modes), listed(ends))
   })
@@ -319,8 +344,7 @@ mode_words <- function(fit) {
     sprintf("If %s exchange their values, nothing changes: no record tells which is which.",
             listed(label[pair]))
   })
-  c(several, if (length(several)) "Median and interval describe no mode.",
-    unlist(exchanges))
+  c(several, unlist(exchanges))
 }
 
 posterior_correlation <- function(fit) stats::cov.wt(fit$values, fit$weights, cor = TRUE)$cor

@@ -205,6 +205,8 @@ rule_table <- list(
   mode_gap = rule(0.25, "interval", paste("gap between draws of a parameter from which it has two",
                                           "modes"),
                   "the tails of one mode leave no such gap", "bench/seeds.R"),
+  mode_gap_share = rule(0.005, "share", "of the posterior that a gap may hold",
+                        "one peak leaves at most four hundredths beyond it", "bench/seeds.R"),
   mode_part = rule(0.05, "share", "of the posterior on either side of the gap",
                    "stray draws are no mode", "bench/seeds.R"),
   effective = rule(0.1, "share", "least effective share of the check runs",

@@ -36,7 +36,7 @@ test_that("a posterior holds both orders of two stores, and the evidence is that
   }
   both <- calibrated(stores_simulator())
   expect_true(both$trust$trusted)
-  expect_identical(tidy(both)$modes, c(2L, 2L))
+  expect_identical(tidy(both)$term, rep(c("first", "second"), each = 2))
   # Some three hundred draws take an order each: they know the share to 0.03.
   expect_equal(sum(both$weights[both$values[, "first"] > 5]), 0.5, tolerance = 0.1)
   expect_match(amiss:::mode_words(both), "If first and second exchange", all = FALSE)
@@ -72,7 +72,7 @@ test_that("a store that a mechanism brings is found in either order", {
                            control = list(max_steps = 1, attribution = list(surrogates = 19)))
   expect_identical(upgrade$models[[2]]$mechanism, "second store")
   expect_true(upgrade$models[[2]]$fit$trust$trusted)
-  expect_identical(tidy(upgrade)$modes, c(2L, 2L))
+  expect_identical(tidy(upgrade)$term, rep(c("first", "second"), each = 2))
 })
 
 test_that("a mode without draws is weighed by its mass", {

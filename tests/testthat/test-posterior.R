@@ -32,12 +32,13 @@ test_that("median and covariance are those of the weighted draws", {
 test_that("the tidy table carries labels, units and what the other methods say", {
   table <- tidy(fit, conf.level = 0.9)
   expect_named(table, c("term", "label", "unit", "estimate", "std.error", "conf.low", "conf.high",
-                        "physical.low", "physical.high", "modes"))
+                        "physical.low", "physical.high", "modes", "share"))
   expect_identical(table$modes, c(1L, 1L))
   expect_identical(table$unit, c("K", ""))
   expect_identical(table$label, c("offset", "gain"))
   expect_identical(table$estimate, unname(coef(fit)))
   expect_equal(table$std.error^2, unname(diag(vcov(fit))))
+  expect_equal(table$share, c(1, 1))
   expect_identical(table$conf.high, unname(confint(fit, level = 0.9)[, 2]))
 })
 
@@ -45,16 +46,38 @@ test_that("a posterior of two modes says so, in the table and in words", {
   parted <- fit
   upper <- seq_len(nrow(fit$values)) %% 2 == 0
   parted$values[, "gain"] <- parted$values[, "gain"] + 0.5 * upper
-  expect_identical(tidy(parted)$modes, c(1L, 2L))
-  expect_match(printed(parted), "posterior of gain has 2 modes: 0.*describe no mode")
-  modes <- amiss:::parameter_modes(parted, "gain")
-  expect_equal(vapply(modes, `[[`, 0, "share"), c(sum(w[!upper]), sum(w[upper])))
+  table <- tidy(parted)
+  expect_identical(table$term, c("offset", "gain", "gain"))
+  expect_identical(table$modes, c(1L, 2L, 2L))
+  expect_equal(table$share[2:3], c(sum(w[!upper]), sum(w[upper])))
+  expect_equal(diff(table$estimate[2:3]), 0.5, tolerance = 0.02)
+  expect_lt(max(table$std.error[2:3]), 0.1)
+  for (said in list(printed(parted), printed(summary(parted))))
+    expect_match(said, "posterior of gain has 2 modes: 0")
+})
+
+test_that("a few draws in the gap between two modes do not hide them", {
+  w <- rep(1, 1001) / 1001
+  modes <- function(x, w) length(amiss:::gaps_between_modes(sort(x), w)) + 1L
+  two <- withr::with_seed(1, c(rnorm(500, 10, 3), rnorm(501, 350, 3)))
+  expect_identical(modes(two, w), 2L)
+  stray <- replace(two, c(100, 600), c(120, 240))
+  expect_identical(modes(stray, w), 2L)
+  # As light as draws of an importance sample are.
+  many <- seq(20, 340, 4)
+  expect_identical(modes(c(two, many), c(w, rep(1e-6, length(many)))[order(c(two, many))]), 2L)
+  three <- withr::with_seed(2, c(rnorm(400, 0, 1), rnorm(300, 60, 1), rnorm(301, 100, 1)))
+  expect_identical(modes(three, w), 3L)
+  # One peak is one mode: flat, normal, with a long tail, and with its mass at both ends of a range.
+  one <- withr::with_seed(3, list(runif(1001), rnorm(1001), rexp(1001), rt(1001, 3),
+                                  rbeta(1001, 0.5, 0.5)))
+  for (x in one) expect_identical(modes(x, w), 1L)
 })
 
 test_that("the parameters are drawn if every one has several modes", {
   parted <- fit
   parted$values <- parted$values + 0.5 * (seq_len(nrow(fit$values)) %% 2 == 0)
-  expect_identical(tidy(parted)$modes, c(2L, 2L))
+  expect_identical(tidy(parted)$modes, rep(2L, 4))
   expect_no_error(ggplot2::ggplot_build(ggplot2::autoplot(parted)))
 })
 
@@ -117,6 +140,6 @@ test_that("a mode of one draw is one", {
   fit$weights[first] <- 0.1 * sum(fit$weights[-first]) / 0.9
   modes <- amiss:::parameter_modes(fit, "gain")
   expect_identical(lengths(list(modes)), 2L)
-  expect_identical(modes[[1]]$lower95, fit$values[[first, "gain"]])
+  expect_identical(modes[[1]]$lower, fit$values[[first, "gain"]])
   expect_identical(tidy(fit)$modes[2], 2L)
 })
