@@ -23,8 +23,8 @@ checked_by_runs <- function(fits, threads) {
 default_exact <- function(fit) if (is.null(fit$emulator$simulator)) 0 else fit$control$check
 
 # Runs of the simulator at draws spread evenly over the posterior (even_draws()): list(draws, times,
-# runs, failed), failed ones left out. A draw of more weight than one of them is run once, and
-# counts as often as it was drawn.
+# runs, failed, first), failed ones left out, and where the `first` of these was. A draw of more
+# weight than one of them is run once, and counts as often as it was drawn.
 posterior_runs <- function(fit, drawn, threads) {
   draws <- unique(drawn)
   times <- tabulate(match(drawn, draws))
@@ -32,16 +32,10 @@ posterior_runs <- function(fit, drawn, threads) {
     fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate",
     threads)))
   failed <- colSums(!is.finite(runs)) > 0
-  if (mean(failed) > largest_failed_share) {
-    worst <- fit$values[draws[failed][1], ]
-    point <- paste(colnames(fit$values), signif(worst, 4), sep = " = ", collapse = ", ")
-    abort_numerical(c(paste("The simulator failed at {sum(failed)} of {length(draws)} draws of the",
-                            "posterior, more than {100 * largest_failed_share} %."),
-                      x = "The first is run {which(failed)[1]} at {point}.",
-                      i = "Find out why it fails there, or narrow the priors."))
-  }
+  first <- fit$values[draws[failed][1], ]
   list(draws = draws[!failed], times = times[!failed], runs = runs[, !failed, drop = FALSE],
-       failed = sum(failed))
+       failed = sum(failed),
+       first = paste(colnames(fit$values), signif(first, 4), sep = " = ", collapse = ", "))
 }
 
 # The check itself reports failed runs.
@@ -49,12 +43,29 @@ suppress_run_warnings <- function(code)
   withCallingHandlers(code, amiss_warning_input = function(w) rlang::cnd_muffle(w))
 
 emulation_check <- function(fit, made) {
+  if (!length(made$draws)) return(failed_check(fit, made))
   emulator <- fit$emulator
   w <- emulated_coefficients(emulator, posterior_unit(fit)[made$draws, , drop = FALSE])
   error <- made$runs - tcrossprod(emulator$basis$vectors, w$mean)
-  new_check(fit, error, series_variance(emulator$basis, w$variance), made$failed,
-            "runs of the simulator at posterior draws",
-            mean = as.numeric(made$runs %*% made$times) / sum(made$times))
+  check <- new_check(fit, error, series_variance(emulator$basis, w$variance), made$failed,
+                     "runs of the simulator at posterior draws",
+                     mean = as.numeric(made$runs %*% made$times) / sum(made$times))
+  n <- length(made$draws) + made$failed
+  if (!is.null(made$first) && made$failed > largest_failed_share * n) {
+    check$passed <- FALSE
+    check$verdict <- sprintf(
+      paste("the simulator failed at %d of %d draws of the posterior, the first at %s;",
+            "calibrate_refined() ends the posterior there"), made$failed, n, made$first)
+  }
+  check
+}
+
+# Of runs that all failed.
+failed_check <- function(fit, made) {
+  list(runs = 0L, failed = made$failed, error = NA_real_, noise = fit$measurements$noise_sd,
+       ratio = NA_real_, z2 = NA_real_, effective = NA_real_, border = NA_real_, passed = FALSE,
+       verdict = sprintf("the simulator failed at all of %d draws of the posterior, the first at %s",
+                         made$failed, made$first), mean = NULL)
 }
 
 # Leave-one-out errors of the runs nearest to the posterior's centre, in the unit cube.
@@ -140,6 +151,7 @@ run_log_likelihood <- function(fit, draws, runs, threads) {
 # of all records.
 exact_evidence <- function(fits, made, threads) {
   drawn <- Reduce(intersect, lapply(made, `[[`, "draws"))
+  if (!length(drawn)) return(fits)
   exact <- Reduce(`+`, Map(function(fit, m) {
     run_log_likelihood(fit, drawn, m$runs[, match(drawn, m$draws), drop = FALSE], threads)
   }, fits, made))

@@ -309,6 +309,7 @@ remaining_sentences <- function(upgrade) {
               if (length(step_moved(model)) > 1) "these values are" else "this value is"),
     vapply(group_words(model$attribution), paste0, "", "."),
     mode_words(model$fit),
+    failing_sentence(model$fit),
     edge_sentence(model$fit) %||% no_edge,
     sprintf("The loop stopped because %s%s.",
             upgrade$stopped_reason,

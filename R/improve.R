@@ -88,6 +88,7 @@ fits_in_region <- function(model, context, ais) {
 }
 
 # The posterior ends where the simulator fails: draws whose nearest run failed are impossible.
+# `failing`: their share.
 without_failing <- function(model, fits) {
   failed <- !succeeded(model)
   near <- straight_distance(model) <= rules$failing_radius
@@ -103,7 +104,7 @@ without_failing <- function(model, fits) {
     fit$log_evidence <- fit$log_evidence + log(sum(weights))
     fit$interval <- fit$interval + log(sum(weights))
     fit$weights <- fit$posterior$weights <- weights / sum(weights)
-    fit$failing <- 1 - sum(weights)
+    fit$failing <- 1 - (1 - (fit$failing %||% 0)) * sum(weights)
     fit
   })
 }
@@ -225,7 +226,7 @@ record_ensemble <- function(model, k, region) {
 least_training <- function(own) max(rules$training_runs, length(own) + rules$training_spare)
 
 # Runs at n draws of the posterior: list(model, fits) with the checks of the calibrations, whose
-# evidence they correct.
+# evidence they correct. Those that fail show where the posterior ends.
 check_by_runs <- function(model, fits, n, context) {
   drawn <- even_draws(fits[[1]], n)
   draws <- unique(drawn)
@@ -237,6 +238,7 @@ check_by_runs <- function(model, fits, n, context) {
   model$checked <- list(draws = draws[fine], at = made$at[fine],
                         times = tabulate(match(drawn, draws))[seq_along(draws)][fine])
   if (!any(fine)) return(list(model = model, fits = fits))
+  if (!all(fine)) fits <- without_failing(model, fits)
   each <- lapply(model$rows, function(rows) {
     list(draws = draws[fine], times = model$checked$times, failed = sum(!fine),
          runs = model$runs$outputs[rows, made$at[fine], drop = FALSE])

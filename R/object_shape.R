@@ -63,7 +63,7 @@ object_shapes <- list(
                 rows = "real[n]", priors = "list", values = "values[k,u]", weights = "real[k]",
                 posterior = ":posterior", log_evidence = "estimate[1]",
                 standard_error = "estimate[1]", interval = "number[2]", trust = ":trust",
-                seed = "number[1]", check = "?:check", best = "?list"),
+                seed = "number[1]", check = "?:check", best = "?list", failing = "?real[1]"),
   amiss_calibration = c(posterior = ":history_posterior", priors = ":history_priors",
                         control = ":history_control", kept = "real[d]", coefficients = "real[e,d]",
                         withheld = "real[w,d]", withheld_covariance = "real[y,d]",

@@ -251,7 +251,7 @@ say_parameters <- function(fit, most) {
                     c("median", "lower95", "upper95")), row.names = NULL)
   if (any(rows$modes > 1)) table$share <- share_words(rows)
   say_first(table, most)
-  say_bullets(c(mode_words(fit), edge_sentence(fit)), "!")
+  say_bullets(c(mode_words(fit), failing_sentence(fit), edge_sentence(fit)), "!")
 }
 
 # Of parameters with several modes.
@@ -263,6 +263,13 @@ say_first <- function(table, most) {
   say_table(utils::head(table, most))
   more <- nrow(table) - most
   if (more > 0) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
+}
+
+# How much of the posterior the simulator's failures cut off; NULL if that is hardly anything.
+failing_sentence <- function(fit) {
+  share <- fit$failing %||% 0
+  if (share > rules$failing_told)
+    sprintf("The posterior ends where the simulator fails: that cuts off %s of it.", percent(share))
 }
 
 # The parameters at the edge of their priors, and what to do about them; NULL if there is none.

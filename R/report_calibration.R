@@ -25,7 +25,7 @@ calibration_words <- function(fit, only) {
          if (!is.null(left$pattern))
            sprintf("The error that remains has a pattern: %s.", left$pattern$what),
          if (!is.null(fit$reach)) sub("^(.)(.*)$", "\\U\\1\\E\\2.", reach_words(fit), perl = TRUE),
-         mode_words(fit), edge_sentence(fit) %||% no_edge),
+         mode_words(fit), failing_sentence(fit), edge_sentence(fit) %||% no_edge),
        inspect = calibration_inspections(fit, model), parameters = parameters_words(fit),
        method = method_table(only), seed = fit$seed)
 }

@@ -169,6 +169,8 @@ rule_table <- list(
   failing_radius = rule(2, "times", paste("distance of a run that failed from the centre, over the",
                                           "region's radius, up to which it makes draws impossible"),
                         "what lies farther is beyond all draws", "bench/soak.R"),
+  failing_told = rule(0.01, "share", "cut off by failing runs from which the result tells of it",
+                      "less moves no interval", "bench/soak.R"),
   least_possible = rule(1e-6, "share", "least share of the draws that lie where no run failed",
                         "with less hardly a draw is left", "bench/soak.R"),
   open_draws = rule(400, "draws",

@@ -113,12 +113,19 @@ test_that("runs that fail at posterior draws are left out and told", {
   }
 })
 
-test_that("where more than a fifth of the runs at posterior draws fail, one of them is named", {
-  expect_error(checked(function(k, y) if (k %% 3 == 0) NaN * y else y),
-               paste("failed at 1[23] of [34][0-9] draws.*more than 20 %.*first is run 3 at",
-                     "offset = [0-9.]+, gain = [0-9.]+"), class = "amiss_error_numerical")
-  expect_error(checked(function(k, y) stop("no steady state")), "failed at ([34][0-9]) of \\1",
-               class = "amiss_error_numerical")
+test_that("a calibration is kept but not trusted if many runs at posterior draws fail", {
+  fit <- checked(function(k, y) if (k %% 3 == 0) NaN * y else y)
+  expect_false(fit$trust$trusted)
+  expect_match(fit$trust$verdict,
+               paste("failed at 1[23] of [34][0-9] draws of the posterior, the first at offset =",
+                     "[0-9.]+, gain = [0-9.]+; calibrate_refined"))
+  none <- checked(function(k, y) stop("no steady state"))
+  expect_false(none$trust$trusted)
+  expect_match(none$trust$verdict, "failed at all of [34][0-9] draws")
+  expect_equal(none$log_evidence, none$posterior$log_evidence)
+  expect_true(is.na(glance(none)$emulator_error))
+  expect_no_error(amiss:::check_whole(none, "none"))
+  expect_output(print(summary(none)), "failed at all")
 })
 
 test_that("a simulator that returns another number of values at posterior draws is refused", {

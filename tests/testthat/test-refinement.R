@@ -69,6 +69,36 @@ test_that("the evidence of a model whose slopes bend does not depend on the seed
   }
 })
 
+test_that("the posterior ends where the simulator fails, and its share is told", {
+  data <- linear_data(200)
+  data$Ti <- 20 + 0.6 * data$Te + 0.01 * data$Gv + withr::with_seed(3, rnorm(200, sd = 0.1))
+  m <- linear_measurements(data, boundary = ~ Te + Gv)
+  free_to_fail <- function(limit) {
+    function_simulator(function(values, drivers) {
+      if (values[["g"]] > limit) stop("the solver did not converge")
+      20 + values[["g"]] * drivers[, "Te"] + values[["s"]] * drivers[, "Gv"]
+    }, free("g", uniform(0, 1)), free("s", uniform(0, 0.05)), boundary = c("Te", "Gv"))
+  }
+  fit_of <- function(limit) {
+    runs <- suppressWarnings(simulate_design(free_to_fail(limit), m, runs = 60, seed = 1))
+    calibrate_refined(runs, m, seed = 1)
+  }
+  line <- summary(lm(I(Ti - 20) ~ 0 + Te + Gv, data))$coefficients
+  limit <- line["Te", 1] + 0.7 * line["Te", 2]
+  fit <- fit_of(limit)
+  expect_true(fit$trust$trusted)
+  beyond <- stats::pnorm(0.7, lower.tail = FALSE)
+  # A thousand draws, and an end that some thirty runs show to a fifth of a standard deviation.
+  expect_lt(abs(fit$failing - beyond), 0.07)
+  expect_lt(confint(fit)["g", 2], limit + 0.25 * line["Te", 2])
+  expect_match(printed(fit), sprintf("fails: that cuts off %s of it", amiss:::percent(fit$failing)))
+  expect_match(amiss:::failing_sentence(fit), "ends where the simulator fails")
+  # The evidence falls by this share.
+  whole <- fit_of(1)
+  expect_lt(abs(fit$log_evidence - whole$log_evidence - log(1 - fit$failing)),
+            4 * sqrt(fit$standard_error^2 + whole$standard_error^2))
+})
+
 test_that("no rounds: the ensemble as it is, as by calibrate()", {
   m <- bent_measurements()
   runs <- simulate_design(bent_simulator(), m, 20, seed = 1)
