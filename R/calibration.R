@@ -263,6 +263,7 @@ print.amiss_calibration <- function(x, ...) on_stdout(x, {
   }
   cli::cli_text("{error_sentence(x)}")
   say_parameters(x, 6)
+  cli::cli_bullets(finding_bullets(fit_findings(x)$says))
   cli::cli_bullets(c("*" = "{reach_words(x)}", if (!is.null(x$check)) c("*" = "{x$check$verdict}")))
   cli::cli_bullets(
     c(">" = if (isTRUE(x$part)) "next: {.fun discrepancy} or {.fun predict}"

@@ -64,7 +64,7 @@ emulation_check <- function(fit, made) {
 failed_check <- function(fit, made) {
   list(runs = 0L, failed = made$failed, error = NA_real_, noise = fit$measurements$noise_sd,
        ratio = NA_real_, z2 = NA_real_, effective = NA_real_, border = NA_real_, passed = FALSE,
-       verdict = sprintf("the simulator failed at all of %d draws of the posterior, the first at %s",
+       verdict = sprintf("the simulator failed at all of %d posterior draws, the first at %s",
                          made$failed, made$first), mean = NULL)
 }
 

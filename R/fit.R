@@ -187,7 +187,8 @@ augment_prediction <- function(fit, prediction) {
 #' @param x Its summary.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A list of `parameters` ([tidy()][posterior]), `glance` ([glance()][fit]), and in words
-#'   `error`, `evidence`, `modes`, `failing`, `edge`, `reach`, `check` and `trust`.
+#'   `error`, `evidence`, `modes`, `failing`, `edge`, `record` (its faults), `reach`, `check` and
+#'   `trust`.
 #' @examples
 #' table <- data.frame(hour = 1:96, Te = 10 + 5 * sin(1:96 / 4),
 #'                     Gv = pmax(0, 100 * cos(1:96 / 3.8)))
@@ -207,9 +208,11 @@ summary.amiss_fit <- function(object, ...) {
   structure(list(name = object$measurements$name, unit = object$measurements$unit,
                  parameters = generics::tidy(object), glance = generics::glance(object),
                  error = error_sentence(object), evidence = evidence_words(object),
-                 modes = mode_words(object), failing = failing_sentence(object), edge = edge_sentence(object),
+                 modes = mode_words(object), failing = failing_sentence(object),
+                 edge = edge_sentence(object),
                  reach = if (!is.null(object$reach)) reach_words(object),
-                 check = object$check$verdict, trust = object$trust$verdict),
+                 record = fit_findings(object)$says, check = object$check$verdict,
+                 trust = object$trust$verdict),
             class = "summary.amiss_fit")
 }
 
@@ -222,6 +225,7 @@ print.summary.amiss_fit <- function(x, ...) {
     cli::cli_text("{x$error}")
     say_first(tidy_words(x$parameters), 6)
     say_bullets(c(x$modes, x$failing, x$edge), "!")
+    cli::cli_bullets(finding_bullets(x$record))
     then <- if (is.null(x$reach)) "its {.code index} of the boundary conditions"
             else "{.fun attribute_discrepancy}"
     cli::cli_bullets(c("*" = as_said(x$reach), "*" = as_said(x$check),

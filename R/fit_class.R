@@ -65,6 +65,12 @@ sampler_said <- function(fit) if (knows_history(fit)) fit$posterior else fit$tru
 # rows.
 knows_history <- function(fit) !is.null(fit$coefficients)
 
+# Faults of the record that a calibration reads.
+fit_findings <- function(fit, measurements = fit$measurements) {
+  simulator <- fit$emulator$simulator
+  findings_read(measurements, if (!is.null(simulator)) driver_names(simulator))
+}
+
 # Mean of the simulator's runs at posterior draws; by the emulator where there are none.
 simulated_mean <- function(fit) {
   if (!is.null(fit$check$mean)) return(fit$check$mean)

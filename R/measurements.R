@@ -239,19 +239,37 @@ measurements <- function(data, time = NULL, target, boundary, noise_sd = NULL, a
                                    use = use_given,
                                    noise_sd = noise$sd * sqrt(coarse$per_step),
                                    per_step = coarse$per_step, no_codes = identical(missing, NA)))
-  structure(list(format_version = format_version, name = name, target = target, unit = unit,
-                 label = label, noise_sd = noise$sd, noise = noise[-1], raw = raw,
-                 per_step = coarse$per_step, step_h = coarse$step_h, time = coarse$time,
-                 hours = coarse$hours, segment = coarse$segment, use = coarse$use,
-                 y = coarse$y, standard_error = coarse$standard_error, block = coarse$block,
-                 boundary = x$values, condition = x$condition, conditions = x$names,
-                 labels = stats::setNames(terms$label, terms$name)[told],
-                 units = stats::setNames(terms$unit, terms$name)[told],
-                 time_format = reading$format, time_zone = time_zone, stamp = stamp,
-                 constant = constant, findings = findings,
-                 faulty = faulty_steps(findings, target, coarse$block, grid$row), missing = missing,
-                 range = range), class = "amiss_measurements")
+  measured <- list(
+    format_version = format_version, name = name, target = target, unit = unit, label = label,
+    noise_sd = noise$sd, noise = noise[-1], raw = raw, per_step = coarse$per_step,
+    step_h = coarse$step_h, time = coarse$time, hours = coarse$hours, segment = coarse$segment,
+    use = coarse$use, y = coarse$y, standard_error = coarse$standard_error, block = coarse$block,
+    boundary = x$values, condition = x$condition, conditions = x$names,
+    labels = stats::setNames(terms$label, terms$name)[told],
+    units = stats::setNames(terms$unit, terms$name)[told], time_format = reading$format,
+    time_zone = time_zone, stamp = stamp, constant = constant, findings = findings,
+    faulty = faulty_steps(findings, target, coarse$block, grid$row), missing = missing,
+    range = range)
+  tell_findings(measured)
+  structure(measured, class = "amiss_measurements")
 }
+
+# A batch job prints no record: what was found is told when it is read.
+tell_findings <- function(measurements) {
+  told <- finding_bullets(findings_read(measurements)$says)
+  if (length(told))
+    cli::cli_inform(c("Look at the record {.val {measurements$name}} first:", told),
+                    class = "amiss_message_record")
+}
+
+finding_bullets <- function(says) {
+  more <- length(says) - most_findings
+  c(stats::setNames(as_said(utils::head(says, most_findings)),
+                    rep("!", min(length(says), most_findings))),
+    if (more > 0) c("!" = sprintf("%d more: see {.code $findings} of the record", more)))
+}
+
+most_findings <- 5
 
 # Steps of the averaged record in which a reading of the target is known to be none.
 faulty_steps <- function(findings, target, block, row) {
@@ -426,8 +444,6 @@ print.amiss_measurements <- function(x, ...) on_stdout(x, {
                                  "{n[['warmup']]} warm up"),
                      "*" = if (any(lost)) "{sum(lost)} without a measurement, left out",
                      "*" = "boundary conditions {.field {condition_titles(x)}}"))
-  said <- findings_read(x)$says
-  for (one in utils::head(said, 5)) cli::cli_bullets(c("!" = "{one}"))
-  if (length(said) > 5) cli::cli_bullets(c("!" = "{length(said) - 5} more: see {.code $findings}"))
-  cli::cli_bullets(c(">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
+  cli::cli_bullets(c(finding_bullets(findings_read(x)$says),
+                     ">" = "next: {.fun simulate_design} or {.fun upgrade_model}"))
 })

@@ -423,8 +423,7 @@ read_findings <- function(models, measurements) {
   each <- each_record(measurements)
   fits <- record_fits(models[[length(models)]]$fit)
   told <- Map(function(m, fit, name) {
-    simulator <- fit$emulator$simulator
-    found <- findings_read(m, if (!is.null(simulator)) driver_names(simulator))
+    found <- fit_findings(fit, m)
     stats::setNames(paste0(record_prefix(name), found$says, recycle0 = TRUE), found$id)
   }, each, fits, names(each) %||% "")
   do.call(c, unname(told))

@@ -121,7 +121,7 @@ test_that("a calibration is kept but not trusted if many runs at posterior draws
                      "[0-9.]+, gain = [0-9.]+; calibrate_refined"))
   none <- checked(function(k, y) stop("no steady state"))
   expect_false(none$trust$trusted)
-  expect_match(none$trust$verdict, "failed at all of [34][0-9] draws")
+  expect_match(none$trust$verdict, "failed at all of [34][0-9] posterior draws")
   expect_equal(none$log_evidence, none$posterior$log_evidence)
   expect_true(is.na(glance(none)$emulator_error))
   expect_no_error(amiss:::check_whole(none, "none"))

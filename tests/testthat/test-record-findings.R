@@ -214,3 +214,14 @@ test_that("stamps that stray by fractions of a second move no row", {
   stray <- of(exact + withr::with_seed(1, runif(240, -0.4, 0.4)))
   expect_identical(stray[c("time", "y", "use")], of(exact)[c("time", "y", "use")])
 })
+
+test_that("a batch job that prints no record is told of its faults, and so is who sees a fit", {
+  data <- linear_data()
+  data$Wd <- withr::with_seed(1, runif(nrow(data), 0, 360))
+  expect_message(m <- linear_measurements(data, boundary = ~ Te + Wd),
+                 "Look at the record.*circular\\(Wd\\)", class = "amiss_message_record")
+  fit <- calibrate(train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m), m,
+                   quick_ais, seed = 3)
+  for (said in list(printed(fit), printed(summary(fit)))) expect_match(said, "circular\\(Wd\\)")
+  expect_no_message(linear_measurements(), class = "amiss_message_record")
+})
