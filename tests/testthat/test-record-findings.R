@@ -220,8 +220,8 @@ test_that("a batch job that prints no record is told of its faults, and so is wh
   data$Wd <- withr::with_seed(1, runif(nrow(data), 0, 360))
   expect_message(m <- linear_measurements(data, boundary = ~ Te + Wd),
                  "Look at the record.*circular\\(Wd\\)", class = "amiss_message_record")
-  fit <- calibrate(train_emulator(simulate_design(linear_simulator(), m, runs = 30, seed = 3), m), m,
-                   quick_ais, seed = 3)
+  runs <- simulate_design(linear_simulator(), m, runs = 30, seed = 3)
+  fit <- calibrate(train_emulator(runs, m), m, quick_ais, seed = 3)
   for (said in list(printed(fit), printed(summary(fit)))) expect_match(said, "circular\\(Wd\\)")
   expect_no_message(linear_measurements(), class = "amiss_message_record")
 })
