@@ -23,8 +23,9 @@ checked_by_runs <- function(fits, threads) {
 default_exact <- function(fit) if (is.null(fit$emulator$simulator)) 0 else fit$control$check
 
 # Runs of the simulator at draws spread evenly over the posterior (even_draws()): list(draws, times,
-# runs, failed, first), failed ones left out, and where the `first` of these was. A draw of more
-# weight than one of them is run once, and counts as often as it was drawn.
+# runs, failed, first, lost), failed ones left out: how many they are, where the first was, and how
+# often they were drawn. A draw of more weight than one of them is run once, and counts as often as
+# it was drawn.
 posterior_runs <- function(fit, drawn, threads) {
   draws <- unique(drawn)
   times <- tabulate(match(drawn, draws))
@@ -32,11 +33,13 @@ posterior_runs <- function(fit, drawn, threads) {
     fit$emulator$simulator, fit$values[draws, , drop = FALSE], fit$measurements, "calibrate",
     threads)))
   failed <- colSums(!is.finite(runs)) > 0
-  first <- fit$values[draws[failed][1], ]
   list(draws = draws[!failed], times = times[!failed], runs = runs[, !failed, drop = FALSE],
-       failed = sum(failed),
-       first = paste(colnames(fit$values), signif(first, 4), sep = " = ", collapse = ", "))
+       failed = sum(failed), first = if (any(failed)) point_words(fit$values[draws[failed][1], ]),
+       lost = sum(times[failed]))
 }
+
+point_words <- function(values)
+  paste(names(values), signif(values, 4), sep = " = ", collapse = ", ")
 
 # The check itself reports failed runs.
 suppress_run_warnings <- function(code)
@@ -51,11 +54,10 @@ emulation_check <- function(fit, made) {
                      "runs of the simulator at posterior draws",
                      mean = as.numeric(made$runs %*% made$times) / sum(made$times))
   n <- length(made$draws) + made$failed
-  if (!is.null(made$first) && made$failed > largest_failed_share * n) {
+  if (made$failed > largest_failed_share * n) {
     check$passed <- FALSE
-    check$verdict <- sprintf(
-      paste("the simulator failed at %d of %d draws of the posterior, the first at %s;",
-            "calibrate_refined() ends the posterior there"), made$failed, n, made$first)
+    check$verdict <- sprintf("the simulator failed at %d of %d posterior draws, the first at %s",
+                             made$failed, n, made$first)
   }
   check
 }
@@ -148,7 +150,7 @@ run_log_likelihood <- function(fit, draws, runs, threads) {
 }
 
 # Z = Z_emulated E[L_run / L_emulated] over draws of the emulated posterior, the likelihoods those
-# of all records.
+# of all records; of a run that fails it is 0.
 exact_evidence <- function(fits, made, threads) {
   drawn <- Reduce(intersect, lapply(made, `[[`, "draws"))
   if (!length(drawn)) return(fits)
@@ -161,15 +163,17 @@ exact_evidence <- function(fits, made, threads) {
   weights <- ratio / sum(ratio)
   n <- length(ratio)
   effective <- 1 / (n * sum(weights^2))
-  correction <- max(log_ratio) + log(mean(ratio))
+  gain <- max(log_ratio) + log(mean(ratio))
+  share <- n / (n + max(vapply(made, `[[`, 0, "lost")))  # that did not fail
   # Where few draws carry the weight, their mean may miss what lies further up. By the spread of the
   # upper half it is that of lognormal ratios; how far the two are apart is part of the error.
   above <- pmax(log_ratio - stats::median(log_ratio), 0)
   # twice the mean square of one half, over two
   lognormal <- stats::median(log_ratio) + mean(above^2)
-  error <- if (n > 1) sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - correction)^2)
+  error <- if (n > 1) sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - gain)^2 +
+                             (1 - share) / n)
            else Inf
-  lapply(fits, corrected, effective = effective, correction = correction, error = error)
+  lapply(fits, corrected, effective = effective, correction = gain + log(share), error = error)
 }
 
 corrected <- function(fit, effective, correction, error) {

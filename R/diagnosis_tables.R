@@ -39,12 +39,11 @@ parameters_words <- function(fit) {
           note = ifelse(rows$at_edge, "at the edge", ""), check.names = FALSE, row.names = NULL))
 }
 
-# Where physical values lie. If there are several modes, they stand as they are.
+# Where physical values lie, of each mode.
 physical_words <- function(fit) {
-  physical <- physical_intervals(fit)
-  if (is.null(physical)) return(NULL)
-  modes <- table(mode_rows(fit)$name)[physical$name]
-  ifelse(modes > 1, intervals_words(fit), interval_words(physical$lower, physical$upper, 3))
+  modes <- mode_rows(fit)
+  physical <- physical_ends(fit, modes)
+  if (!is.null(physical)) listed_of_each(physical$lower, physical$upper, modes$name)
 }
 
 # The two parameters that what is missing may bias most, if that is known.
@@ -65,8 +64,12 @@ bias_sentence <- function(fit) {
 # The 95 % interval of each parameter, or those of its modes.
 intervals_words <- function(fit) {
   modes <- mode_rows(fit)
-  words <- interval_words(modes$lower, modes$upper, 3)
-  unname(vapply(split(words, factor(modes$name, unique(modes$name))), listed, "", "or"))
+  listed_of_each(modes$lower, modes$upper, modes$name)
+}
+
+listed_of_each <- function(lower, upper, name) {
+  words <- interval_words(lower, upper, 3)
+  unname(vapply(split(words, factor(name, unique(name))), listed, "", "or"))
 }
 
 scores_table <- function(upgrade) {

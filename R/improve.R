@@ -99,14 +99,28 @@ without_failing <- function(model, fits) {
   nearest <- apply(draws, 2, function(draw) which.min(colSums((runs - draw)^2)))
   possible <- !failed[near][nearest]
   weights <- fits[[1]]$weights * possible
-  if (sum(weights) < rules$least_possible) return(fits)
+  kept <- possible[fits[[1]]$kept + 1]
+  effective <- sum(weights)^2 / max(sum(weights^2), 1e-300)
+  if (effective < rules$least_possible * length(model$parameters) || !any(kept)) return(fits)
+  # As well as the runs there tell it.
+  error <- sqrt(max(0, 1 / sum(weights) - 1) / sum(near))
   lapply(fits, function(fit) {
     fit$log_evidence <- fit$log_evidence + log(sum(weights))
-    fit$interval <- fit$interval + log(sum(weights))
+    fit$standard_error <- sqrt(fit$standard_error^2 + error^2)
+    fit$interval <- fit$interval + log(sum(weights)) + c(-1.96, 1.96) * error
     fit$weights <- fit$posterior$weights <- weights / sum(weights)
+    fit$posterior$ess <- 1 / sum(fit$weights^2)
     fit$failing <- 1 - (1 - (fit$failing %||% 0)) * sum(weights)
-    fit
+    keeping(fit, kept)
   })
+}
+
+# A fit with some of the draws of its discrepancy.
+keeping <- function(fit, some) {
+  fit$kept <- fit$kept[some]
+  for (part in c("coefficients", "withheld", "withheld_covariance"))
+    fit[[part]] <- fit[[part]][, some, drop = FALSE]
+  fit
 }
 
 # The run of least squares, of all runs that there are: if one is nearer to the record, the search
@@ -137,9 +151,12 @@ with_exact_least <- function(model, context) {
     known <- list(z = model$runs$z[model$least$at, ], slopes = found$slopes, stale = found$stale)
     model <- converged_least(model, found, context)
     model$least$exact <- TRUE
-    model$least$known <- known
+    model$least[c("known", "idle")] <- list(known, found$idle)
   }
-  model$least$slopes <- secant_slopes(model, model$least$at, model$least$known)
+  least <- model$least
+  model$least$slopes <- given_slopes(model, model$runs$z[least$at, ]) %||%
+    secant_slopes(model, least$at, least$known)
+  model$least$slopes[, names(model$parameters) %in% least$idle] <- 0
   model
 }
 
@@ -225,6 +242,12 @@ record_ensemble <- function(model, k, region) {
 
 least_training <- function(own) max(rules$training_runs, length(own) + rules$training_spare)
 
+first_failing <- function(model, at) {
+  if (!length(at)) return(NULL)
+  unit <- to_unit(model$runs$z[at[1], , drop = FALSE], model$space)
+  point_words(unit_to_values(unit, model$parameters)[1, ])
+}
+
 # Runs at n draws of the posterior: list(model, fits) with the checks of the calibrations, whose
 # evidence they correct. Those that fail show where the posterior ends.
 check_by_runs <- function(model, fits, n, context) {
@@ -241,6 +264,7 @@ check_by_runs <- function(model, fits, n, context) {
   if (!all(fine)) fits <- without_failing(model, fits)
   each <- lapply(model$rows, function(rows) {
     list(draws = draws[fine], times = model$checked$times, failed = sum(!fine),
+         lost = 0, first = first_failing(model, made$at[!fine]),
          runs = model$runs$outputs[rows, made$at[fine], drop = FALSE])
   })
   fits <- Map(function(fit, runs) {

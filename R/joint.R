@@ -131,6 +131,7 @@ print.amiss_joint <- function(x, ...) on_stdout(x, {
   for (name in names(x$records)) {
     fit <- x$records[[name]]
     cli::cli_bullets(c("*" = "{name} ({length(fit$rows)} rows): {fit$check$verdict}"))
+    cli::cli_bullets(finding_bullets(fit_findings(fit)$says))
   }
   cli::cli_bullets(c(">" = paste("next: {.fun attribute_discrepancy}, {.fun upgrade_model}, or",
                                  "{.code $records} one by one")))

@@ -39,7 +39,7 @@ new_joint <- function(fits) {
          interval = first$interval, check = joint_check(fits),
          trust = new_trust(!length(untrusted), why), rounds = first$rounds,
          runs_made = first$runs_made, modes = first$modes, exchanges = first$exchanges,
-         seed = first$seed),
+         failing = first$failing, seed = first$seed),
     class = "amiss_joint")
 }
 

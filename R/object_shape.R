@@ -89,7 +89,7 @@ object_shapes <- list(
                   values = "real[k,p]", weights = "real[k]",
                   posterior = ":posterior", log_evidence = "estimate[1]",
                   standard_error = "estimate[1]", interval = "number[2]", trust = ":trust",
-                  check = "?:check", seed = "number[1]"),
+                  check = "?:check", failing = "?real[1]", seed = "number[1]"),
   amiss_upgrade = c(models = "some:model", candidates = "?table", responses = "?table",
                     catalogue = "amiss_catalogue",
                     measurements = "amiss_measurements|amiss_records",

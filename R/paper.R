@@ -192,6 +192,7 @@ print.amiss_paper_calibration <- function(x, ...) on_stdout(x, {
                       "{x$trust$verdict}"))
   cli::cli_text("{error_sentence(x)}")
   say_parameters(x, 3)
+  cli::cli_bullets(finding_bullets(fit_findings(x)$says))
   cli::cli_text("variance index of the boundary conditions over that of white noise")
   index <- utils::head(x$index, 4)
   index$boundary <- condition_label(x$measurements, index$boundary)

@@ -9,21 +9,34 @@
 # b is normal. The interval holds that of the kept draws without the moves, and the posterior's.
 # @return A data frame with name, lower and upper, or NULL if a calibration knows no slopes.
 physical_intervals <- function(fit, level = 0.95) {
+  ends <- stats::confint(fit, level = level)
+  physical_ends(fit, data.frame(name = rownames(ends), lower = ends[, 1], upper = ends[, 2],
+                                from = -Inf, to = Inf), level)
+}
+
+# The same of the parts of posteriors between `from` and `to`, whose intervals are `lower` to
+# `upper`; a part without a kept draw has these.
+physical_ends <- function(fit, parts, level = 0.95) {
   records <- record_fits(fit)
   if (!all(vapply(records, knows_slopes, NA))) return(NULL)
   parameters <- drawn_parameters(fit)
   space <- coordinates_of(parameters)
   moved <- moved_by_missing(records, names(parameters))
-  z <- t(from_unit(posterior_unit(fit)[records[[1]]$kept + 1L, , drop = FALSE], space))
+  kept <- records[[1]]$kept + 1L
+  z <- from_unit(posterior_unit(fit)[kept, , drop = FALSE], space)
   tails <- c((1 - level) / 2, (1 + level) / 2)
-  ends <- vapply(seq_along(parameters), function(j) {
-    at <- z[j, ] - moved$mean[j, ] + outer(moved$sd[j, ], normal_points)
-    pmin(pmax(stats::quantile(at, tails), space$lower[j]), space$upper[j])
+  ends <- vapply(seq_len(nrow(parts)), function(row) {
+    j <- match(parts$name[row], names(parameters))
+    at <- fit$values[kept, parts$name[row]]
+    own <- at >= parts$from[row] & at <= parts$to[row]
+    if (!any(own)) return(c(NA_real_, NA_real_))
+    without <- z[own, j] - moved$mean[j, own] + outer(moved$sd[j, own], normal_points)
+    of_all <- matrix(0, 2, length(parameters))
+    of_all[, j] <- pmin(pmax(stats::quantile(without, tails), space$lower[j]), space$upper[j])
+    unit_to_values(to_unit(of_all, space), parameters)[, j]
   }, c(0, 0))
-  values <- unit_to_values(to_unit(ends, space), parameters)
-  of_posterior <- stats::confint(fit, level = level)[names(parameters), , drop = FALSE]
-  data.frame(name = names(parameters), lower = pmin(values[1, ], of_posterior[, 1]),
-             upper = pmax(values[2, ], of_posterior[, 2]), row.names = NULL)
+  data.frame(name = parts$name, lower = pmin(ends[1, ], parts$lower, na.rm = TRUE),
+             upper = pmax(ends[2, ], parts$upper, na.rm = TRUE), row.names = NULL)
 }
 
 # Equally probable ones: each draw given is as good as so many.
@@ -77,11 +90,8 @@ tidy.amiss_fit <- function(x, conf.level = 0.95, ...) {
     unit = vapply(drawn_parameters(x)[rows$name], `[[`, "", "unit"), estimate = rows$median,
     std.error = rows$sd, conf.low = rows$lower, conf.high = rows$upper, physical.low = NA_real_,
     physical.high = NA_real_, modes = rows$modes, share = rows$share, row.names = NULL)
-  physical <- physical_intervals(x, conf.level)
-  if (is.null(physical)) return(table)
-  physical <- physical[match(rows$name, physical$name), ]
-  several <- rows$modes > 1  # modes stand as they are
-  table$physical.low <- ifelse(several, rows$lower, physical$lower)
-  table$physical.high <- ifelse(several, rows$upper, physical$upper)
+  physical <- physical_ends(x, rows, conf.level)
+  if (!is.null(physical))
+    table[c("physical.low", "physical.high")] <- physical[c("lower", "upper")]
   table
 }

@@ -60,7 +60,7 @@ parameter_table <- function(fit) {
 #'   the record. What the simulator lacks may act as a parameter does, and the calibrated value then
 #'   makes up for it. `physical.low` and `physical.high` count this too: between them lies the value
 #'   of the quantity itself (Brynjarsdottir and O'Hagan 2014). They are `NA` after [calibrate()] and
-#'   [calibrate_paper()], which know no slopes of the simulator.
+#'   [calibrate_paper()], which know no slopes of the simulator. Each mode has its own.
 #'
 #'   `tidy(upgrade, "candidates")` has one row for each mechanism tried. Its columns are those of
 #'   `candidates` ([upgrade_model()], *Candidates*) without the estimates, with `conf.low` and
@@ -257,11 +257,12 @@ say_parameters <- function(fit, most) {
 # Of parameters with several modes.
 share_words <- function(rows) ifelse(rows$modes > 1, percent(rows$share), "")
 
-# The first rows of a table of parameters, without a column of units if there is none.
+# The first parameters of a table, without a column of units if there is none.
 say_first <- function(table, most) {
   if (!any(nzchar(table$unit))) table$unit <- NULL
-  say_table(utils::head(table, most))
-  more <- nrow(table) - most
+  place <- match(table$parameter, unique(table$parameter))
+  say_table(table[place <= most, ])
+  more <- max(place) - most
   if (more > 0) cli::cli_text("{more} more parameter{?s}: see {.fun tidy}")
 }
 
@@ -286,7 +287,7 @@ edge_sentence <- function(fit) {
 no_edge <- "No parameter is at the edge of its range."
 
 # Modes of a parameter: parts of its draws that a gap keeps apart, list(median, sd, lower, upper,
-# share) each. A gap counts if it is a quarter of the 95 % interval or more and holds hardly any of
+# from, to, share) each, with the draws at either end. A gap counts if it is a quarter of the 95 % interval or more and holds hardly any of
 # the posterior, with a twentieth of it on either side. A density with one peak has no such gap: it
 # falls from there on, so that three times as much lies beyond at most, and what is outside the
 # interval.
@@ -294,7 +295,7 @@ parameter_modes <- function(fit, name, level = 0.95) {
   lapply(draws_of_modes(fit, name), function(own) {
     q <- weighted_quantile(own$x, own$w, c(0.5, 0.5 - level / 2, 0.5 + level / 2))
     list(median = q[1], sd = weighted_sd(own$x, own$w), lower = q[2], upper = q[3],
-         share = sum(own$w))
+         from = own$x[1], to = own$x[length(own$x)], share = sum(own$w))
   })
 }
 
@@ -316,8 +317,9 @@ draws_of_modes <- function(fit, name) {
 gaps_between_modes <- function(x, w) {
   below <- cumsum(w)
   end <- pmin(findInterval(below + rules$mode_gap_share, below) + 1, length(x))
+  part <- max(rules$mode_part, rules$mode_part_draws * sum(w^2))
   is_gap <- x[end] - x > rules$mode_gap * diff(weighted_quantile(x, w, c(0.025, 0.975))) &
-    below > rules$mode_part & below[end] - w[end] < 1 - rules$mode_part
+    below > part & below[end] - w[end] < 1 - part
   begin <- which(is_gap)
   apart <- begin[-1] >= cummax(end[begin])[-length(begin)]
   vapply(unname(split(begin, cumsum(c(TRUE, apart))[seq_along(begin)])), function(own) {

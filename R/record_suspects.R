@@ -41,13 +41,15 @@ suspect_case <- function(base, adopted, threads, runs) {
 }
 
 # What is left of the record beside a simulation, by least squares in the model's parameters under
-# their priors, and in the amounts of `extra` columns; NA where the simulation is.
-left_with <- function(case, simulated = case$simulated, slopes = case$slopes, extra = NULL) {
+# their priors, and in the amounts of `extra` columns, which are free or have standard normal priors;
+# NA where the simulation is.
+left_with <- function(case, simulated = case$simulated, slopes = case$slopes, extra = NULL,
+                      free = TRUE) {
   r <- case$y - simulated
   x <- cbind(slopes, extra)
   there <- is.finite(r) & rowSums(!is.finite(x)) == 0
   x <- x[there, , drop = FALSE]
-  small <- 1e-9 * max(colSums(x^2), 1e-300)
+  small <- if (free) 1e-9 * max(colSums(x^2), 1e-300) else case$noise^2
   penalty <- c(rep(case$noise^2, ncol(slopes)), rep(small, NCOL(extra) * !is.null(extra)))
   amounts <- solve(crossprod(x) + diag(penalty, ncol(x)), crossprod(x, r[there]))
   left <- rep(NA_real_, length(r))
@@ -72,20 +74,21 @@ excess_share <- function(before, left, noise) {
   gone / max(sum(before[there]^2) - noise^2 * sum(there), 1e-300)
 }
 
-# The suspicion that gains most, or NULL: list(id, column, ..., left).
+# The suspicion that gains most, or NULL: list(id, column, ..., left). Clocks of drivers cost most
+# runs, and are tried last.
 strongest_suspect <- function(case) {
-  tried <- c(clock_suspects(case), start_suspects(case), step_suspects(case))
-  best <- best_suspect(tried, case)
-  if (is.null(best))
-    best <- best_suspect(c(driver_clock_suspects(case), range_suspects(case)), case)
-  best
+  tried <- c(clock_suspects(case), start_suspects(case), step_suspects(case),
+             range_suspects(case))
+  best_suspect(tried, case) %||% best_suspect(driver_clock_suspects(case), case)
 }
 
+# Kinds are as probable as one another, and so are those of a kind.
 best_suspect <- function(tried, case) {
   tried <- Filter(Negate(is.null), tried)
   if (!length(tried)) return(NULL)
+  kinds <- vapply(tried, `[[`, "", "id")
   gains <- vapply(tried, function(s) error_gain(case$before$left, s$left, s$more), 0) -
-    log10(length(tried))
+    log10(table(kinds)[kinds] * length(unique(kinds)))
   best <- tried[[which.max(gains)]]
   holds <- max(gains) >= rules$decisive &&
     excess_share(case$before$left, best$left, case$noise) >= rules$excess_gone &&
@@ -309,8 +312,18 @@ range_suspect <- function(case, name, piled) {
   extra <- do.call(cbind, c(lapply(parts, `*`, level), lapply(parts, `*`, arc)))
   extra <- extra[, colSums(extra^2) > 0, drop = FALSE]
   if (!ncol(extra) || ncol(extra) > rules$range_amounts * length(case$y)) return(NULL)
-  found <- left_with(case, extra = extra)
-  suspect("range_end", name, found, ncol(extra), end = piled$end, rows = piled$rows)
+  found <- left_with(case, extra = extra, free = FALSE)
+  suspect("range_end", name, found, weight_of_amounts(case, extra, found$amounts),
+          end = piled$end, rows = piled$rows)
+}
+
+# As many free parameters as amounts of standard normal priors weigh: the evidence with them is less
+# than the likelihood at their best by their prior there, and by what they may move beside the
+# model's parameters.
+weight_of_amounts <- function(case, extra, amounts) {
+  beside <- qr.resid(qr(case$slopes), extra) / case$noise
+  size <- eigen(crossprod(beside), symmetric = TRUE, only.values = TRUE)$values
+  (sum(log1p(pmax(size, 0))) + sum(amounts^2)) / log(nrow(extra))
 }
 
 beyond_end <- function(v, end) {

@@ -18,13 +18,16 @@ reference_here <- function(search, slopes, stale) {
 }
 
 # Slopes by differences, on the same side wherever the priors allow it; where a small one shows
-# nothing, by larger ones on both sides: list(model, slopes, stale), no slopes if the budget ends. A
-# difference is the slope half way along it: what the simulator bends over that, other runs show.
+# nothing, by larger ones on both sides: list(model, slopes, stale, idle), no slopes if the budget
+# ends. A difference is the slope half way along it: what the simulator bends over that, other runs
+# show. `idle`: the parameters on which nothing depends there.
 difference_slopes <- function(model, at, context, asked = names(model$parameters)) {
   z <- model$runs$z[at, ]
   known <- given_slopes(model, z)
-  if (!is.null(known))
-    return(list(model = model, slopes = known[, asked, drop = FALSE], stale = 0))
+  if (!is.null(known)) {
+    return(list(model = model, slopes = known[, asked, drop = FALSE], stale = 0,
+                idle = asked[colSums(known[, asked, drop = FALSE] != 0) == 0]))
+  }
   seen <- function(model, step) {
     points <- matrix(z, length(step), length(z), byrow = TRUE)
     points[cbind(seq_along(step), match(names(step), names(z)))] <- z[names(step)] + step
@@ -32,8 +35,10 @@ difference_slopes <- function(model, at, context, asked = names(model$parameters
     if (length(made$at) < length(step)) return(list(model = made$model))
     change <- made$model$runs$outputs[, made$at, drop = FALSE] - made$model$runs$outputs[, at]
     slopes <- sweep(change, 2, step, "/")
-    slopes[, colSums(!is.finite(slopes)) > 0] <- 0
-    list(model = made$model, slopes = slopes, stale = rules$search_difference / 2)
+    failed <- colSums(!is.finite(slopes)) > 0
+    slopes[, failed] <- 0
+    list(model = made$model, slopes = slopes, stale = rules$search_difference / 2,
+         idle = names(step)[colSums(slopes != 0) == 0 & !failed])
   }
   side <- difference_side(z, model$space)[asked]
   found <- seen(model, rules$search_difference * side)
@@ -44,7 +49,8 @@ difference_slopes <- function(model, at, context, asked = names(model$parameters
   down <- seen(up$model, -rules$wide_difference * side[flat])
   if (is.null(up$slopes) || is.null(down$slopes)) return(list(model = down$model))
   found$slopes[, match(flat, asked)] <- (up$slopes + down$slopes) / 2
-  list(model = down$model, slopes = found$slopes, stale = found$stale)
+  list(model = down$model, slopes = found$slopes, stale = found$stale,
+       idle = Reduce(intersect, list(found$idle, up$idle, down$idle)))
 }
 
 # Those that the simulators give themselves, for a unit of z; NULL unless all do.

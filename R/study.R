@@ -75,7 +75,7 @@
 #'   * `emulator_error`, `emulator_ratio`, `emulator_checked`: what the check by runs said.
 #'   * `refinements`, `reach`, scores and `attribution`.
 #'   * `parameters`: median and 95 % interval of each, and where its physical value lies
-#'     (`physical_lower`, `physical_upper`, as `tidy()` of a calibration has them).
+#'     (`physical_lower`, `physical_upper`, of all its modes together).
 #'
 #'   If the command `amiss` ends with status 0, the work was done. It does not mean that a cause was
 #'   found or that numbers are trusted.

@@ -205,8 +205,7 @@ judging_points <- function(context) {
 inert_parameters <- function(state) {
   last <- state$present
   gone <- setdiff(state$base, names(last$parameters))
-  idle <- if (isTRUE(last$least$exact)) names(last$parameters)[colSums(last$least$slopes^2) == 0]
-  c(gone, intersect(idle, state$base))
+  c(gone, intersect(last$least$idle, state$base))
 }
 
 # list(simulator, measurements, record): of one record as they are, with its name; of several a list

@@ -43,16 +43,15 @@ upgrades <- lapply(records, function(lost) {
                                  threads = threads,
                                  quiet = TRUE))
 })
-whole <- tidy(upgrades$whole)
+whole <- confint(upgrades$whole)
 rows <- Map(function(name, upgrade) {
-  estimates <- tidy(upgrade)
-  both <- merge(whole, estimates, by = "term")
-  held <- both$estimate.y >= both$conf.low.x & both$estimate.y <= both$conf.high.x
+  both <- intersect(rownames(whole), names(coef(upgrade)))
+  held <- coef(upgrade)[both] >= whole[both, 1] & coef(upgrade)[both] <= whole[both, 2]
   data.frame(record = name, rows = nobs(upgrade),
              cause = upgrade$named_cause$mechanism %or% NA_character_,
              verdict = upgrade$models[[length(upgrade$models)]]$verdict %or% NA_character_,
-             log10_bf = upgrade$named_cause$log10_bf %or% NA_real_, parameters = nrow(both),
-             within = sum(held), outside = paste(both$term[!held], collapse = ", "),
+             log10_bf = upgrade$named_cause$log10_bf %or% NA_real_, parameters = length(both),
+             within = sum(held), outside = paste(both[!held], collapse = ", "),
              rmse_validation = upgrade$gain$rmse_validation[2])
 }, names(upgrades), upgrades)
 table <- do.call(rbind, unname(rows))

@@ -11,6 +11,7 @@
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
+source(file.path(here, "intervals.R"))
 family <- option("family", "network")
 seeds <- as.integer(option("seed", "71001")) +
   seq_len(as.integer(option("worlds", "24", smallest = "1"))) - 1L
@@ -35,12 +36,10 @@ one_world <- function(seed, family, parts) {
   start <- proc.time()[[3]]
   fit <- calibrate_refined(runs, world$measurements, seed = 1)
   table <- tidy(fit)
-  table <- table[table$term %in% names(truth), ]
-  data.frame(family = family, seed = seed, name = table$term,
-             mechanism = table$term %in% names(hidden),
-             held = table$conf.low <= truth[table$term] & truth[table$term] <= table$conf.high,
-             physical = table$physical.low <= truth[table$term] &
-               truth[table$term] <= table$physical.high,
+  truth <- truth[intersect(names(truth), table$term)]
+  data.frame(family = family, seed = seed, name = names(truth),
+             mechanism = names(truth) %in% names(hidden), held = holds(table, truth),
+             physical = holds(table, truth, "physical"),
              passed = fit$check$passed, runs = fit$runs_made, seconds = proc.time()[[3]] - start)
 }
 

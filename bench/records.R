@@ -1,8 +1,8 @@
 #!/usr/bin/env Rscript
 # Faults of a record in worlds with nothing hidden: of each kind, how often a cause is named, and
-# how often the fault is reported; of clean worlds, how often anything is reported. Rooms follow
-# outdoor air, sun and a heater, at once or with a memory; mechanisms that would take a fault for a
-# cause are in the catalogue.
+# how often the fault is reported; of clean worlds, and of those that hide an effect (`hidden`), how
+# often anything is reported. Rooms follow outdoor air, sun and a heater, at once or with a memory;
+# mechanisms that would take a fault for a cause are in the catalogue.
 # Usage: Rscript bench/records.R [--kinds clean,code,...] [--worlds 40] [--seed 1] [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))

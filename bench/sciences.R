@@ -9,6 +9,7 @@
 #          [--seed 1] [--runs 120] [--out FILE]
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
+source(file.path(here, "intervals.R"))
 suppressPackageStartupMessages(library(amiss))
 known <- c("reservoir", "cell", "greenhouse", "town", "river", "glucose", "reactor", "module",
            "drug")
@@ -30,16 +31,15 @@ score_record <- function(name) {
   listed <- function(x) if (length(x)) paste(x, collapse = ", ") else "nothing"
   adopted <- upgrade$models[-1]
   estimates <- tidy(upgrade)
-  own <- estimates[estimates$term %in% names(record$true), ]
-  true <- record$true[own$term]
+  true <- record$true[intersect(names(record$true), estimates$term)]
   answers <- upgrade$models[[1]]$attribution$table
   data.frame(
     record = name, hidden = listed(record$hidden),
     adopted = listed(vapply(adopted, function(m) sprintf("%s (%s)", m$mechanism, m$verdict), "")),
     answers_to = listed(answers$boundary[answers$significant][1][any(answers$significant)]),
-    verdict = summary(upgrade)$verdict, log10_bf = upgrade$gain$log10_bf, parameters = nrow(own),
-    covered = sum(own$physical.low <= true & true <= own$physical.high),
-    calibrated_covered = sum(own$conf.low <= true & true <= own$conf.high),
+    verdict = summary(upgrade)$verdict, log10_bf = upgrade$gain$log10_bf, parameters = length(true),
+    covered = sum(holds(estimates, true, "physical")),
+    calibrated_covered = sum(holds(estimates, true)),
     rmse_before = upgrade$gain$rmse_validation[1], rmse_after = upgrade$gain$rmse_validation[2],
     noise = record$measurements$noise_sd, runs = upgrade$runs_total,
     seconds = proc.time()[["elapsed"]] - started)

@@ -64,11 +64,11 @@ one_record <- function(name, phi, seed) {
   scouts <- simulate_design(case$simulator, record, runs = 8, seed = seed)
   fit <- suppressWarnings(calibrate_refined(scouts, record, control = list(calibration = error),
                                             seed = seed))
-  found <- as.data.frame(generics::tidy(fit))
-  found <- found[match(names(case$truth), found$term), ]
-  data.frame(simulator = name, phi, seed, term = found$term, off = found$estimate - case$truth,
-             half_width = (found$conf.high - found$conf.low) / 2, trusted = fit$trust$trusted,
-             inside = case$truth >= found$conf.low & case$truth <= found$conf.high)
+  ends <- confint(fit, names(case$truth))
+  data.frame(simulator = name, phi, seed, term = names(case$truth),
+             off = coef(fit)[names(case$truth)] - case$truth,
+             half_width = (ends[, 2] - ends[, 1]) / 2, trusted = fit$trust$trusted,
+             inside = case$truth >= ends[, 1] & case$truth <= ends[, 2])
 }
 
 jobs <- expand.grid(seed = first + seq_len(records) - 1L, phi = c(0, 0.6, 0.9, 0.97, 0.99),

@@ -12,6 +12,7 @@
 
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "options.R"))
+source(file.path(here, "intervals.R"))
 seeds <- as.integer(option("seed", "81001")) +
   seq_len(as.integer(option("worlds", "60", smallest = "1"))) - 1L
 workers <- option("workers")
@@ -83,10 +84,9 @@ one_world <- function(seed, common, smoke) {
     verdicts != "stand-in"
   names <- vapply(adopted, `[[`, "", "mechanism")
   table <- tidy(upgrade)
-  table <- table[table$term %in% names(true), ]
-  held <- table$conf.low <= true[table$term] & true[table$term] <= table$conf.high
+  held <- holds(table, true[intersect(names(true), table$term)])
   moves <- amiss:::step_moves(upgrade$models[[length(upgrade$models)]])
-  told <- table$term %in% names(moves)[abs(moves) > 1]
+  told <- names(held) %in% names(moves)[abs(moves) > 1]
   wrong <- names != hidden
   data.frame(seed, parts, off = sqrt(mean(off^2)) / noise, hidden, adopted = toString(names),
              verdicts = toString(verdicts), right = hidden %in% names,

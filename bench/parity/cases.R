@@ -47,10 +47,8 @@ sampled <- function(value, error) list(value = value, error = error)
 
 # Medians of a fit's parameters, with the error of a median of so many effective draws.
 medians <- function(fit) {
-  table <- tidy(fit)
   effective <- 1 / sum(fit$weights^2)
-  sampled(stats::setNames(table$estimate, table$term),
-          1.25 * table$std.error / sqrt(effective))
+  sampled(coef(fit), 1.25 * sqrt(diag(vcov(fit))) / sqrt(effective))
 }
 
 evidence <- function(fit) sampled(c(log_evidence = fit$log_evidence), fit$standard_error)

@@ -48,7 +48,23 @@ visible <- function(put) function(world) {
   faulty
 }
 
+# An effect that the base model lacks, three times as large as the noise, in a record without fault.
+hidden_effect <- function(world) {
+  simulated <- function(drivers) simulate_room(world$true, drivers, world$memory, world$step_h)
+  data <- world$data
+  slow <- data
+  for (name in c("Te", "Gv", "P")) slow[[name]] <- one_pole(data[[name]], 3, world$step_h)
+  base <- simulated(data)
+  effect <- switch(
+    sample(c("wind", "sky", "mass", "windows", "drift"), 1), wind = data$Ws, sky = data$Lw,
+    drift = data$hour, windows = -pmax(0, base - stats::quantile(base, 0.7)),
+    mass = simulated(slow) - base)
+  world$data$Ti <- world$data$Ti + 3 * world$noise / stats::sd(effect) * (effect - mean(effect))
+  world
+}
+
 faults <- list(
+  hidden = list(put = hidden_effect, right = character()),
   code_target = list(put = in_target(coded(c(-9999, -999, -99.9, 9999, 32767, 1e30, 85))),
                      right = c("missing_code", "far_outside")),
   code_driver = list(put = in_driver(coded(c(-9999, -999, -99.9, 9999, 32767, 1e30, 150))),

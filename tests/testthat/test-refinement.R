@@ -93,6 +93,11 @@ test_that("the posterior ends where the simulator fails, and its share is told",
   expect_lt(confint(fit)["g", 2], limit + 0.25 * line["Te", 2])
   expect_match(printed(fit), sprintf("fails: that cuts off %s of it", amiss:::percent(fit$failing)))
   expect_match(amiss:::failing_sentence(fit), "ends where the simulator fails")
+  # Nothing that is drawn lies beyond: simulate() takes draws of the discrepancy.
+  expect_true(all(fit$weights[fit$kept + 1] > 0))
+  expect_identical(ncol(fit$coefficients), length(fit$kept))
+  expect_lt(max(fit$values[fit$weights > 0, "g"]), limit + line["Te", 2])
+  expect_equal(fit$posterior$ess, 1 / sum(fit$weights^2))
   # The evidence falls by this share.
   whole <- fit_of(1)
   expect_lt(abs(fit$log_evidence - whole$log_evidence - log(1 - fit$failing)),
