@@ -42,7 +42,8 @@
 #'     them along the parameters: they follow a curved posterior, at up to twice the cost. [ais()]
 #'     makes them if it is given a gradient.
 #'   * `resample`: `FALSE` for plain annealed importance sampling (Neal 2001).
-#'   * `importance_draws`: draws of the mixture (1000). 0 leaves out the second estimator and the
+#'   * `importance_draws`: draws of the mixture (1000; in [ais()] ten for each number of a normal
+#'     distribution of all parameters, if that is more). 0 leaves out the second estimator and the
 #'     search for modes.
 #'   * `max_components`: most components of the mixture (3).
 #' @return An object of class `amiss_ais`:
@@ -70,7 +71,10 @@ ais <- function(log_likelihood, priors, control = NULL, seed = NULL, gradient = 
               "priors", "For example {.code list(a = uniform(0, 1))}.")
   for (one in priors) check_whole(one, "priors")
   check_input(checkmate::check_function(gradient, null.ok = TRUE), "gradient")
-  control <- fill_ais_control(control)
+  filled <- fill_ais_control(control)
+  if (is.null(control$importance_draws))
+    filled$importance_draws <- max(filled$importance_draws, mixture_draws(length(priors)))
+  control <- filled
   control$gradient <- !is.null(gradient)
   seed <- pick_seed(seed)
   to_values <- function(unit) {
@@ -157,6 +161,10 @@ tell_undefined <- function(tally) {
 
 # The numbers of chains and moves stay 0 where they follow from the target, which the engine knows.
 # Limits that were not given follow those that were: more groups than `max_groups` raise it.
+# Draws that show the mean and the covariance of d parameters: a mixture that is fitted to few
+# misses what it does not know, and an importance sample of it finds too little of a long ridge.
+mixture_draws <- function(d) 10 * d * (d + 3) / 2
+
 fill_ais_control <- function(control, what = "control", call = rlang::caller_env()) {
   filled <- merge_control(ais_defaults_(), control, what, call = call)
   for (name in c("pilot_chains", "chains", "sweeps")) filled[[name]] <- filled[[name]] %||% 0

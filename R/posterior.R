@@ -287,10 +287,10 @@ edge_sentence <- function(fit) {
 no_edge <- "No parameter is at the edge of its range."
 
 # Modes of a parameter: parts of its draws that a gap keeps apart, list(median, sd, lower, upper,
-# from, to, share) each, with the draws at either end. A gap counts if it is a quarter of the 95 % interval or more and holds hardly any of
-# the posterior, with a twentieth of it on either side. A density with one peak has no such gap: it
-# falls from there on, so that three times as much lies beyond at most, and what is outside the
-# interval.
+# from, to, share) each, with the draws at either end. A gap counts if it is a quarter of the 95 %
+# interval or more and holds hardly any of the posterior, with a twentieth of it on either side. A
+# density with one peak has no such gap: it falls from there on, so that three times as much lies
+# beyond at most, and what is outside the interval.
 parameter_modes <- function(fit, name, level = 0.95) {
   lapply(draws_of_modes(fit, name), function(own) {
     q <- weighted_quantile(own$x, own$w, c(0.5, 0.5 - level / 2, 0.5 + level / 2))

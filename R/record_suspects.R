@@ -41,8 +41,8 @@ suspect_case <- function(base, adopted, threads, runs) {
 }
 
 # What is left of the record beside a simulation, by least squares in the model's parameters under
-# their priors, and in the amounts of `extra` columns, which are free or have standard normal priors;
-# NA where the simulation is.
+# their priors, and in the amounts of `extra` columns, which are free or have standard normal
+# priors; NA where the simulation is.
 left_with <- function(case, simulated = case$simulated, slopes = case$slopes, extra = NULL,
                       free = TRUE) {
   r <- case$y - simulated

@@ -1,5 +1,5 @@
-# Whether the intervals of a table of tidy() hold the true values: of a parameter with several modes,
-# whether one of them does. TRUE or FALSE for each parameter of `true`, by its name.
+# Whether the intervals of a table of tidy() hold the true values: of a parameter with several
+# modes, whether one of them does. TRUE or FALSE for each parameter of `true`, by its name.
 holds <- function(table, true, kind = "conf") {
   low <- table[[paste0(kind, ".low")]]
   high <- table[[paste0(kind, ".high")]]
