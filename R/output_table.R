@@ -43,7 +43,7 @@ table_hint <- function(bad, words, output) {
 # their lines.
 split_table <- function(lines, output) {
   lines <- lines[as.integer(names(lines)) > output$skip]
-  remark <- if (nzchar(output$comment)) startsWith(trimws(lines), output$comment)
+  remark <- if (nzchar(output$comment)) startsWith(without_blanks(lines), output$comment)
             else rep(FALSE, length(lines))
   named <- is.character(output$column)
   header <- if (named) table_header(lines, remark, output)
@@ -51,7 +51,7 @@ split_table <- function(lines, output) {
   body <- lines[!remark & seq_along(lines) > header$at]
   body <- without_ends(body, output$units_rows)
   if (!length(body)) stop("it wrote no rows of numbers into ", output$file)
-  body <- trimws(body, if (identical(header$separator, "\t")) "none" else "both")
+  if (!identical(header$separator, "\t")) body <- without_blanks(body)
   list(words = field_matrix(body, header, output$file), line = names(body), names = header$fields)
 }
 
@@ -86,8 +86,9 @@ table_header <- function(lines, remark, output) {
   tried <- if (is.null(output$separator)) separators else known_separator(output$separator)
   best <- list(found = -1)
   for (at in utils::head(seq_along(lines), 200)) {
-    bare <- if (remark[at]) trimws(substring(trimws(lines[at]), nchar(output$comment) + 1))
-            else lines[at]
+    bare <- lines[at]
+    if (remark[at])
+      bare <- without_blanks(substring(without_blanks(bare), nchar(output$comment) + 1))
     if (!possible_header(bare, wanted)) next
     for (separator in tried) {
       fields <- split_line(bare, separator)

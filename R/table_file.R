@@ -14,7 +14,7 @@ read_table_file <- function(path, names, separator = NULL, decimal = NULL,
     why <- paste0(...)
     abort_input(c("The data file {.file {path}} cannot be read.", x = "{why}"), call = call)
   }
-  if (!any(nzchar(trimws(lines)))) refuse("It holds no lines.")
+  if (!any(nzchar(without_blanks(lines)))) refuse("It holds no lines.")
   header <- find_header(lines, names,
                         if (is.null(separator)) separators else known_separator(separator))
   body <- body_lines(lines, header$line)
@@ -50,7 +50,7 @@ known_separator <- function(separator) {
 # list(line, fields, separator): the first line with most of the names. A header may stand in a
 # comment.
 find_header <- function(lines, names, separators) {
-  first <- utils::head(which(nzchar(trimws(lines))), 200)
+  first <- utils::head(which(nzchar(without_blanks(lines))), 200)
   best <- list(found = -1)
   for (line in first)
     for (bare in unique(c(lines[line], sub("^\\s*[#%!]+\\s*", "", lines[line])))) {
@@ -76,13 +76,13 @@ split_line <- function(line, separator) {
   fields <- suppressWarnings(scan(text = line, what = "", sep = separator, quote = "\"",
                                   quiet = TRUE, na.strings = character(), comment.char = "",
                                   encoding = "UTF-8"))
-  trimws(fields)
+  without_blanks(fields)
 }
 
 # The lines below the header that hold something, with their numbers in the file.
 body_lines <- function(lines, header) {
   number <- seq_along(lines)
-  kept <- number > header & nzchar(trimws(lines)) & !is_comment(lines)
+  kept <- number > header & nzchar(without_blanks(lines)) & !is_comment(lines)
   list(text = lines[kept], number = number[kept])
 }
 
@@ -135,7 +135,7 @@ scan_fields <- function(text, width, separator) {
   fields <- scan(text = text, what = rep(list(""), width), sep = separator, quote = "\"",
                  quiet = TRUE, fill = TRUE, multi.line = FALSE, na.strings = character(),
                  comment.char = "", encoding = "UTF-8")
-  lapply(fields, trimws)
+  lapply(fields, without_blanks)
 }
 
 # Nothing but separators may stand behind the last name. Of very many of them a table would be made

@@ -45,3 +45,15 @@ checked_bytes <- function(path, field, call) {
   mark <- as.raw(c(0xef, 0xbb, 0xbf))
   if (identical(utils::head(bytes, 3), mark)) bytes[-(1:3)] else bytes
 }
+
+# trimws() in a time that grows as the text does, also if it holds a hundred thousand blanks.
+without_blanks <- function(x) {
+  long <- nchar(x, "bytes") > 1000
+  x[!long] <- trimws(x[!long])
+  x[long] <- vapply(x[long], function(text) {
+    code <- utf8ToInt(text)
+    there <- which(!code %in% utf8ToInt(" \t\r\n"))
+    if (length(there)) intToUtf8(code[min(there):max(there)]) else ""
+  }, "")
+  x
+}

@@ -77,6 +77,9 @@ test_that("every row has the fields of the header", {
   refused(c("Zeit,Te,Ti", replace(plain, 5, paste0("\"", plain[5]))), "quotation mark.*line 6")
   refused(c("Zeit,Te,Ti", replace(plain, 5, sub(",", paste0(strrep(" ", 1e5), "x,"), plain[5]))),
           "Line 6 has 1000[0-9]* characters in field 1 \\(Zeit\\)")
+  refused(c("Zeit\tTe\tTi", replace(rows(when, Te, Ti, sep = "\t"), 5,
+                                    paste0(when[5], strrep("\t", 1e5), Ti[5]))),
+          "Line 6 has 100001 fields, its header 3")
   refused("Zeit,Te,Ti", "no rows below")
   refused("", "holds no lines")
   expect_read(c(",Zeit,Te,Ti", paste(0:(n - 1), plain, sep = ",")))
@@ -156,4 +159,10 @@ test_that("a line of a great many fields is refused before a table is made of it
   stand_in(scan_fields = function(...) stop("a table is made"))
   expect_error(read_table_file(path, c("hour", "Ti", "Te")),
                "Line 10 has 100001 fields, its header 3", class = "amiss_error_input")
+})
+
+test_that("blanks at the ends of long texts are left out in a time that grows as they do", {
+  long <- strrep(" ", 1e6)
+  expect_identical(amiss:::without_blanks(c(a = paste0(long, "x \u00e9", long), b = long, c = " y ")),
+                   c(a = "x \u00e9", b = "", c = "y"))
 })
