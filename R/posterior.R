@@ -51,10 +51,11 @@ parameter_table <- function(fit) {
 #'   * `tidy()`: a data frame with one row for each parameter or, if its posterior has several
 #'     modes, for each mode.
 #'
-#'   The columns of `tidy()` are `term`, `label`, `unit`, `estimate` (the median), `std.error` (the
-#'   posterior's standard deviation), `conf.low`, `conf.high`, `physical.low`, `physical.high`,
-#'   `modes`, the number of modes of this parameter, and `share`, the part of the posterior that the
-#'   row holds. `coef()`, `confint()` and `vcov()` are of all modes together.
+#'   The columns of `tidy()` name the parameter (`term`, `label`, `unit`) and give its median
+#'   (`estimate`) and standard deviation (`std.error`). Two intervals follow, `conf.low` to
+#'   `conf.high` and `physical.low` to `physical.high`. `modes` is the number of modes of this
+#'   parameter, and `share` the part of the posterior that the row holds. `coef()`, `confint()` and
+#'   `vcov()` describe all modes together.
 #'
 #'   `conf.low` and `conf.high` are of the calibrated value, by which the simulation is nearest to
 #'   the record. What the simulator lacks may act as a parameter does, and the calibrated value then
