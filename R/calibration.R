@@ -35,7 +35,8 @@ calibration_control <- list(
 #' more error was seen than stated, it is the noise stated. The check fails if
 #'
 #' * the emulator's error is larger than a third of the noise,
-#' * fewer than a tenth of the `exact` draws are effective, or
+#' * fewer than a tenth of the `exact` draws are effective,
+#' * the runs change the evidence by more than ten nats, or
 #' * more than a twentieth of the posterior lies in the outer tenth of the emulator's region.
 #'
 #' If the check fails, trust neither the posterior nor the evidence. [calibrate_refined()] then

@@ -173,16 +173,22 @@ exact_evidence <- function(fits, made, threads) {
   error <- if (n > 1) sqrt(max(0, 1 / effective - 1) / (n - 1) + max(0, lognormal - gain)^2 +
                              (1 - share) / n)
            else Inf
-  lapply(fits, corrected, effective = effective, correction = gain + log(share), error = error)
+  lapply(fits, corrected, effective = effective, gain = gain, share = share, error = error)
 }
 
-corrected <- function(fit, effective, correction, error) {
+corrected <- function(fit, effective, gain, share, error) {
   fit$check$effective <- effective
-  if (fit$check$passed && effective < rules$effective) {
+  doubt <- if (effective < rules$effective)
+             sprintf("few of these runs are as likely as it says (effective share %.2f)", effective)
+           # points that it takes for so much less likely may be the likelier ones
+           else if (abs(gain) > rules$mode_depth)
+             sprintf("these runs are %.0f nats %s likely than it says", abs(gain),
+                     if (gain < 0) "less" else "more")
+  if (fit$check$passed && !is.null(doubt)) {
     fit$check$passed <- FALSE
-    fit$check$verdict <- sprintf(paste("%s, but few of these runs are as likely as it says",
-                                       "(effective share %.2f)"), fit$check$verdict, effective)
+    fit$check$verdict <- paste0(fit$check$verdict, ", but ", doubt)
   }
+  correction <- gain + log(share)
   fit$check$correction <- correction
   fit$log_evidence <- fit$log_evidence + correction
   fit$standard_error <- sqrt(fit$standard_error^2 + error^2)

@@ -270,7 +270,7 @@ BEGIN_RCPP
 END_RCPP
 }
 // network_simulate_
-Eigen::MatrixXd network_simulate_(Rcpp::List network, Eigen::MatrixXd coefficients, Eigen::MatrixXd drivers, Eigen::VectorXd hold, Rcpp::List options, Rcpp::List context);
+Rcpp::NumericMatrix network_simulate_(Rcpp::List network, Eigen::MatrixXd coefficients, Eigen::MatrixXd drivers, Eigen::VectorXd hold, Rcpp::List options, Rcpp::List context);
 RcppExport SEXP _amiss_network_simulate_(SEXP networkSEXP, SEXP coefficientsSEXP, SEXP driversSEXP, SEXP holdSEXP, SEXP optionsSEXP, SEXP contextSEXP) {
 BEGIN_RCPP
     Rcpp::RObject rcpp_result_gen;

@@ -50,16 +50,14 @@ Options read_options(const Rcpp::List& from) {
   return options;
 }
 
-Eigen::MatrixXd run_all(const Network& network, const Eigen::MatrixXd& coefficients,
-                        const Eigen::MatrixXd& drivers, const Eigen::VectorXd& hold, const Options& options,
-                        const amiss::Context& context) {
-  Eigen::MatrixXd output(drivers.rows(), coefficients.cols());
+void run_all(const Network& network, const Eigen::MatrixXd& coefficients, const Eigen::MatrixXd& drivers,
+             const Eigen::VectorXd& hold, const Options& options, const amiss::Context& context,
+             Eigen::Map<Eigen::MatrixXd> output) {
   amiss::parallel_for(static_cast<int>(coefficients.cols()), context, [&](int run) {
     const Coefficients read = read_coefficients(network, coefficients.col(run));
     output.col(run) = simulate(network, read, {}, drivers, hold, options).output;
     if (!output.col(run).allFinite()) output.col(run).setConstant(std::numeric_limits<double>::quiet_NaN());
   });
-  return output;
 }
 
 Eigen::MatrixXd slopes_of(const Network& network, const Eigen::VectorXd& coefficients,
@@ -75,10 +73,14 @@ Eigen::MatrixXd slopes_of(const Network& network, const Eigen::VectorXd& coeffic
 
 // N x M outputs of a network; `coefficients` has a column for each run.
 // [[Rcpp::export]]
-Eigen::MatrixXd network_simulate_(Rcpp::List network, Eigen::MatrixXd coefficients, Eigen::MatrixXd drivers,
-                                  Eigen::VectorXd hold, Rcpp::List options, Rcpp::List context) {
-  return network_export::run_all(network_export::read_network(network), coefficients, drivers, hold,
-                                 network_export::read_options(options), amiss::convert::context(context));
+Rcpp::NumericMatrix network_simulate_(Rcpp::List network, Eigen::MatrixXd coefficients,
+                                      Eigen::MatrixXd drivers, Eigen::VectorXd hold, Rcpp::List options,
+                                      Rcpp::List context) {
+  Rcpp::NumericMatrix output(Rcpp::no_init(drivers.rows(), coefficients.cols()));
+  network_export::run_all(network_export::read_network(network), coefficients, drivers, hold,
+                          network_export::read_options(options), amiss::convert::context(context),
+                          {output.begin(), output.nrow(), output.ncol()});
+  return output;
 }
 
 // N x P slopes of one run; `directions` has a column for each parameter.

@@ -113,36 +113,73 @@ class SteadyStart {
   Eigen::ColPivHouseholderQR<MatrixXd> solver_;
 };
 
-// Inputs of all rows, one a row: drivers and the constant one at the start of the row, and what they gain
+// Inputs of some rows, one a column: drivers and the constant one at the start of the row, and what they gain
 // over it.
-MatrixXd inputs_of(const Eigen::Ref<const MatrixXd>& drivers, bool linear) {
-  const Index m = drivers.cols(), rows = drivers.rows();
-  MatrixXd out = MatrixXd::Zero(rows, (linear ? 2 : 1) * (m + 1));
-  out.leftCols(m) = drivers;
-  out.col(m).setOnes();
-  if (!linear) return out;
-  out.block(1, m + 1, rows - 1, m) = out.block(1, 0, rows - 1, m) - out.block(0, 0, rows - 1, m);
-  out.leftCols(m) -= out.middleCols(m + 1, m);
-  return out;
-}
+class Inputs {
+ public:
+  Inputs(const Eigen::Ref<const MatrixXd>& drivers, bool linear)
+      : drivers_(drivers), linear_(linear), block_((linear ? 2 : 1) * (drivers.cols() + 1), kBlock) {
+    block_.setZero();
+    block_.row(drivers.cols()).setOnes();
+  }
 
-// x_1 = A x_0 + f, y = c x_0 + g for the rows [f, g] of `forcing`; of n states, unrolled if they are few.
+  Index size() const { return block_.rows(); }
+  Index rows() const { return drivers_.rows(); }
+
+  /// The first of them are rows from, from + 1, ..., `count` at most.
+  const MatrixXd& of(Index from, Index count) {
+    const Index m = drivers_.cols();
+    for (Index k = 0; k < m; ++k) {
+      if (linear_) {
+        double before = drivers_(std::max<Index>(from - 1, 0), k);
+        for (Index j = 0; j < count; ++j) {
+          const double now = drivers_(from + j, k);
+          block_(k, j) = before;
+          block_(m + 1 + k, j) = now - before;
+          before = now;
+        }
+      } else {
+        for (Index j = 0; j < count; ++j) block_(k, j) = drivers_(from + j, k);
+      }
+    }
+    return block_;
+  }
+
+ private:
+  Eigen::Ref<const MatrixXd> drivers_;
+  bool linear_;
+  MatrixXd block_;
+};
+
+// x_{j+1} = A x_j + B u_j, y_j = c x_j + d u_j for [A B; c d] = p and the first `rows` columns of `inputs`;
+// of n states, unrolled if they are few. Each row waits for the one before: its products are summed in two
+// chains, which run side by side.
 template <int n>
-void recur(const Eigen::Ref<const MatrixXd>& p, const MatrixXd& forcing, VectorXd& state, double* output) {
+void recur(const Eigen::Ref<const MatrixXd>& p, const MatrixXd& inputs, Index rows, VectorXd& state,
+           double* output) {
   const Index high = n == Eigen::Dynamic ? state.size() : n;
   const Eigen::Matrix<double, n, n> a = p.topLeftCorner(high, high);
+  const Eigen::Matrix<double, n, Eigen::Dynamic> b = p.topRightCorner(high, inputs.rows());
   const Eigen::Matrix<double, 1, n> c = p.row(high).head(high);
-  Eigen::Matrix<double, n, 1> x = state, next(high);
-  for (Index j = 0; j < forcing.rows(); ++j) {
-    output[j] = c.dot(x) + forcing(j, high);
-    for (Index i = 0; i < high; ++i) next[i] = forcing(j, i);
-    next.noalias() += a * x;
-    x = next;
+  const Eigen::RowVectorXd d = p.row(high).tail(inputs.rows());
+  Eigen::Matrix<double, n, 1> x = state, even(high), odd(high);
+  for (Index j = 0; j < rows; ++j) {
+    even.setZero();
+    double y = 0.0;
+    for (Index k = 0; k < b.cols(); ++k) {
+      even += b.col(k) * inputs(k, j);
+      y += d[k] * inputs(k, j);
+    }
+    output[j] = y + c.dot(x);
+    odd.setZero();
+    for (Index k = 0; k < high; k += 2) even += a.col(k) * x[k];
+    for (Index k = 1; k < high; k += 2) odd += a.col(k) * x[k];
+    x = even + odd;
   }
   state = x;
 }
 
-using Recursion = void (*)(const Eigen::Ref<const MatrixXd>&, const MatrixXd&, VectorXd&, double*);
+using Recursion = void (*)(const Eigen::Ref<const MatrixXd>&, const MatrixXd&, Index, VectorXd&, double*);
 
 Recursion recursion_of(Index nodes) {
   static const Recursion known[] = {recur<1>, recur<2>, recur<3>, recur<4>,
@@ -153,7 +190,7 @@ Recursion recursion_of(Index nodes) {
 // Goes through the rows, some hundred at a time.
 class Stepper {
  public:
-  Stepper(RowPropagators& propagators, const MatrixXd& inputs, Index nodes, Index directions)
+  Stepper(RowPropagators& propagators, const Inputs& inputs, Index nodes, Index directions)
       : propagators_(propagators), inputs_(inputs), nodes_(nodes), directions_(directions) {}
 
   /// Takes the state over rows [from, to), asked for in ascending order, and writes output and slopes there.
@@ -162,8 +199,8 @@ class Stepper {
       const auto p = propagators_.at(from);
       const Recursion recursion = recursion_of(nodes_);
       for (Index first = from; first < to; first += kBlock) {
-        force(p, first, std::min(kBlock, to - first));
-        recursion(p, forcing_, state.x, run.output.data() + first);
+        const Index count = std::min(kBlock, to - first);
+        recursion(p, inputs_.of(first, count), count, state.x, run.output.data() + first);
       }
     } else {
       for (Index r = from; r < to; ++r) step(state, r, run);
@@ -174,11 +211,11 @@ class Stepper {
   void step(State& state, Index r, Run& run) {
     const auto p = propagators_.at(r);
     const Index high = nodes_ + 1;
+    if (r >= end_) read(p, r);
     if (propagators_.same()) {
-      if (r < first_ || r >= first_ + forcing_.rows()) force(p, r, std::min(kBlock, inputs_.rows() - r));
-      moved_ = forcing_.row(r - first_);
+      moved_ = forcing_.col(r - first_);
     } else {
-      moved_.noalias() = p.rightCols(inputs_.cols()) * inputs_.row(r).transpose();
+      moved_.noalias() = p.rightCols(inputs_.size()) * block_->col(r - first_);
     }
     moved_.noalias() += p.leftCols(nodes_) * state.x;
     Eigen::Map<MatrixXd> all(moved_.data(), high, 1 + directions_);
@@ -191,17 +228,21 @@ class Stepper {
     run.output[r] = moved_[nodes_];
   }
 
-  // What inputs bring to each quantity, one a column.
-  void force(const Eigen::Map<const MatrixXd>& p, Index from, Index count) {
+  // Inputs of the next rows and, if propagators are the same, what they bring to each quantity, a row a
+  // column.
+  void read(const Eigen::Map<const MatrixXd>& p, Index from) {
     first_ = from;
-    forcing_.noalias() = inputs_.middleRows(from, count) * p.rightCols(inputs_.cols()).transpose();
+    end_ = std::min(from + kBlock, inputs_.rows());
+    block_ = &inputs_.of(from, end_ - from);
+    if (propagators_.same()) forcing_.noalias() = p.rightCols(inputs_.size()) * block_->leftCols(end_ - from);
   }
 
   RowPropagators& propagators_;
-  const MatrixXd& inputs_;
+  Inputs inputs_;
   Index nodes_, directions_;
+  const MatrixXd* block_ = nullptr;
+  Index first_ = 0, end_ = 0;
   MatrixXd forcing_;
-  Index first_ = 0;
   VectorXd moved_;
 };
 
@@ -240,7 +281,7 @@ Run simulate(const Network& network, const Coefficients& coefficients,
   State state = SteadyStart(network, coefficients, drivers_before(coefficients, drivers, options), given,
                             1e5 / options.step_h)
                     .state(directions);
-  const MatrixXd inputs = inputs_of(drivers, options.linear);
+  const Inputs inputs(drivers, options.linear);
   const auto count = static_cast<Index>(directions.size());
   Row row{options.step_h, options.linear, options.mean, -1};
   RowPropagators free(network, coefficients, directions, drivers, row);

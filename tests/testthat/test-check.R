@@ -82,6 +82,20 @@ test_that("spoiled coefficients fail the check, and the calibration says why it 
   expect_match(printed(fit), "not good enough")
 })
 
+# The error is a tenth of the noise in every row. As it has the signs of what the simulation leaves,
+# the likelihoods of 240 rows differ by 0.1 x 240 E|e| = 19 nats together, or by 1 less or more.
+test_that("a small error that changes the likelihood by many nats fails the check", {
+  data <- linear_data()
+  best <- stats::fitted(stats::lm(Ti ~ Te, data))
+  for (towards in c(-1, 1)) {
+    fit <- checked(function(k, y) y + towards * 0.01 * sign(data$Ti - best))
+    expect_lt(fit$check$ratio, 1 / 3)
+    expect_equal(towards * fit$check$correction, 19, tolerance = 0.3)
+    expect_false(fit$check$passed)
+    expect_match(fit$trust$verdict, paste("nats", if (towards > 0) "more" else "less", "likely"))
+  }
+})
+
 test_that("too few runs fail the check", {
   m <- bent_measurements()
   fit <- calibrate(train_emulator(simulate_design(bent_simulator(), m, runs = 6, seed = 1), m), m,

@@ -23,12 +23,15 @@ MatrixXd weighted_covariance(const MatrixXd& x, const VectorXd& weights, const V
   return covariance.selfadjointView<Eigen::Lower>();
 }
 
-// Lower Cholesky factor of a covariance estimated from `points` points, shrunk towards its diagonal.
+// Lower Cholesky factor of a covariance estimated from `points` points. That of few points is shrunk towards
+// its diagonal; shrinking that of many would leave a ball of a thin ridge.
 MatrixXd shrunk_root(MatrixXd covariance, double points) {
   const double d = static_cast<double>(covariance.rows());
   const VectorXd diagonal = covariance.diagonal().cwiseMax(1e-12);
-  covariance *= points / (points + d);
-  covariance.diagonal() = diagonal;
+  if (points < 2.0 * d) {
+    covariance *= points / (points + d);
+    covariance.diagonal() = diagonal;
+  }
   Eigen::LLT<MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return diagonal.cwiseSqrt().asDiagonal();
   return factor.matrixL();
