@@ -51,7 +51,8 @@
 #'   * `log_evidence`, `standard_error`, `interval` (95 %).
 #'   * `annealed`, `second`: estimate and standard error of each estimator.
 #'   * `ladder`, `evaluations`.
-#'   * `trusted`, `verdict`.
+#'   * `trusted`, `verdict`: what the sampler sees of its own work. A mode that it has not seen
+#'     leaves no sign.
 #' @source Neal (2001), Annealed importance sampling, Statistics and Computing 11, 125-139. Del
 #'   Moral, Doucet and Jasra (2006), Sequential Monte Carlo samplers, Journal of the Royal
 #'   Statistical Society B 68, 411-436 (the pilot). Rodriguez and Laio (2014), Clustering by fast

@@ -218,14 +218,14 @@ local_moves <- function(model, k) {
        unit = unit)
 }
 
-# Runs inside the region or, if they are few, the nearest ones.
+# Runs inside the region, or the nearest ones if they are few or too many.
 record_ensemble <- function(model, k, region) {
   own <- model$own[[k]]
   record <- model$records[[k]]
   rows <- model$rows[[k]]
   distance <- ifelse(succeeded(model), straight_distance(model), Inf)
   nearest <- order(distance)
-  inside <- sum(distance <= 1)
+  inside <- min(sum(distance <= 1), rules$most_training)
   wanted <- nearest[seq_len(max(inside, min(least_training(own), sum(is.finite(distance)))))]
   wanted <- sort(wanted[!duplicated(model$runs$z[wanted, own, drop = FALSE])])
   parameters <- model$parameters[own]

@@ -134,6 +134,8 @@ rule_table <- list(
                        "runs outside the region help where few lie in it", "bench/seeds.R"),
   training_spare = rule(3, "runs", "the same beyond the number of parameters",
                         "more than slopes and a mean can take up", "bench/seeds.R"),
+  most_training = rule(200, "runs", "most runs that train a local emulator",
+                       "the time that it takes grows as their cube", "bench/crude.R"),
   filled_share = rule(0.5, "share", "of the runs wanted in a region that must be in it for a check",
                       "with fewer it has moved away from its runs", "bench/seeds.R"),
   more_runs = rule(20, "runs", "further runs in a region if the check fails",
