@@ -101,7 +101,7 @@ with_key_rows <- function(plot, width, scale, family) {
   rows <- ceiling(sum(text_inches(labels, points, "plain", family) + key_inches) / width)
   if (rows < 2) return(plot)
   keys <- ggplot2::guide_legend(nrow = rows, byrow = TRUE)
-  plot + ggplot2::guides(colour = keys, shape = keys, size = keys)
+  plot + ggplot2::guides(colour = keys, fill = keys, shape = keys, size = keys)
 }
 
 # ---- measuring

@@ -131,7 +131,7 @@ correlation_words <- function(measurements, a, b) {
 
 called_for <- function(parameters) {
   if (!NROW(parameters)) return("no value that could be checked")
-  listed(sprintf("a %s of %s", parameters$name,
+  listed(sprintf("%s of %s", with_article(parameters$label %||% parameters$name),
                  with_unit(interval_words(parameters$lower95, parameters$upper95),
                            parameters$unit)))
 }

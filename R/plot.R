@@ -1,6 +1,6 @@
 figure_names <- c("fit", "attribution", "candidates", "explained", "parameters", "discrepancy",
                   "response", "gain", "mean_day", "priors", "moved", "steps", "missing", "emulator",
-                  "residuals", "sampler", "modes")
+                  "residuals", "sampler", "modes", "runs")
 
 # Of several records each has its own.
 record_figure_names <- c("fit", "attribution", "discrepancy", "response", "mean_day", "missing",
@@ -37,6 +37,7 @@ calibration_figures <- c("parameters", "residuals", "modes")
 #'   * `"residuals"`: whether the last model's error is as the error model says, see *Residuals*.
 #'   * `"sampler"`: how the annealing went.
 #'   * `"modes"`: the modes of the last model's posterior, and the ends of searches.
+#'   * `"runs"`: what the runs of the simulator were spent on.
 #'
 #'   If an upgrade has several records, figures that show a series are of one record: `"fit of
 #'   NAME"`. `"fit"` then shows the first record.
@@ -213,7 +214,8 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
          emulator = figure_emulator(lapply(stages, `[[`, "fit")),
          residuals = figure_residuals(stages[[length(stages)]]$fit),
          sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)),
-         modes = figure_modes(stages[[length(stages)]]$fit))
+         modes = figure_modes(stages[[length(stages)]]$fit),
+         runs = figure_runs(upgrade))
 }
 
 # Names of the figures that an object has.

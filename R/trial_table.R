@@ -78,6 +78,7 @@ keeps_error <- function(table) !is.na(table$error_ratio) & table$error_ratio > r
 # Estimates of the parameters that a mechanism brought with it.
 added_parameters <- function(fit, parent) {
   table <- parameter_table(fit)
+  table$label <- parameter_labels(fit, table$name)
   table[!table$name %in% names(drawn_parameters(parent)), ]
 }
 

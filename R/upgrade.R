@@ -106,7 +106,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   * `judged_by`: `"runs"` for mechanisms that were verified, `"trial"` for the others, `"none"`
 #'     for those that could not be tried.
 #'   * `runs`: the runs of the simulator that the mechanism took.
-#'   * `parameters`: the estimates of its parameters.
+#'   * `parameters`: the estimates of its parameters, with labels and units.
 #'
 #' @section Models: Each model that adopted a mechanism has a `verdict`:
 #'   * `"named"`;

@@ -25,6 +25,8 @@ listed <- function(x, last = "and", none = "nothing") {
   else paste(paste(x[-length(x)], collapse = ", "), last, x[length(x)])
 }
 
+with_article <- function(x) paste(ifelse(grepl("^[aeio]", x, ignore.case = TRUE), "an", "a"), x)
+
 # A few significant digits, not in powers of ten unless very far from one.
 short <- function(x, digits = 2) {
   far <- abs(x) >= 1e7 | (abs(x) < 1e-4 & x != 0)

@@ -152,7 +152,7 @@ parameter_covered <- function(world, upgrade, which) {
   true <- world$effects[[first]]
   own <- last[last$term == names(true)[1], ]
   ends <- own[paste0(which, c(".low", ".high"))]
-  ends[[1]] <= true[[1]] && true[[1]] <= ends[[2]]
+  any(ends[[1]] <= true[[1]] & true[[1]] <= ends[[2]])  # a row for each mode
 }
 
 # What is done today: the residuals of the calibrated base model held against each condition. The

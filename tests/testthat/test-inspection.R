@@ -41,7 +41,7 @@ test_that("rivals are distinguished by what only one of them responds to, or on 
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- "Gv"
   expect_match(about(inspected(upgrade), "rival"),
                paste("only a check on site can distinguish them: the first needs a",
-                     "sun_gain of 0.00"))
+                     "gain of the sun of 0.00"))
   upgrade$models[[2]]$confounded_with <- "gain"
   expect_match(about(inspected(upgrade), "tied"),
                paste("The estimate of sun \\(gain of the sun\\) is correlated with gain:",
@@ -99,7 +99,7 @@ test_that("conditions that go together, answers without a mechanism and absent d
   expect_match(answers(-1, 0.7),
                paste("Gv\\. With sun, which it drives, the error falls to 70 % of what it is, but",
                      "an unknown response to Gv would explain this as well \\(log10 Bayes factor",
-                     "beside it: [-+0-9.]+\\). Check on site whether there is a sun_gain"),
+                     "beside it: [-+0-9.]+\\). Check on site whether there is a gain of the sun"),
                all = FALSE)
   expect_match(answers(1, 0.7), "responds to Gv: sun may be why, and is not decided", all = FALSE)
   plain <- upgrade$catalogue

@@ -9,6 +9,11 @@ test_that("units have their powers, and other digits stay", {
   expect_equal(amiss:::change_words(1, 2, ""), "rises from 1.0 to 2.0")
 })
 
+test_that("a name has the article of its sound", {
+  expect_identical(amiss:::with_article(c("window", "Opening", "uniform share")),
+                   c("a window", "an Opening", "a uniform share"))
+})
+
 test_that("the ends of an interval are distinguished", {
   expect_equal(amiss:::interval_words(c(0.351, 1), c(0.353, 2)), c("0.351 to 0.353", "1.0 to 2.0"))
   expect_equal(amiss:::interval_words(3, 3), "3.0 to 3.0")
