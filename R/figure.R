@@ -58,13 +58,6 @@ figure_theme <- function() {
       legend.margin = ggplot2::margin(0, 0, 0, 0))
 }
 
-# A first word with a capital, unless it is a name such as x2 or Te.
-capital <- function(text) {
-  word <- regmatches(text, regexpr("^[[:lower:]-]{2,}(?=[ ,;:]|$)", text, perl = TRUE))
-  if (length(word)) substr(text, 1, 1) <- toupper(substr(text, 1, 1))
-  text
-}
-
 figure_titles <- function(title, subtitle = NULL, x = NULL, y = NULL) {
   ggplot2::labs(title = capital(title), subtitle = subtitle, x = x, y = y)
 }

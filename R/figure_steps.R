@@ -24,12 +24,13 @@ figure_steps <- function(upgrade) {
   shown <- table[table$use == use[length(use)], ]
   drop <- -diff(shown$rmse)
   best <- which.max(drop)
-  title <- if (drop[best] <= 0) sprintf("No step lowers the typical error (%s)", use[length(use)])
+  change <- change_words(shown$rmse[best], shown$rmse[best + 1], m$unit)
+  title <- if (!startsWith(change, "falls"))
+             sprintf("No step lowers the typical error (%s)", use[length(use)])
            else sprintf("%s %s: the typical error (%s) %s",
                         sub("^\\+ ", "", as.character(shown$step[best + 1])),
                         if (length(drop) > 1) "brings most" else "lowers the error",
-                        use[length(use)],
-                        change_words(shown$rmse[best], shown$rmse[best + 1], m$unit))
+                        use[length(use)], change)
   noise <- if (any(table$rmse < m$noise_sd))
              paste("the stated noise; errors left of it suggest that the measurements are less",
                    "noisy than stated.")

@@ -362,7 +362,7 @@ tried_words <- function(driven) {
   sprintf(paste("The error still responds to %s. %s, which %s, %s tried but not adopted: look for",
                 "another way in which %s. The best days for this are those on which %s changes",
                 "and the other conditions hardly change."),
-          listed(names(driven)), listed(tried), if (several) "they drive" else "it drives",
+          listed(names(driven)), capital(listed(tried)), if (several) "they drive" else "it drives",
           if (length(tried) > 1) "were" else "was",
           if (several) "they act" else paste(names(driven), "acts"),
           if (several) "one of them" else "it")

@@ -17,7 +17,8 @@ inspection_ranks <- function() {
 # The sentences by rank; an id without a place is last.
 ranked <- function(told) {
   place <- match(names(told), unlist(inspection_ranks()), nomatch = .Machine$integer.max)
-  told[order(place)]
+  told <- told[order(place)]
+  stats::setNames(capital(told), names(told))
 }
 
 first_inspections <- function(told) utils::head(told, inspections_first)

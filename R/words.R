@@ -25,6 +25,10 @@ listed <- function(x, last = "and", none = "nothing") {
   else paste(paste(x[-length(x)], collapse = ", "), last, x[length(x)])
 }
 
+# A first word with a capital, unless it is a name such as x2 or Te.
+capital <- function(text)
+  sub("^([[:lower:]])(?=[[:lower:]-]+([ ,;:]|$))", "\\U\\1", text, perl = TRUE)
+
 with_article <- function(x) paste(ifelse(grepl("^[aeio]", x, ignore.case = TRUE), "an", "a"), x)
 
 # A few significant digits, not in powers of ten unless very far from one.

@@ -37,7 +37,7 @@ test_that("rivals are distinguished by what only one of them responds to, or on 
   expect_match(summary(upgrade)$mechanisms[[1]]$also, "drift \\(30 %\\)", all = FALSE)
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- character()
   expect_match(about(inspected(upgrade), "rival"),
-               "^sun and drift respond to no condition that was measured, so only a check on site")
+               "^Sun and drift respond to no condition that was measured, so only a check on site")
   upgrade$catalogue$drift$boundary <- upgrade$catalogue$sun$boundary <- "Gv"
   expect_match(about(inspected(upgrade), "rival"),
                paste("only a check on site can distinguish them: the first needs a",
@@ -51,7 +51,7 @@ test_that("rivals are distinguished by what only one of them responds to, or on 
 test_that("a stand-in and a drifting sensor have tests of their own", {
   upgrade <- small_upgrade()
   upgrade$models[[2]]$verdict <- "stand-in"
-  expect_match(about(inspected(upgrade), "stand_in"), "^sun probably stands in for another cause")
+  expect_match(about(inspected(upgrade), "stand_in"), "^Sun probably stands in for another cause")
   expect_length(about(inspected(upgrade), "site"), 0)
   upgrade$models[[2]]$doubts <- c(slow = "anything that changes slowly would explain the error too")
   expect_match(about(inspected(upgrade), "drift"),
@@ -93,7 +93,7 @@ test_that("conditions that go together, answers without a mechanism and absent d
     about(inspected(upgrade), "answer")
   }
   expect_match(answers(-1, 0.9),
-               paste("responds to (Gv and Te|Te and Gv)\\. (sun and drift|drift and sun), which",
+               paste("responds to (Gv and Te|Te and Gv)\\. (Sun and drift|Drift and sun), which",
                      "they drive, were tried but not adopted"))
   expect_length(answers(-1, 0.9), 1)
   expect_match(answers(-1, 0.7),
@@ -123,7 +123,7 @@ test_that("conditions that go together, answers without a mechanism and absent d
   expect_no_match(amiss:::group_words(upgrade$models[[1]]$attribution), "correlation")
   upgrade$catalogue$sun$boundary <- c("Gv", "wind")
   expect_match(about(inspected(upgrade), "driver"),
-               "^wind drives sun, but is not analysed: name it in boundary")
+               "^Wind drives sun, but is not analysed: name it in boundary")
 })
 
 test_that("a candidate that is near is named with what would decide it", {
@@ -342,7 +342,7 @@ test_that("what asks for the same action is one sentence", {
   expect_match(about(told, "step"), "before you believe in sun or moon")
   for (k in 2:3) upgrade$models[[k]]$verdict <- "stand-in"
   expect_match(about(inspected(upgrade), "stand_in"),
-               "^sun and moon probably stand in for another cause")
+               "^Sun and moon probably stand in for another cause")
   upgrade <- base_only(upgrade)
   upgrade$catalogue <- upgrade$catalogue["moon"]
   upgrade$models[[1]]$attribution$table[c("significant", "group")] <- list(TRUE, NA_character_)

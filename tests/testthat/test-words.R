@@ -14,6 +14,11 @@ test_that("a name has the article of its sound", {
                    c("a window", "an Opening", "a uniform share"))
 })
 
+test_that("sentences begin with a capital, names of code stay", {
+  expect_identical(amiss:::capital(c("heater lag fits", "x2 moves", "Te", "a", "k_out moves")),
+                   c("Heater lag fits", "x2 moves", "Te", "a", "k_out moves"))
+})
+
 test_that("the ends of an interval are distinguished", {
   expect_equal(amiss:::interval_words(c(0.351, 1), c(0.353, 2)), c("0.351 to 0.353", "1.0 to 2.0"))
   expect_equal(amiss:::interval_words(3, 3), "3.0 to 3.0")
