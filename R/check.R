@@ -178,10 +178,10 @@ exact_evidence <- function(fits, made, threads) {
 
 corrected <- function(fit, effective, gain, share, error) {
   fit$check$effective <- effective
-  doubt <- if (effective < rules$effective)
+  doubt <- if (!isTRUE(effective >= rules$effective))
              sprintf("few of these runs are as likely as it says (effective share %.2f)", effective)
            # points that it takes for so much less likely may be the likelier ones
-           else if (abs(gain) > rules$mode_depth)
+           else if (!isTRUE(abs(gain) <= rules$mode_depth))
              sprintf("these runs are %.0f nats %s likely than it says", abs(gain),
                      if (gain < 0) "less" else "more")
   if (fit$check$passed && !is.null(doubt)) {

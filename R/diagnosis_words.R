@@ -62,23 +62,26 @@ sure_sentences <- function(upgrade) {
 }
 
 raised_sentence <- function(row, when = "") {
-  sprintf(paste("%s was not adopted%s: with it the simulation's own error in calibration does not",
-                "fall by 1 %% (it is %s times as large). Only the discrepancy fits better."),
-          row$mechanism, when, short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2))
+  capital(sprintf(
+    paste("%s was not adopted%s: with it the simulation's own error in calibration does not fall",
+          "by 1 %% (it is %s times as large). Only the discrepancy fits better."),
+    row$mechanism, when, short(row$error_ratio, if (row$error_ratio < 1.05) 3 else 2)))
 }
 
 # Of two that may be adopted, the one with the larger factor need not rank higher.
 outranked_sentence <- function(row, best) {
   if (row$judged_by != "runs" || is_refuted(row) || row$log10_bf <= best$log10_bf) return(NULL)
-  sprintf(paste("%s has larger odds over no change. But if no model may respond to the conditions",
-                "in an unknown way, %s explains the record better: odds of %s."),
-          row$mechanism, best$mechanism, odds(best$standing - row$standing))
+  capital(sprintf(
+    paste("%s has larger odds over no change. But if no model may respond to the conditions in an",
+          "unknown way, %s explains the record better: odds of %s."),
+    row$mechanism, best$mechanism, odds(best$standing - row$standing)))
 }
 
 refuted_sentence <- function(row) {
-  sprintf(paste("%s was not adopted, because an unknown response to what drives it explains the",
-                "error better: if both models have such a response, its log10 Bayes factor is %s."),
-          row$mechanism, signed(row$beside_unknown))
+  capital(sprintf(
+    paste("%s was not adopted, because an unknown response to what drives it explains the error",
+          "better: if both models have such a response, its log10 Bayes factor is %s."),
+    row$mechanism, signed(row$beside_unknown)))
 }
 
 unjudged_sentence <- function(fit) {

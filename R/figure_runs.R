@@ -1,7 +1,7 @@
 # What the runs of the simulator were spent on.
 
-# Runs of the base model, of each trial, and of what was adopted, which is searched and checked once
-# more. `to`: the model that a mechanism was added to.
+# Runs of the base model, of each trial, and the rest: checks of trials that may win, and whether
+# what was adopted is still needed. `to`: the model that a mechanism was added to.
 runs_table <- function(upgrade) {
   trials <- upgrade$candidates
   adopted <- as.character(unlist(lapply(upgrade$models, `[[`, "mechanism")))
@@ -9,7 +9,7 @@ runs_table <- function(upgrade) {
   to <- c("added to the base model", paste("added after", adopted, recycle0 = TRUE))
   base <- upgrade$models[[1]]$fit$runs_made %||% 0
   rest <- upgrade$runs_total - base - sum(trials$runs)
-  table <- data.frame(row = c("the base model", trials$mechanism, "what was adopted, once more"),
+  table <- data.frame(row = c("the base model", trials$mechanism, "checks and comparisons"),
                       to = c("models as a whole", to[step], "models as a whole"),
                       runs = c(base, trials$runs, rest))
   table$to <- factor(table$to, c("models as a whole", to))
@@ -30,7 +30,7 @@ figure_runs <- function(upgrade) {
     return(figure_of_nothing("No run of the simulator was made"))
   table <- runs_table(upgrade)
   sums <- stats::aggregate(runs ~ row, table, sum)
-  ends <- c("what was adopted, once more", "the base model")
+  ends <- c("checks and comparisons", "the base model")
   tried <- sums[!sums$row %in% ends, ]
   table$row <- factor(table$row, c(ends[1], tried$row[order(tried$runs)], ends[2]))
   shades <- c("grey35", stage_colours[["after"]],

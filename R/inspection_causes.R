@@ -28,7 +28,8 @@ step_inspection <- function(upgrade, adopted, last = NULL) {
   if (!length(doubted) && !length(times) && !coarse) return(NULL)
   mended <- c(doubted, names(times))
   reasons <- c(
-    if (length(doubted)) sprintf("%s may only correct for its coarse steps.", listed(doubted)),
+    if (length(doubted))
+      sprintf("%s may only correct for its coarse steps.", capital(listed(doubted))),
     if (length(times))
       sprintf(paste("The time%s of %s %s about a step of the record, and coarse steps make an",
                     "error of the same shape."), if (length(times) > 1) "s" else "",
@@ -389,14 +390,14 @@ driver_inspections <- function(upgrade) {
       vapply(upgrade$catalogue, function(m) any(m$boundary %in% conditions), NA)])
   }
   c(if (length(constant)) {
-      c(constant = sprintf(paste("%s did not vary in calibration, so %s cannot be judged:",
+      c(constant = sprintf(paste("In calibration %s did not vary, so %s cannot be judged:",
                                  "calibrate on rows with changes."),
                            listed(constant), driven_by(constant)))
     },
     if (length(absent)) {
       c(driver = sprintf(
-        paste("%s %s %s, but %s not analysed: name %s in boundary of measurements(), to see",
-              "whether the error responds to %s."),
+        paste("In the catalogue %s %s %s, but %s not analysed: name %s in boundary of",
+              "measurements(), to see whether the error responds to %s."),
         listed(absent), if (length(absent) > 1) "drive" else "drives", driven_by(absent),
         if (length(absent) > 1) "are" else "is", if (length(absent) > 1) "them" else "it",
         if (length(absent) > 1) "them" else "it"))

@@ -29,7 +29,10 @@ listed <- function(x, last = "and", none = "nothing") {
 capital <- function(text)
   sub("^([[:lower:]])(?=[[:lower:]-]+([ ,;:]|$))", "\\U\\1", text, perl = TRUE)
 
-with_article <- function(x) paste(ifelse(grepl("^[aeio]", x, ignore.case = TRUE), "an", "a"), x)
+with_article <- function(x) {
+  begins_open <- grepl("^(?!(uni[^n]|us|eu|one))([aeiou]|hour)", x, ignore.case = TRUE, perl = TRUE)
+  paste(ifelse(begins_open, "an", "a"), x)
+}
 
 # A few significant digits, not in powers of ten unless very far from one.
 short <- function(x, digits = 2) {

@@ -123,7 +123,7 @@ test_that("conditions that go together, answers without a mechanism and absent d
   expect_no_match(amiss:::group_words(upgrade$models[[1]]$attribution), "correlation")
   upgrade$catalogue$sun$boundary <- c("Gv", "wind")
   expect_match(about(inspected(upgrade), "driver"),
-               "^Wind drives sun, but is not analysed: name it in boundary")
+               "^In the catalogue wind drives sun, but is not analysed: name it in boundary")
 })
 
 test_that("a candidate that is near is named with what would decide it", {

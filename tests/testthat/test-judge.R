@@ -307,7 +307,7 @@ test_that(
   told <- summary(upgrade)
   expect_match(
     paste(told$sure, collapse = " "),
-    "sun was not adopted: with it the simulation's own error .* does not fall by 1 % \\(it is 1.9")
+    "Sun was not adopted: with it the simulation's own error .* does not fall by 1 % \\(it is 1.9")
   expect_match(told$candidates[["error in calibration"]], "1.9 times", all = FALSE)
   expect_match(ggplot2::autoplot(upgrade, "candidates")$labels$title,
                "the best does not lower the error")
@@ -436,8 +436,9 @@ test_that("why the one of highest evidence was not adopted is told", {
   upgrade$candidates$error_ratio[other] <- 1.2
   told <- paste(summary(upgrade)$sure, collapse = " ")
   expect_match(
-    told, paste(upgrade$candidates$mechanism[other][1], "was not adopted first: with it the",
-                "simulation's own error in calibration does not fall by 1 % \\(it is 1.2 times"))
+    told, paste(capital(upgrade$candidates$mechanism[other][1]),
+                "was not adopted first: with it the simulation's own error in calibration does not",
+                "fall by 1 % \\(it is 1.2 times"))
   upgrade$candidates$error_ratio[other] <- 0.9
   expect_no_match(paste(summary(upgrade)$sure, collapse = " "), "not adopted first")
 })

@@ -200,7 +200,7 @@ test_that(
   upgrade$measurements$constant <- "Gv"
   upgrade$measurements$conditions <- "Te"
   asked <- amiss:::driver_inspections(upgrade)
-  expect_match(asked[["constant"]], "Gv did not vary in calibration, so sun cannot be judged")
+  expect_match(asked[["constant"]], "In calibration Gv did not vary, so sun cannot be judged")
   expect_false("driver" %in% names(asked))
 })
 

@@ -10,8 +10,10 @@ test_that("units have their powers, and other digits stay", {
 })
 
 test_that("a name has the article of its sound", {
-  expect_identical(amiss:::with_article(c("window", "Opening", "uniform share")),
-                   c("a window", "an Opening", "a uniform share"))
+  expect_identical(amiss:::with_article(c("window", "Opening", "uniform share", "unknown leak",
+                                          "one-way flow", "hour")),
+                   c("a window", "an Opening", "a uniform share", "an unknown leak",
+                     "a one-way flow", "an hour"))
 })
 
 test_that("sentences begin with a capital, names of code stay", {

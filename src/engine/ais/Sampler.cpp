@@ -44,14 +44,6 @@ void report(AisResult& result, Estimator estimator, const AnnealedRun& run) {
   report(result, estimator, run.log_evidence(), run.spread());
 }
 
-// Both estimates of Z are unbiased, so each is seldom too large (Markov: Z_hat > k Z with probability below 1
-// / k) and easily too small. Another estimate below the one reported is no objection to it; one above says
-// that the one reported misses part of the posterior.
-bool consistent(const AisResult& result) {
-  const double other = result.estimator == Estimator::annealed ? result.second : result.annealed;
-  return other - result.log_evidence < 3.5 * std::hypot(result.annealed_se, result.second_se) + 0.1;
-}
-
 // The second estimator, and the report of the better one: the importance sample or, where no mixture comes
 // close to the posterior, the annealed run from the prior or the one that goes the short way from the
 // mixture.
@@ -88,16 +80,15 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   result.second_se = bridged.spread().se;
   report(result, Estimator::bridged, bridged);
   result.second_ess = result.ess;
-  result.annealed = annealed.log_evidence();
-  result.annealed_se = annealed.spread().se;
   if (!shorter) report(result, Estimator::annealed, annealed);
 
   // The estimate that is not reported lies above the other: it has seen what that one missed, or is loose. A
   // third run, from a mixture fitted to the draws of both, decides.
   const AnnealedRun& reported = shorter ? bridged : annealed;
   const AnnealedRun& other = shorter ? annealed : bridged;
-  const double doubt = kDoubt * std::max(reported.spread().se, options.precision);
-  if (other.log_evidence() <= reported.log_evidence() + doubt && consistent(result)) return;
+  if (!(other.log_evidence() >
+        reported.log_evidence() + kDoubt * std::max(reported.spread().se, options.precision)))
+    return;
   DrawPool both;
   for (const AnnealedRun* run : {&annealed, &bridged}) {
     MatrixXd x;
@@ -111,6 +102,14 @@ void second_estimator(const Target& target, const AisOptions& options, const Con
   result.evaluations += third.evaluations();
   report(result, Estimator::bridged, third);
   result.second_ess = result.ess;
+}
+
+// Both estimates of Z are unbiased, so each is seldom too large (Markov: Z_hat > k Z with probability below 1
+// / k) and easily too small. Another estimate below the one reported is no objection to it; one above says
+// that the one reported misses part of the posterior.
+bool consistent(const AisResult& result) {
+  const double other = result.estimator == Estimator::annealed ? result.second : result.annealed;
+  return other - result.log_evidence < 3.5 * std::hypot(result.annealed_se, result.second_se) + 0.1;
 }
 
 Outcome judge(const AisResult& result, const AisOptions& options) {

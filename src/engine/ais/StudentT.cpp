@@ -23,15 +23,12 @@ MatrixXd weighted_covariance(const MatrixXd& x, const VectorXd& weights, const V
   return covariance.selfadjointView<Eigen::Lower>();
 }
 
-// Lower Cholesky factor of a covariance estimated from `points` points. That of few points is shrunk towards
-// its diagonal; shrinking that of many would leave a ball of a thin ridge.
+// Lower Cholesky factor of a covariance estimated from `points` points, shrunk towards its diagonal.
 MatrixXd shrunk_root(MatrixXd covariance, double points) {
   const double d = static_cast<double>(covariance.rows());
   const VectorXd diagonal = covariance.diagonal().cwiseMax(1e-12);
-  if (points < 2.0 * d) {
-    covariance *= points / (points + d);
-    covariance.diagonal() = diagonal;
-  }
+  covariance *= points / (points + d);
+  covariance.diagonal() = diagonal;
   Eigen::LLT<MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return diagonal.cwiseSqrt().asDiagonal();
   return factor.matrixL();

@@ -10,8 +10,8 @@ class StudentT {
  public:
   StudentT(Eigen::VectorXd location, Eigen::MatrixXd root, double dof);
 
-  /// Fitted by moments to weighted points (columns of x; weights sum to 1). The covariance of fewer than 2 d
-  /// points is shrunk towards its diagonal by d / (d + number of points), so that it is usable.
+  /// Fitted by moments to weighted points (columns of x; weights sum to 1), the covariance shrunk towards its
+  /// diagonal by d / (d + number of points), so that few points in many dimensions give a usable one.
   static StudentT fit(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, double dof);
 
   Eigen::VectorXd log_densities(const Eigen::MatrixXd& x) const;  ///< of each column of x

@@ -50,25 +50,6 @@ TEST(SampleAis, MixturesFollowABentRidge) {
   }
 }
 
-// Ten coordinates, in directions that are not the axes: a straight ridge, its thinnest direction a
-// ten-thousandth of its length. Of correlations shrunk by a tenth nothing of it is left.
-TEST(SampleAis, MixturesLieAlongAStraightRidge) {
-  const Index d = 10;
-  const MatrixXd axes = Eigen::HouseholderQR<MatrixXd>(normal_matrix(d, d, 81)).householderQ();
-  const VectorXd narrower = pow(10.0, VectorXd::LinSpaced(d, 0.0, 4.0).array());
-  const MatrixXd by = narrower.asDiagonal() * axes.transpose();
-  const FunctionTarget ridge{d, [&](const VectorXd& x) {
-                               return 0.5 * x.squaredNorm() - 0.5 * (by * x).squaredNorm() +
-                                      narrower.array().log().sum();
-                             }};
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const AisResult result = sample_ais(ridge, {}, seeded(seed));
-    EXPECT_EQ(result.estimator, Estimator::importance);
-    EXPECT_GT(result.ess, 0.5 * static_cast<double>(result.draws.cols()));
-    expect_evidence(result, 0.0);
-  }
-}
-
 TEST(SampleAis, ImportanceSampleGrowsUntilEnoughDrawsAreEffective) {
   AisOptions options;
   options.refit_draws = 200;
