@@ -180,7 +180,7 @@ corrected <- function(fit, effective, gain, share, error) {
   fit$check$effective <- effective
   doubt <- if (!isTRUE(effective >= rules$effective))
              sprintf("few of these runs are as likely as it says (effective share %.2f)", effective)
-           # points that it takes for so much less likely may be the likelier ones
+           # what it takes for impossible may then be likeliest
            else if (!isTRUE(abs(gain) <= rules$mode_depth))
              sprintf("these runs are %.0f nats %s likely than it says", abs(gain),
                      if (gain < 0) "less" else "more")

@@ -46,8 +46,8 @@ figure_runs <- function(upgrade) {
     ggplot2::scale_x_continuous(expand = ggplot2::expansion(c(0, 0.02)), guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.5)) +
     figure_titles(runs_title(upgrade, table),
-                  paste("What may be the cause is run until its evidence is certain; what cannot",
-                        "win is given up after a few runs."), x = "runs of the simulator") +
+                  paste("A trial that cannot win is given up after a few runs. Checks and",
+                        "comparisons verify those that may."), x = "runs of the simulator") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), counts)
   figure <- with_keys(figure, levels(table$to))

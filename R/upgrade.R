@@ -105,7 +105,7 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #'   * `trusted`: whether the numbers can be believed.
 #'   * `judged_by`: `"runs"` for mechanisms that were verified, `"trial"` for the others, `"none"`
 #'     for those that could not be tried.
-#'   * `runs`: the runs of the simulator that the mechanism took.
+#'   * `runs`: the runs of the simulator that its trial took, without those that verified it.
 #'   * `parameters`: the estimates of its parameters, with labels and units.
 #'
 #' @section Models: Each model that adopted a mechanism has a `verdict`:
