@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "network/RowPropagators.hpp"
 
@@ -190,8 +191,8 @@ Recursion recursion_of(Index nodes) {
 // Goes through the rows, some hundred at a time.
 class Stepper {
  public:
-  Stepper(RowPropagators& propagators, const Inputs& inputs, Index nodes, Index directions)
-      : propagators_(propagators), inputs_(inputs), nodes_(nodes), directions_(directions) {}
+  Stepper(RowPropagators& propagators, Inputs inputs, Index nodes, Index directions)
+      : propagators_(propagators), inputs_(std::move(inputs)), nodes_(nodes), directions_(directions) {}
 
   /// Takes the state over rows [from, to), asked for in ascending order, and writes output and slopes there.
   void run(State& state, Index from, Index to, Run& run) {
@@ -281,11 +282,10 @@ Run simulate(const Network& network, const Coefficients& coefficients,
   State state = SteadyStart(network, coefficients, drivers_before(coefficients, drivers, options), given,
                             1e5 / options.step_h)
                     .state(directions);
-  const Inputs inputs(drivers, options.linear);
   const auto count = static_cast<Index>(directions.size());
   Row row{options.step_h, options.linear, options.mean, -1};
   RowPropagators free(network, coefficients, directions, drivers, row);
-  Stepper freely(free, inputs, network.nodes, count);
+  Stepper freely(free, {drivers, options.linear}, network.nodes, count);
   row.held = output_node;
   std::optional<RowPropagators> held;
   std::optional<Stepper> holding;
@@ -300,7 +300,7 @@ Run simulate(const Network& network, const Coefficients& coefficients,
     }
     if (!holding) {
       held.emplace(network, coefficients, directions, drivers, row);
-      holding.emplace(*held, inputs, network.nodes, count);
+      holding.emplace(*held, Inputs(drivers, options.linear), network.nodes, count);
     }
     state.x[output_node] = holds[r];
     state.slopes.row(output_node).setZero();
