@@ -61,8 +61,8 @@ within_box <- function(z, box, fixed, at) {
 }
 
 # The largest values of f that steps uphill find from points `z`, of each of which the coordinate
-# `fixed` stays. Steps are Newton's, in coordinates in which the others are uncorrelated; a point may
-# also go on from where the one before or after it has come.
+# `fixed` stays. Steps are Newton's, in coordinates in which the others are uncorrelated. A point
+# may also go on from where the one before or after it has come.
 climbed <- function(f, z, fixed, covariance, box) {
   n <- nrow(z)
   at <- z[cbind(seq_len(n), fixed)]

@@ -73,9 +73,9 @@ calibration_figures <- c("parameters", "residuals", "modes", "profiles")
 #'   title tells of the first check that fails at a level of 1 %. A long record shows its first
 #'   20,000 rows.
 #' @source Johnson (2007), Bayesian model assessment using pivotal quantities, Bayesian Analysis 2,
-#'   719-734. Wilks (1938), The large-sample distribution of the likelihood ratio for testing composite
-#'   hypotheses, Annals of Mathematical Statistics 9, 60-62. Durbin and Koopman (2012), Time series analysis by state space methods, 2nd edition,
-#'   for the prediction errors.
+#'   719-734. Durbin and Koopman (2012), Time series analysis by state space methods, 2nd edition, for
+#'   the prediction errors. Wilks (1938), The large-sample distribution of the likelihood ratio for
+#'   testing composite hypotheses, Annals of Mathematical Statistics 9, 60-62.
 #' @examples
 #' table <- data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4))
 #' plot(measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,

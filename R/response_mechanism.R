@@ -80,7 +80,7 @@ response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, t
   entry <- mechanism(
     name, function(model) with_response(model, response, measurements), boundary,
     sprintf(paste("%s responds to %s in a way that the model lacks: described here by a gain and a",
-                  "time constant, and not explained."), of, boundary))
+                  "time constant, and not explained."), capital(of), boundary))
   entry$response <- response
   structure(entry, class = c("amiss_response_mechanism", class(entry)))
 }
