@@ -55,3 +55,19 @@ test_that("no file calls into a room below its own, and none in a circle", {
   while (any(last <- !left$to %in% left$from)) left <- left[!last, ]
   expect_identical(nrow(left), 0L)
 })
+
+test_that("every benchmark is in the plan of bench/all, with a seed of its own", {
+  skip_without_sources()
+  lines <- grep("^[^#]", readLines(file.path(root, "bench", "plan.txt")), value = TRUE)
+  parts <- utils::read.table(text = lines, sep = "|", strip.white = TRUE,
+                             col.names = c("part", "how", "command"))
+  scripts <- list.files(file.path(root, "bench"), "\\.R$")
+  started <- Filter(function(f) startsWith(readLines(file.path(root, "bench", f), 1), "#!"),
+                    scripts)
+  script <- sub(" .*", "", parts$command)
+  expect_setequal(c(started, "peers/ball_drop.R"), script)
+  expect_false(anyDuplicated(parts$part) > 0)
+  expect_true(all(parts$how %in% c("alone", "shared", "last")))
+  seeds <- regmatches(parts$command, regexpr("--(seed|first) [0-9]+", parts$command))
+  expect_false(anyDuplicated(seeds) > 0)
+})
