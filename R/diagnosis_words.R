@@ -166,8 +166,8 @@ change_sentences <- function(upgrade) {
     row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
     entry <- upgrade$catalogue[[model$mechanism]]
     driven <- if (length(entry$boundary)) paste0(", driven by ", listed(entry$boundary)) else ""
-    c(sprintf("%s (%s)%s: %s Evidence %s, odds of %s.", capital(model$mechanism), model$verdict,
-              driven, entry$sentence, row$word, odds(row$log10_bf)),
+    c(sprintf("%s (%s)%s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, driven,
+              entry$sentence, row$word, odds(row$log10_bf)),
       description_sentence(entry, last_fit(upgrade)), step_sentence(upgrade, model),
       doubt_sentence(model), confounded_sentence(model))
   }))

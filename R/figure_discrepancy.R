@@ -120,7 +120,9 @@ missing_title <- function(size, name, stage, unit) {
 # The response that the model lacks, of each of the leading conditions, in the unit of the target:
 # first of those that are significant in the `attribution`, if there is one. What is below a
 # twentieth of the largest is a flat line, and left out.
-figure_missing <- function(discrepancy, attribution = NULL, stage = "the model", most = 4) {
+# `left`: the typical error of the run of least squares.
+figure_missing <- function(discrepancy, attribution = NULL, stage = "the model", most = 4,
+                           left = Inf) {
   responses <- discrepancy$responses
   size <- sqrt(colMeans(responses^2))
   first <- names(size) %in% if (!is.null(attribution)) significant_conditions(attribution$table)
@@ -137,8 +139,11 @@ figure_missing <- function(discrepancy, attribution = NULL, stage = "the model",
     ggplot2::scale_y_continuous(n.breaks = 4, guide = apart) +
     figure_titles(
       missing_title(size, shown[1], stage, discrepancy$unit),
-      paste("How the target responds to each boundary condition, present and past, beyond what",
-            "the model says. Above zero the model is too low, below it too high."),
+      paste(c("How the target responds to each boundary condition, present and past, beyond what",
+              "the model says. Above zero the model is too low, below it too high.",
+              if (left < size[[shown[1]]])
+                sprintf("The run of least squares leaves only %s: its parameters make up for a part.",
+                        with_unit(short(left), discrepancy$unit))), collapse = " "),
       x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +
     time_axis(table$time) + figure_theme()
   with_height(figure, 2 + 1.2 * length(shown))

@@ -57,11 +57,12 @@ calibration_figures <- c("parameters", "residuals", "modes", "profiles")
 #'   * `"profiles"`: the profile likelihood of each parameter, see *Profiles*.
 #' @section Profiles:
 #'   The profile likelihood of a parameter is the largest likelihood at each of its values, whatever
-#'   the other parameters are. It says what the record alone knows of the parameter: by Wilks, the
-#'   95 % interval ends at a fall of the log-likelihood by 1.92. The emulator stands in for the
-#'   simulator, ten draws of the posterior for the error and the discrepancy, and the range of the
-#'   draws ends the search. Steps uphill from the best of 80 draws find the largest value or a lower
-#'   one. The figure takes some seconds, minutes for a record of 10,000 rows.
+#'   the other parameters are. It says what the record alone knows of the parameter. By Wilks, a 95 %
+#'   interval ends where the log-likelihood has fallen by 1.92. The emulator stands in for the
+#'   simulator. Error and discrepancy are as ten draws of the posterior have them and do not follow
+#'   the parameters, so that true intervals are somewhat wider. The search begins at the best of 80
+#'   draws and stays in their range; it finds the largest value or a lower one. The figure takes
+#'   some seconds, and minutes for a record of 10,000 rows.
 #' @section Residuals:
 #'   A residual is what a measurement does beyond what the calibrated model expects of it, given all
 #'   measurements before, in standard deviations. The model is that of one draw of the posterior:
@@ -183,6 +184,7 @@ draw <- function(figure) {
 calibration_figure <- function(fit, which, call = rlang::caller_env()) {
   check_whole(fit, "object", call = call)
   check_input(checkmate::check_choice(which, calibration_figures), "which", call = call)
+  if (which == "profiles") check_not_part(fit, call)
   switch(which,
          parameters = figure_parameters(list("the model" = fit)),
          residuals = figure_residuals(fit),
@@ -220,7 +222,8 @@ upgrade_figure <- function(upgrade, which, call = rlang::caller_env()) {
          moved = figure_moved(upgrade),
          steps = figure_steps(upgrade),
          missing = figure_missing(discrepancy(stages[[1]]$fit), stages[[1]]$attribution,
-                             names(stages)[1]),
+                                  names(stages)[1],
+                                  left = sqrt(mean(left_at_best(stages[[1]]$fit)^2))),
          emulator = figure_emulator(lapply(stages, `[[`, "fit")),
          residuals = figure_residuals(stages[[length(stages)]]$fit),
          sampler = figure_sampler(lapply(stages, function(s) s$fit$posterior)),

@@ -76,11 +76,10 @@ response_mechanism <- function(boundary, measurements, unit = "", gain = NULL, t
                         "below zero."), i = "Give one of positive hours."))
   }
   response <- new_response(boundary, measurements, unit, gain, time_constant, reference)
-  of <- target_label(measurements)
   entry <- mechanism(
     name, function(model) with_response(model, response, measurements), boundary,
-    sprintf(paste("%s responds to %s in a way that the model lacks: described here by a gain and a",
-                  "time constant, and not explained."), capital(of), boundary))
+    sprintf(paste("The model lacks a response of %s to %s: described here by a gain and a time",
+                  "constant, and not explained."), target_label(measurements), boundary))
   entry$response <- response
   structure(entry, class = c("amiss_response_mechanism", class(entry)))
 }

@@ -70,7 +70,8 @@ disagreements <- function(upgrade) {
   }
   missing <- numbers("typically ", place$figures$missing)
   whole <- max(rmse, na.rm = TRUE)
-  if (any(missing > 1.05 * whole)) note("typically %s missing of %s", max(missing), whole)
+  if (any(missing > 1.05 * whole) && !says(place$figures$missing, "least squares leaves only"))
+    note("typically %s missing of %s", max(missing), whole)
 
   # Edges.
   edge <- unname(engine$edge_of_prior(last$fit))
@@ -92,7 +93,8 @@ disagreements <- function(upgrade) {
   if (!trusted && says(told$sure, "odds of")) note("odds of numbers that are not trusted")
   if (!trusted && !says(texts$report, "not trusted|not to be trusted|cannot be trusted"))
     note("the report does not say that numbers are not trusted")
-  if (trusted && says(told$sure, "not trusted")) note("trusted numbers called not trusted")
+  all_trusted <- all(vapply(upgrade$models, function(m) m$fit$trust$trusted, NA))
+  if (all_trusted && says(told$sure, "not trusted")) note("trusted numbers called not trusted")
   decisive <- Filter(function(m) m$verdict == "named", adopted)
   if (length(decisive) && says(told$headline, "unexplained", ignore.case = TRUE))
     note("named and unexplained")

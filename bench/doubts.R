@@ -7,6 +7,8 @@ here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE
 source(file.path(here, "options.R"))
 folders <- strsplit(option("worlds", ""), ",", fixed = TRUE)[[1]]
 out <- option("out", "doubts.json")
+missing <- folders[!dir.exists(folders)]
+if (length(missing)) stop("--worlds: there is no folder ", toString(missing))
 files <- list.files(folders, "[.]rds$", full.names = TRUE)
 if (!length(files)) stop("--worlds names no folder with worlds of bench/hidden_effects.R")
 doubt_ids <- names(getFromNamespace("doubts", "amiss"))

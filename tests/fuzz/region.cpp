@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     region.pulled_back(placed, Eigen::MatrixXd::Ones(normal.cols(), d));
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(root);
     if (svd.singularValues()[d - 1] < 1e-3 * svd.singularValues()[0] ||
-        centre.norm() > 1e3 * radius * svd.singularValues()[d - 1])
+        centre.cwiseAbs().maxCoeff() > 1e3 * radius * svd.singularValues()[d - 1])
       return;
     for (Eigen::Index i = 0; i < placed.cols(); ++i)
       fuzz::require(region.contains(placed.col(i)), "what is placed is inside");

@@ -67,3 +67,31 @@ test_that("the title says which parameters the record bounds on both sides", {
   expect_identical(figure$labels$title, "The record bounds every parameter on both sides")
   expect_error(ggplot2::ggplot_build(figure), NA)
 })
+
+test_that("emulated runs lack what the basis discards, as the sampler takes them", {
+  m <- bent_measurements()
+  ensemble <- simulate_design(bent_simulator(), m, runs = 30, seed = 1)
+  emulator <- suppressWarnings(train_emulator(ensemble, m, list(max_vectors = 2)))
+  fit <- calibrate(emulator, m, quick_ais, seed = 1)
+  expect_gt(fit$priors$discarded_variance, 0)
+  draws <- amiss:::even_draws(fit, amiss:::profile_draws)
+  z <- amiss:::to_normal(amiss:::posterior_unit(fit))
+  expected <- fit$posterior$log_likelihood[draws]
+  own <- vapply(seq_along(draws), function(k) {
+    one <- fit
+    one$weights <- replace(0 * fit$weights, draws[k], 1)
+    amiss:::emulated_log_likelihood(one, z[draws[k], , drop = FALSE])
+  }, 0)
+  # The sampler adds the emulator's own variance, which is small with so many runs. With what the
+  # basis discards taken off, they would differ by tens and hundreds.
+  expect_lt(max(abs(own - expected)), 2)
+})
+
+test_that("a posterior of few draws, and a part of a joint one, have no profiles", {
+  fit <- plain_linear_fit()
+  fit$weights <- replace(0 * fit$weights, 1:2, 0.5)
+  expect_match(ggplot2::autoplot(fit, "profiles")$labels$title, "too few draws")
+  fit <- plain_linear_fit()
+  fit$part <- TRUE
+  expect_error(ggplot2::autoplot(fit, "profiles"), class = "amiss_error_input")
+})

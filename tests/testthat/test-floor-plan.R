@@ -56,18 +56,24 @@ test_that("no file calls into a room below its own, and none in a circle", {
   expect_identical(nrow(left), 0L)
 })
 
-test_that("every benchmark is in the plan of bench/all, with a seed of its own", {
+test_that("every benchmark is in the plan of bench/all, by options that it has", {
   skip_without_sources()
   lines <- grep("^[^#]", readLines(file.path(root, "bench", "plan.txt")), value = TRUE)
   parts <- utils::read.table(text = lines, sep = "|", strip.white = TRUE,
                              col.names = c("part", "how", "command"))
+  code <- function(script) readLines(file.path(root, "bench", script))
   scripts <- list.files(file.path(root, "bench"), "\\.R$")
-  started <- Filter(function(f) startsWith(readLines(file.path(root, "bench", f), 1), "#!"),
-                    scripts)
+  started <- Filter(function(f) startsWith(code(f)[1], "#!"), scripts)
   script <- sub(" .*", "", parts$command)
-  expect_setequal(c(started, "peers/ball_drop.R"), script)
+  expect_setequal(script, c(started, "peers/ball_drop.R"))
   expect_false(anyDuplicated(parts$part) > 0)
   expect_true(all(parts$how %in% c("alone", "shared", "last")))
-  seeds <- regmatches(parts$command, regexpr("--(seed|first) [0-9]+", parts$command))
+  options <- regmatches(parts$command, gregexpr("(?<=--)[a-z]+", parts$command, perl = TRUE))
+  for (k in seq_along(options)) for (name in options[[k]]) {
+    expect_true(any(grepl(sprintf('option("%s"', name), code(script[k]), fixed = TRUE)),
+                info = paste(parts$command[k], name))
+  }
+  seeds <- regmatches(parts$command, regexpr("(?<=--seed |--first )[0-9]+", parts$command,
+                                             perl = TRUE))
   expect_false(anyDuplicated(seeds) > 0)
 })

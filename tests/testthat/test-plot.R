@@ -153,3 +153,11 @@ test_that("an argument that a figure does not know is an error", {
     expect_error(ggplot2::autoplot(x, colour = "red"), "must be empty")
   }
 })
+
+test_that("a response larger than what least squares leaves is explained", {
+  found <- discrepancy(plain_linear_fit())
+  size <- max(sqrt(colMeans(found$responses^2)))
+  told <- function(left) amiss:::figure_missing(found, left = left)$labels$subtitle
+  expect_match(told(0.9 * size), "least squares leaves only .* its parameters make up for a part")
+  expect_no_match(told(1.1 * size), "least squares")
+})

@@ -20,6 +20,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr Index kBlock = 2048;      // rows of a long record that are whitened at once
+constexpr double kLargest = 1e75;   // value of a record, whose fourth power is a number
 constexpr double kFaintest = 1e-4;  // of kappa sigma_0^2: directions with less are withheld by 1e-8 of them
 
 // Gram matrix of W [K / norms, Phi, directions, r] in blocks of rows.
@@ -86,8 +87,9 @@ void HistoryData::check() const {
     throw std::invalid_argument("history: a column of the basis is zero");
   if (moves.size() > 0 && moves.rows() != n)
     throw std::invalid_argument("history: the simulator's moves need one row for each of the record");
-  if (!y.allFinite() || !basis.allFinite() || !responses.allFinite() || !moves.allFinite())
-    throw std::invalid_argument("history: record, basis, responses and moves must be finite");
+  const auto in_range = [](const auto& values) { return (values.array().abs() <= kLargest).all(); };
+  if (!in_range(y) || !in_range(basis) || !in_range(responses) || !in_range(moves))
+    throw std::invalid_argument("history: record, basis, responses and moves must be finite, 1e75 at most");
 }
 
 void HistoryPriors::check() const {

@@ -391,6 +391,7 @@ TEST(HistoryModel, RefusesDataThatDoNotFit) {
   refuses([](HistoryData& data) { data.basis(3, 1) = kInfinity; });
   refuses([=](HistoryData& data) { data.responses(3, 1) = nan; });
   refuses([=](HistoryData& data) { data.moves(3, 1) = nan; });
+  refuses([](HistoryData& data) { data.responses(3, 1) = 1e156; });  // its square is no number
 }
 
 TEST(HistoryModel, RefusesPriorsWithoutMeaning) {
