@@ -142,8 +142,9 @@ figure_missing <- function(discrepancy, attribution = NULL, stage = "the model",
       paste(c("How the target responds to each boundary condition, present and past, beyond what",
               "the model says. Above zero the model is too low, below it too high.",
               if (left < size[[shown[1]]])
-                sprintf("The run of least squares leaves only %s: its parameters make up for a part.",
-                        with_unit(short(left), discrepancy$unit))), collapse = " "),
+                paste0("The run of least squares leaves only ",
+                       with_unit(short(left), discrepancy$unit),
+                       ": its parameters make up for a part.")), collapse = " "),
       x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +
     time_axis(table$time) + figure_theme()
   with_height(figure, 2 + 1.2 * length(shown))

@@ -57,12 +57,12 @@ calibration_figures <- c("parameters", "residuals", "modes", "profiles")
 #'   * `"profiles"`: the profile likelihood of each parameter, see *Profiles*.
 #' @section Profiles:
 #'   The profile likelihood of a parameter is the largest likelihood at each of its values, whatever
-#'   the other parameters are. It says what the record alone knows of the parameter. By Wilks, a 95 %
-#'   interval ends where the log-likelihood has fallen by 1.92. The emulator stands in for the
-#'   simulator. Error and discrepancy are as ten draws of the posterior have them and do not follow
-#'   the parameters, so that true intervals are somewhat wider. The search begins at the best of 80
-#'   draws and stays in their range; it finds the largest value or a lower one. The figure takes
-#'   some seconds, and minutes for a record of 10,000 rows.
+#'   the other parameters are. It says what the record alone knows of the parameter. By Wilks, an
+#'   interval of 95 % ends where the log-likelihood has fallen by 1.92. The emulator stands in for
+#'   the simulator. Error and discrepancy are as ten draws of the posterior have them and do not
+#'   follow the parameters, so that true intervals are somewhat wider. The search begins at the best
+#'   of 80 draws and stays in their range; it finds the largest value or a lower one. The figure
+#'   takes some seconds, and minutes for a record of 10,000 rows.
 #' @section Residuals:
 #'   A residual is what a measurement does beyond what the calibrated model expects of it, given all
 #'   measurements before, in standard deviations. The model is that of one draw of the posterior:
@@ -74,9 +74,9 @@ calibration_figures <- c("parameters", "residuals", "modes", "profiles")
 #'   title tells of the first check that fails at a level of 1 %. A long record shows its first
 #'   20,000 rows.
 #' @source Johnson (2007), Bayesian model assessment using pivotal quantities, Bayesian Analysis 2,
-#'   719-734. Durbin and Koopman (2012), Time series analysis by state space methods, 2nd edition, for
-#'   the prediction errors. Wilks (1938), The large-sample distribution of the likelihood ratio for
-#'   testing composite hypotheses, Annals of Mathematical Statistics 9, 60-62.
+#'   719-734. Durbin and Koopman (2012), Time series analysis by state space methods, 2nd edition,
+#'   for the prediction errors. Wilks (1938), The large-sample distribution of the likelihood ratio
+#'   for testing composite hypotheses, Annals of Mathematical Statistics 9, 60-62.
 #' @examples
 #' table <- data.frame(hour = 1:96, Ti = 20 + sin(1:96 / 4), Te = 5 + 3 * sin(1:96 / 4))
 #' plot(measurements(table, time = "hour", target = "Ti", boundary = ~Te, noise_sd = 0.1,

@@ -93,7 +93,8 @@ disagreements <- function(upgrade) {
   if (!trusted && says(told$sure, "odds of")) note("odds of numbers that are not trusted")
   if (!trusted && !says(texts$report, "not trusted|not to be trusted|cannot be trusted"))
     note("the report does not say that numbers are not trusted")
-  all_trusted <- all(vapply(upgrade$models, function(m) m$fit$trust$trusted, NA))
+  all_trusted <- all(vapply(upgrade$models, function(m) m$fit$trust$trusted, NA),
+                     upgrade$candidates$trusted, na.rm = TRUE)
   if (all_trusted && says(told$sure, "not trusted")) note("trusted numbers called not trusted")
   decisive <- Filter(function(m) m$verdict == "named", adopted)
   if (length(decisive) && says(told$headline, "unexplained", ignore.case = TRUE))
@@ -127,7 +128,7 @@ disagreements <- function(upgrade) {
   steps <- place$figures$steps
   if (length(steps) && says(steps, "NA|NaN|Inf")) note("the figure of steps: %s", steps)
   for (where in names(texts))
-    if (says(gsub("mark as NA", "", texts[[where]]), "\\bNA\\b|\\bNaN\\b|NULL|character\\(0\\)"))
+    if (says(gsub("\\bas NA\\b", "", texts[[where]]), "\\bNA\\b|\\bNaN\\b|NULL|character\\(0\\)"))
       note("%s has NA, NaN or NULL", where)
   found
 }

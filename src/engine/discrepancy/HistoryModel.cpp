@@ -19,8 +19,10 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr Index kBlock = 2048;      // rows of a long record that are whitened at once
-constexpr double kLargest = 1e75;   // value of a record, whose fourth power is a number
+constexpr Index kBlock = 2048;     // rows of a long record that are whitened at once
+constexpr double kLargest = 1e75;  // of values, also beside the noise: their fourth powers are numbers
+// Of the noise variance: below, its quantiles leave the range of numbers; above, they take seconds.
+constexpr double kLeastShape = 0.01, kLargestShape = 1e8;
 constexpr double kFaintest = 1e-4;  // of kappa sigma_0^2: directions with less are withheld by 1e-8 of them
 
 // Gram matrix of W [K / norms, Phi, directions, r] in blocks of rows.
@@ -71,7 +73,7 @@ int HistoryData::conditions() const {
   return condition.empty() ? 0 : 1 + *std::max_element(condition.begin(), condition.end());
 }
 
-void HistoryData::check() const {
+void HistoryData::check(double noise_sd) const {
   axis.check();
   const Index n = y.size();
   if (basis.rows() != n || responses.rows() != n || axis.size() != n)
@@ -87,21 +89,22 @@ void HistoryData::check() const {
     throw std::invalid_argument("history: a column of the basis is zero");
   if (moves.size() > 0 && moves.rows() != n)
     throw std::invalid_argument("history: the simulator's moves need one row for each of the record");
-  const auto in_range = [](const auto& values) { return (values.array().abs() <= kLargest).all(); };
-  if (!in_range(y) || !in_range(basis) || !in_range(responses) || !in_range(moves))
-    throw std::invalid_argument("history: record, basis, responses and moves must be finite, 1e75 at most");
+  const double largest = kLargest * std::min(1.0, noise_sd);
+  const auto in_range = [&](const auto& values) { return (values.array().abs() <= largest).all(); };
+  if (!y.allFinite() || !in_range(basis) || !in_range(responses) || !in_range(moves))
+    throw std::invalid_argument(
+        "history: record, basis, responses and moves must be finite, the last three at most 1e75 noise_sd");
 }
 
 void HistoryPriors::check() const {
   if (!(noise_sd > 0 && noise_sd * noise_sd > 0))
     throw std::invalid_argument("history: noise_sd must be positive");
-  if (!(noise_shape > 0)) throw std::invalid_argument("history: noise_shape must be positive");
+  if (!(noise_shape >= kLeastShape && noise_shape <= kLargestShape))
+    throw std::invalid_argument("history: noise_shape must lie in [0.01, 1e8]");
   if (!(discarded_variance >= 0))
     throw std::invalid_argument("history: discarded_variance must not be negative");
-  if (!std::isfinite(noise_sd * noise_sd) || !std::isfinite(noise_shape) ||
-      !std::isfinite(discarded_variance) || !std::isfinite(amplitude))
-    throw std::invalid_argument(
-        "history: noise_sd, noise_shape, discarded_variance and amplitude must be finite");
+  if (!std::isfinite(noise_sd * noise_sd) || !std::isfinite(discarded_variance) || !std::isfinite(amplitude))
+    throw std::invalid_argument("history: noise_sd, discarded_variance and amplitude must be finite");
   if (!(inclusion > 0 && inclusion <= 1))
     throw std::invalid_argument("history: inclusion must lie in (0, 1]");
   if (!(amplitude > 0)) throw std::invalid_argument("history: amplitude must be positive");
@@ -132,8 +135,8 @@ WhitenedData WhitenedData::in_terms_of(const VectorXd& shift, const MatrixXd& ro
 HistoryModel::HistoryModel(HistoryData data, HistoryPriors priors, const Context& context,
                            const std::vector<int>& only)
     : data_(std::move(data)), priors_(std::move(priors)), conditions_(data_.conditions()) {
-  data_.check();
   priors_.check();
+  data_.check(priors_.noise_sd);
   if (data_.moves.size() == 0) data_.moves.resize(data_.y.size(), 0);
   find_directions();
   columns_ = VectorXd::Zero(conditions_);

@@ -20,7 +20,7 @@ struct HistoryData {
   Eigen::MatrixXd moves;
 
   int conditions() const;
-  void check() const;
+  void check(double noise_sd) const;
 };
 
 /// Priors of the history model.

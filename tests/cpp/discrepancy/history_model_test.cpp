@@ -403,10 +403,12 @@ TEST(HistoryModel, RefusesPriorsWithoutMeaning) {
   refuses([](HistoryPriors& priors) { priors.noise_sd = 0.0; });
   refuses([](HistoryPriors& priors) { priors.noise_sd = kInfinity; });
   refuses([](HistoryPriors& priors) { priors.noise_sd = 1e-200; });
+  refuses([](HistoryPriors& priors) { priors.noise_sd = 1e-124; });  // of values of 1
   refuses([](HistoryPriors& priors) { priors.noise_shape = kInfinity; });
   refuses([](HistoryPriors& priors) { priors.discarded_variance = kInfinity; });
   refuses([](HistoryPriors& priors) { priors.amplitude = kInfinity; });
   refuses([](HistoryPriors& priors) { priors.noise_shape = 0.0; });
+  refuses([](HistoryPriors& priors) { priors.noise_shape = 1e-173; });
   refuses([](HistoryPriors& priors) { priors.discarded_variance = -1.0; });
   refuses([](HistoryPriors& priors) { priors.inclusion = 0.0; });
   refuses([](HistoryPriors& priors) { priors.amplitude = 0.0; });
