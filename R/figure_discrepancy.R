@@ -147,5 +147,6 @@ figure_missing <- function(discrepancy, attribution = NULL, stage = "the model",
                        ": its parameters make up for a part.")), collapse = " "),
       x = time_label(table$time), y = axis_label("missing response", discrepancy$unit)) +
     time_axis(table$time) + figure_theme()
-  with_height(figure, 2 + 1.2 * length(shown))
+  # The axis title needs a panel that is not low.
+  with_height(figure, max(4.2, 2.2 + 1.2 * length(shown)))
 }

@@ -6,31 +6,42 @@ profile_draws <- 10   # of error and discrepancy, over which the log-likelihood 
 profile_starts <- 80  # draws that steps may begin from
 profile_rounds <- 40  # of steps uphill, at most
 profile_gain <- 0.01  # nats, below which a point has come to its end
-profile_probe <- 0.3  # standard deviations, for differences
+profile_probe <- 0.3  # standard deviations, for slopes
+profile_damping <- 0.05  # of steps, beside the curvature over one standard deviation
+profile_stride <- 3  # standard deviations, the longest step
 profile_numbers <- 2e7  # of runs that are compared at once: 160 MB
 profile_fall <- stats::qchisq(0.95, 1) / 2  # at the ends of a 95 % interval (Wilks)
 
-# Log-likelihood by the emulator at points of all parameters (one a row, normal coordinates), as
-# draws of error and discrepancy see it in the mean.
-emulated_log_likelihood <- function(fit, z) {
-  draws <- even_draws(fit, profile_draws)
+# What the emulator of each record says at points of all parameters (one a row, normal coordinates):
+# rows of the record x points.
+emulated_runs <- function(fit, z) {
   names <- names(drawn_parameters(fit))
-  of_record <- function(one, z) {
+  lapply(record_fits(fit), function(one) {
     own <- match(names(one$emulator$parameters), names)
     w <- predict_emulator_(one$emulator$processes, z[, own, drop = FALSE])$mean
-    runs <- tcrossprod(one$emulator$basis$vectors, w)
+    tcrossprod(one$emulator$basis$vectors, w)
+  })
+}
+
+# Log-likelihood of such runs, as draws of error and discrepancy see it in the mean.
+emulated_log_likelihood <- function(fit, runs) {
+  draws <- even_draws(fit, profile_draws)
+  n <- ncol(runs[[1]])
+  of_record <- function(one, runs) {
     # Unlike runs of the simulator, these lack what the basis discards.
     one$priors$discarded_variance <- 0
-    each <- rep(seq_len(nrow(z)), each = length(draws))
-    log_l <- run_log_likelihood(one, rep(draws, nrow(z)), runs[, each, drop = FALSE], 1)
+    each <- rep(seq_len(ncol(runs)), each = length(draws))
+    log_l <- run_log_likelihood(one, rep(draws, ncol(runs)), runs[, each, drop = FALSE], 1)
     colMeans(matrix(log_l, length(draws)))
   }
-  rows <- sum(vapply(record_fits(fit), function(one) length(one$rows), 0L))
+  rows <- sum(vapply(runs, nrow, 0L))
   at_once <- max(1, floor(profile_numbers / (rows * length(draws))))
-  blocks <- split(seq_len(nrow(z)), (seq_len(nrow(z)) - 1) %/% at_once)
-  unlist(lapply(unname(blocks), function(some) {
-    Reduce(`+`, lapply(record_fits(fit), of_record, z[some, , drop = FALSE]))
+  blocks <- split(seq_len(n), (seq_len(n) - 1) %/% at_once)
+  value <- unlist(lapply(unname(blocks), function(some) {
+    Reduce(`+`, Map(function(one, runs) of_record(one, runs[, some, drop = FALSE]),
+                    record_fits(fit), runs))
   }))
+  ifelse(is.na(value), -Inf, value)
 }
 
 # Of each parameter, in the range of its draws: list(x, log_likelihood), the highest that steps
@@ -41,7 +52,6 @@ profiles <- function(fit) {
   covariance <- stats::cov.wt(z, fit$weights, method = "ML")$cov
   covariance <- covariance + diag(1e-8 + 1e-6 * diag(covariance), ncol(z))
   box <- apply(z, 2, weighted_quantile, fit$weights, c(0.001, 0.999))
-  f <- function(z) emulated_log_likelihood(fit, z)
   draws <- unique(even_draws(fit, profile_starts))
   x <- lapply(seq_along(parameters), function(j) {
     ends <- weighted_quantile(fit$values[, j], fit$weights, c(0.005, 0.995))
@@ -50,18 +60,16 @@ profiles <- function(fit) {
   fixed <- rep(seq_along(parameters), each = profile_points)
   at <- to_normal(unlist(Map(function(p, x) prior_cdf(p$prior, x), parameters, x)))
   ways <- covariance[fixed, , drop = FALSE] / diag(covariance)[fixed]
-  # A point, moved as the others are expected to move with the fixed one.
-  moved <- function(point, some = seq_along(at)) {
-    from <- matrix(point, length(some), length(point), byrow = TRUE)
-    within_box(from + (at[some] - point[fixed[some]]) * ways[some, , drop = FALSE], box,
-               fixed[some], at[some])
+  # Points, moved to their fixed coordinates as the others are expected to move with these.
+  moved <- function(z, some = seq_along(at)) {
+    by <- at[some] - z[cbind(seq_along(some), fixed[some])]
+    within_box(z + by * ways[some, , drop = FALSE], box, fixed[some], at[some])
   }
-  starts <- lapply(draws, function(i) moved(z[i, ]))
-  values <- matrix(f(do.call(rbind, starts)), length(at))
-  values[is.na(values)] <- -Inf
-  best <- max.col(values, "first")
+  starts <- lapply(draws, function(i) moved(z[rep(i, length(at)), , drop = FALSE]))
+  values <- vapply(starts, function(z) emulated_log_likelihood(fit, emulated_runs(fit, z)), 0 * at)
+  best <- max.col(matrix(values, length(at)), "first")
   start <- t(vapply(seq_along(at), function(i) starts[[best[i]]][i, ], z[1, ]))
-  found <- climbed(f, matrix(start, length(at)), fixed, covariance, box, moved)
+  found <- climbed(fit, matrix(start, length(at)), fixed, covariance, moved)
   stats::setNames(Map(function(x, value) list(x = x, log_likelihood = value),
                       x, split(found, fixed)), names(parameters))
 }
@@ -73,40 +81,24 @@ within_box <- function(z, box, fixed, at) {
   z
 }
 
-# The largest values of f that steps uphill find from points `z`, of each of which the coordinate
-# `fixed` stays. Steps are Newton's, in coordinates in which the others are uncorrelated. A point
-# may also go on from where the one before or after it has come, or the best of all. Those that gain
-# nothing more are left.
-climbed <- function(f, z, fixed, covariance, box, moved) {
-  value <- f(z)
-  value[is.na(value)] <- -Inf
-  others <- ncol(z) - 1
-  if (!others) return(value)
+# The largest log-likelihoods that steps uphill find from points `z`, of each of which the coordinate
+# `fixed` stays. A point may also go on from where the one before or after it has come, or the best
+# of all. Those that gain nothing more are left.
+climbed <- function(fit, z, fixed, covariance, moved) {
+  value <- emulated_log_likelihood(fit, emulated_runs(fit, z))
   n <- nrow(z)
-  at <- z[cbind(seq_len(n), fixed)]
+  if (ncol(z) == 1) return(value)
   roots <- lapply(seq_len(ncol(z)), function(j) conditional_root(covariance, j))
-  directions <- lapply(seq_len(others), function(k) {
-    t(vapply(fixed, function(j) roots[[j]][, k], z[1, ]))
-  })
   climbs <- rep(TRUE, n)
   for (round in seq_len(profile_rounds)) {
     some <- which(climbs)
-    kept <- function(to) within_box(to, box, fixed[some], at[some])
-    part <- function(table) table[some, , drop = FALSE]
-    probes <- lapply(directions, function(d) {
-      rbind(part(z) + profile_probe * part(d), part(z) - profile_probe * part(d))
-    })
-    seen <- array(f(do.call(rbind, probes)), c(length(some), 2, others))
-    slope <- matrix(seen[, 1, ] - seen[, 2, ], length(some)) / (2 * profile_probe)
-    bend <- (matrix(seen[, 1, ] + seen[, 2, ], length(some)) - 2 * value[some]) / profile_probe^2
-    steps <- slope / pmax(-bend, 0.2)
-    steps <- steps / pmax(1, sqrt(rowSums(steps^2)) / 2)
-    way <- Reduce(`+`, Map(function(d, k) part(d) * steps[, k], directions, seq_len(others)))
-    tries <- c(lapply(c(1, 0.3, 0.1), function(length) kept(part(z) + length * way)),
-               lapply(c(-1, 1), function(by) kept(z[pmin(pmax(some + by, 1), n), , drop = FALSE])),
-               list(moved(z[which.max(value), ], some)))
-    values <- matrix(f(do.call(rbind, tries)), length(some))
-    values[is.na(values)] <- -Inf
+    way <- newton_steps(fit, z[some, , drop = FALSE], roots[fixed[some]])
+    by_step <- lapply(c(1, 0.3, 0.1), function(length) z[some, , drop = FALSE] + length * way)
+    neighbours <- lapply(c(-1, 1), function(by) z[pmin(pmax(some + by, 1), n), , drop = FALSE])
+    best_of_all <- matrix(z[which.max(value), ], length(some), ncol(z), byrow = TRUE)
+    tries <- lapply(c(by_step, neighbours, list(best_of_all)), moved, some)
+    values <- matrix(emulated_log_likelihood(fit, emulated_runs(fit, do.call(rbind, tries))),
+                     length(some))
     best <- max.col(values, "first")
     gain <- values[cbind(seq_along(some), best)] - value[some]
     for (i in which(gain > 0)) {
@@ -119,6 +111,42 @@ climbed <- function(f, z, fixed, covariance, box, moved) {
     if (!any(climbs)) break
   }
   value
+}
+
+# Steps by Gauss and Newton from points, along the columns of a root of each. Given error and
+# discrepancy, the log-likelihood is quadratic in the output, and so along its slopes: its values at
+# 1 + 2 m + m (m - 1) / 2 outputs give its gradient and its matrix.
+newton_steps <- function(fit, z, roots) {
+  m <- ncol(z) - 1
+  pairs <- if (m > 1) utils::combn(m, 2) else matrix(0L, 2, 0)
+  # Combinations of slopes: none, each, each taken off, each pair.
+  mix <- cbind(0, diag(m), -diag(m), diag(m)[, pairs[1, ]] + diag(m)[, pairs[2, ]])
+  probes <- do.call(rbind, lapply(seq_len(nrow(z)), function(i) {
+    away <- profile_probe * t(roots[[i]])
+    sweep(rbind(0, away, -away), 2, z[i, ], "+")
+  }))
+  point <- rep(seq_len(nrow(z)), each = 2 * m + 1)
+  mixed <- lapply(emulated_runs(fit, probes), function(runs) {
+    do.call(cbind, lapply(seq_len(nrow(z)), function(i) {
+      own <- runs[, point == i, drop = FALSE]
+      slopes <- (own[, 1 + seq_len(m), drop = FALSE] -
+                   own[, 1 + m + seq_len(m), drop = FALSE]) / (2 * profile_probe)
+      own[, 1] + slopes %*% mix
+    }))
+  })
+  values <- matrix(emulated_log_likelihood(fit, mixed), ncol(mix))
+  t(vapply(seq_len(nrow(z)), function(i) {
+    v <- values[, i]
+    up <- v[1 + seq_len(m)]
+    down <- v[1 + m + seq_len(m)]
+    gradient <- (up - down) / 2
+    bend <- diag(2 * v[1] - up - down, m)
+    bend[t(pairs)] <- up[pairs[1, ]] + up[pairs[2, ]] - v[1] - v[-seq_len(1 + 2 * m)]
+    bend[t(pairs)[, 2:1]] <- bend[t(pairs)]
+    step <- tryCatch(solve(bend + diag(profile_damping, m), gradient), error = function(e) gradient)
+    if (!all(is.finite(step))) step <- 0 * gradient
+    as.numeric(roots[[i]] %*% (step / max(1, sqrt(sum(step^2)) / profile_stride)))
+  }, z[1, ]))
 }
 
 # Columns along which the other coordinates are independent and of standard deviation 1, given

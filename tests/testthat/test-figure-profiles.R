@@ -2,13 +2,16 @@
 
 profiled <- made_once(function() amiss:::profiles(plain_linear_fit()))
 
+log_likelihood_at <- function(fit, z)
+  amiss:::emulated_log_likelihood(fit, amiss:::emulated_runs(fit, z))
+
 # The largest value over the other of two parameters by a search of base R.
 searched_value <- function(fit, j, x) {
   prior <- fit$emulator$parameters[[j]]$prior
   at <- amiss:::to_normal(amiss:::prior_cdf(prior, x))
   z <- amiss:::to_normal(amiss:::posterior_unit(fit))
   other <- setdiff(1:2, j)
-  f <- function(v) amiss:::emulated_log_likelihood(fit, rbind(replace(c(v, v), j, at)))
+  f <- function(v) log_likelihood_at(fit, rbind(replace(c(v, v), j, at)))
   stats::optimize(f, range(z[, other]), maximum = TRUE, tol = 1e-6)$objective
 }
 
@@ -47,7 +50,7 @@ test_that("one parameter alone has the likelihood as its profile", {
                    quick_ais, seed = 1)
   profile <- amiss:::profiles(fit)$gain
   z <- cbind(amiss:::to_normal(profile$x))  # the prior is the unit interval
-  expect_equal(profile$log_likelihood, amiss:::emulated_log_likelihood(fit, z))
+  expect_equal(profile$log_likelihood, log_likelihood_at(fit, z))
 })
 
 test_that("the title says which parameters the record bounds on both sides", {
@@ -80,7 +83,7 @@ test_that("emulated runs lack what the basis discards, as the sampler takes them
   own <- vapply(seq_along(draws), function(k) {
     one <- fit
     one$weights <- replace(0 * fit$weights, draws[k], 1)
-    amiss:::emulated_log_likelihood(one, z[draws[k], , drop = FALSE])
+    log_likelihood_at(one, z[draws[k], , drop = FALSE])
   }, 0)
   # The sampler adds the emulator's own variance, which is small with so many runs. With what the
   # basis discards taken off, they would differ by tens and hundreds.
