@@ -81,8 +81,8 @@ within_box <- function(z, box, fixed, at) {
   z
 }
 
-# The largest log-likelihoods that steps uphill find from points `z`, of each of which the coordinate
-# `fixed` stays. A point may also go on from where the one before or after it has come, or the best
+# The largest log-likelihoods that steps uphill find from points `z`, of which the coordinates
+# `fixed` stay. A point may also go on from where the one before or after it has come, or the best
 # of all. Those that gain nothing more are left.
 climbed <- function(fit, z, fixed, covariance, moved) {
   value <- emulated_log_likelihood(fit, emulated_runs(fit, z))
