@@ -91,20 +91,20 @@ void HistoryData::check(double noise_sd) const {
     throw std::invalid_argument("history: the simulator's moves need one row for each of the record");
   const double largest = kLargest * std::min(1.0, noise_sd);
   const auto in_range = [&](const auto& values) { return (values.array().abs() <= largest).all(); };
-  if (!y.allFinite() || !in_range(basis) || !in_range(responses) || !in_range(moves))
+  if (!in_range(y) || !in_range(basis) || !in_range(responses) || !in_range(moves))
     throw std::invalid_argument(
-        "history: record, basis, responses and moves must be finite, the last three at most 1e75 noise_sd");
+        "history: record, basis, responses and moves must be finite, at most 1e75 and 1e75 noise_sd");
 }
 
 void HistoryPriors::check() const {
-  if (!(noise_sd > 0 && noise_sd * noise_sd > 0))
-    throw std::invalid_argument("history: noise_sd must be positive");
+  if (!(noise_sd >= 1.0 / kLargest && noise_sd <= kLargest))
+    throw std::invalid_argument("history: noise_sd must lie in [1e-75, 1e75]");
   if (!(noise_shape >= kLeastShape && noise_shape <= kLargestShape))
     throw std::invalid_argument("history: noise_shape must lie in [0.01, 1e8]");
   if (!(discarded_variance >= 0))
     throw std::invalid_argument("history: discarded_variance must not be negative");
-  if (!std::isfinite(noise_sd * noise_sd) || !std::isfinite(discarded_variance) || !std::isfinite(amplitude))
-    throw std::invalid_argument("history: noise_sd, discarded_variance and amplitude must be finite");
+  if (!std::isfinite(discarded_variance) || !std::isfinite(amplitude))
+    throw std::invalid_argument("history: discarded_variance and amplitude must be finite");
   if (!(inclusion > 0 && inclusion <= 1))
     throw std::invalid_argument("history: inclusion must lie in (0, 1]");
   if (!(amplitude > 0)) throw std::invalid_argument("history: amplitude must be positive");

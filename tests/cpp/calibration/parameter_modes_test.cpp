@@ -74,10 +74,10 @@ TEST(ParameterModes, FindBothOfTwo) {
 }
 
 TEST(ParameterModes, WithoutAModeThePriorStands) {
-  HistoryData data = make_data();
-  data.y[3] = 1e200;  // its square is not finite
-  const HistoryModel model = make_model({}, data);
-  const Emulator emulator = make_emulator(2);
+  const HistoryModel model = make_model({}, make_data());
+  EmulatorState state = make_emulator(2).state();
+  state.coefficients.array() += 1e200;  // the square of the error is not finite
+  const Emulator emulator(state);
   const CalibrationTarget target(model, {}, emulator);
   Stream stream(1, 2, 3);
   const ParameterModes modes =
