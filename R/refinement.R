@@ -178,9 +178,7 @@ refine_ensemble <- function(ensemble, fit, runs = 40, threads = 1, quiet = FALSE
   # Where the posterior reached the end of its region, or the emulator was surer than it was right,
   # it lies elsewhere in part. An emulator that knows how far it is off has widened the posterior
   # already.
-  check <- fit$check
-  astray <- isTRUE(any(check$border > rules$border, check$z2 > 1,
-                       abs(check$correction %||% 0) > rules$mode_depth))
+  astray <- isTRUE(fit$check$border > rules$border || fit$check$z2 > 1)
   region <- posterior_region(fit, growth = if (astray) rules$astray_growth else 1)
   regional_ensemble(ensemble, region, fit$emulator, fit$measurements, runs, threads)
 }

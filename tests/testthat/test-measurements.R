@@ -205,7 +205,7 @@ test_that("people read the target's label, and tables keep its column", {
   fit <- linear_fit(m)
   expect_output(print(discrepancy(fit)), "Discrepancy of air of the room")
   expect_true("Ti" %in% names(generics::augment(fit)))
-  expect_match(response_mechanism("Gv", m)$sentence, "^air of the room responds to Gv")
+  expect_match(response_mechanism("Gv", m)$sentence, "a response of air of the room to Gv")
   for (wrong in list("", 1, NA_character_, c("a", "b")))
     expect_error(linear_measurements(label = wrong), "label", class = "amiss_error_input")
   plain <- linear_measurements()
