@@ -101,6 +101,7 @@ climbed <- function(fit, z, fixed, covariance, moved) {
                      length(some))
     best <- max.col(values, "first")
     gain <- values[cbind(seq_along(some), best)] - value[some]
+    gain[is.nan(gain)] <- 0  # impossible before and after
     for (i in which(gain > 0)) {
       z[some[i], ] <- tries[[best[i]]][i, ]
       value[some[i]] <- values[i, best[i]]
