@@ -5,6 +5,10 @@ noise_level <- function(noise_sd, coarse, y, call = rlang::caller_env()) {
   if (is.numeric(noise_sd)) {
     check_input(checkmate::check_number(noise_sd, finite = TRUE), "noise_sd", call = call)
     if (noise_sd <= 0) abort_input("{.arg noise_sd} must be positive; got {noise_sd}.", call = call)
+    if (noise_sd < 1e-75 || noise_sd > 1e75) {
+      abort_input(c("{.arg noise_sd} is {noise_sd}: only 1e-75 to 1e75 can be computed with.",
+                    i = "Give the target in another unit."), call = call)
+    }
     return(list(sd = as.numeric(noise_sd), method = "given"))
   }
   if (!is.null(noise_sd) && !inherits(noise_sd, "amiss_bootstrap_noise")) {

@@ -258,6 +258,7 @@ rows_of_their_own <- function() {
     bad("measurements", "boundary", ~ Ti, "is the target or the time"),
     bad("measurements", "time", "Te", "Te"), bad("measurements", "noise_sd", -1, "noise_sd.*-1"),
     bad("measurements", "noise_sd", "much", "noise_sd.*much"),
+    bad("measurements", "noise_sd", 1e-100, "noise_sd.*1e-100.*another unit"),
     bad("measurements", "noise_sd", NULL), bad("measurements", "average", 0.3, "average.*0.3"),
     bad("measurements", "average", "day"),
     bad("measurements", "calibrate", "hour <", "calibrate.*hour <"),
