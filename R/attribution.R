@@ -151,12 +151,20 @@ attribute_record <- function(fits, which, control, seed, threads) {
   table <- table[order(-table$log10_bf_dropped, -table$share), ]
   rownames(table) <- NULL
   structure(list(format_version = format_version, table = table, groups = groups,
+                 lost = by_condition_set(log10_bf,
+                                         lapply(result$sets$conditions,
+                                                function(at) conditions[at + 1L])),
                  surrogates = nrow(result$null_statistics),
                  statistic = result$statistic, null_statistics = result$null_statistics,
                  p_value_own = stats::setNames(result$adjusted[alone], conditions),
                  control = control, labels = fit$measurements$labels, seed = seed),
             class = "amiss_attribution")
 }
+
+# Evidence lost, by the sets of conditions without which it is.
+by_condition_set <- function(lost, sets) stats::setNames(lost, vapply(sets, condition_set, ""))
+
+condition_set <- function(conditions) toString(sort(conditions))
 
 # As AttributionOptions::significant() of the engine.
 is_significant <- function(log10_bf, p_value, control) {

@@ -23,17 +23,19 @@ with_taken <- function(trial, present, context) {
 # By how much more the present model needs the response to some conditions than the extension does.
 taken_away <- function(trial, present, conditions, context) {
   if (!length(conditions)) return(0)
-  present$lost[[toString(conditions)]] - lost_without(trial, conditions, context)
+  present$lost[[condition_set(conditions)]] - lost_without(trial, conditions, context)
 }
 
 # The present model with the conditions of the mechanisms that are left, each and together, and what
-# it loses without a response to them.
-with_losses <- function(model, catalogue, context) {
+# it loses without a response to them. `known`: losses by set that were computed before.
+with_losses <- function(model, catalogue, known, context) {
   model$conditions <- lapply(catalogue, function(mechanism) sort(mechanism$boundary))
   model$catalogued <- sort(unique(unlist(model$conditions, use.names = FALSE)))
   sets <- unique(Filter(length, c(unname(model$conditions), list(model$catalogued))))
-  lost <- lapply(sets, function(conditions) lost_without(model, conditions, context))
-  model$lost <- stats::setNames(lost, vapply(sets, toString, ""))
+  model$lost <- by_condition_set(lapply(sets, function(conditions) {
+    set <- condition_set(conditions)
+    if (set %in% names(known)) known[[set]] else lost_without(model, conditions, context)
+  }), sets)
   model
 }
 
@@ -60,7 +62,7 @@ response_table <- function(trials, present, attribution) {
   rows <- lapply(trusted, function(trial) {
     conditions <- present$conditions[[trial$mechanism]]
     if (!length(conditions)) return(NULL)
-    lost <- present$lost[[toString(conditions)]]
+    lost <- present$lost[[condition_set(conditions)]]
     data.frame(mechanism = trial$mechanism, condition = conditions, before = lost,
                left = lost - trial$taken)
   })

@@ -271,10 +271,10 @@ attribute_discrepancy.amiss_joint <- function(fit, control = NULL, seed = fit$se
             class = "amiss_joint_attribution")
 }
 
-# list(table, groups): a row for each condition that any record has, with the evidence lost if it is
-# dropped from all discrepancies, and the least p-value among the records, times their number
-# (Bonferroni); and the same of groups that some record cannot tell apart, where the records
-# together cannot either.
+# list(table, groups, lost): a row for each condition that any record has, with the evidence lost if
+# it is dropped from all discrepancies, and the least p-value among the records, times their number
+# (Bonferroni); the same of groups that some record cannot tell apart, where the records together
+# cannot either; and the evidence lost by single conditions.
 attributed_together <- function(fits, each, control, seed, threads) {
   records <- engine_records(fits)
   draws <- engine_draws(fits)
@@ -308,13 +308,14 @@ attributed_together <- function(fits, each, control, seed, threads) {
       dropped_from_all(conditions, vapply(own, `[[`, 0, "p_value")),
       list(correlation = min(vapply(own, `[[`, 0, "correlation"))))
   })
+  lost <- by_condition_set(table$log10_bf_dropped, conditions)
   # A member that is significant by itself is known apart.
   alone <- table$boundary[table$significant]
   groups <- Filter(function(group) group$significant && !any(group$conditions %in% alone), groups)
   table <- with_groups(table, groups)
   table <- table[order(-table$log10_bf_dropped), ]
   rownames(table) <- NULL
-  list(table = table, groups = groups)
+  list(table = table, groups = groups, lost = lost)
 }
 
 #' @export

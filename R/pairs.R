@@ -9,9 +9,9 @@ try_pairs <- function(state, trials, context) {
   pairs <- if (leaves_much(state$present)) promising_pairs(state, trials)
   context$control$decisive <- 2 * context$control$decisive
   if (!length(pairs)) return(list(state = state, trials = list(), context = context))
-  known <- state$catalogue[names(trials)]
+  known <- with_entries(state$catalogue[names(trials)], pairs)
   state$catalogue <- with_entries(state$catalogue, pairs)
-  state$present <- with_losses(state$present, with_entries(known, pairs), context)
+  state$present <- with_losses(state$present, known, state$present$lost, context)
   off <- lapply(trials, `[[`, "off")
   tried <- list()
   for (name in names(pairs)) {

@@ -19,7 +19,8 @@ next_step <- function(state, context) {
                     words = "no mechanism that is left can be applied on top of what was adopted")
   }
   if (!is.null(stopped)) return(c(state, list(stopped = stopped)))
-  state$present <- as_present(state$present, state$catalogue[left], context)
+  attribution <- last_model(state$models)$attribution
+  state$present <- as_present(state$present, state$catalogue[left], attribution, context)
   alone <- tried_alone(state, left, context)
   paired <- staged("pairs", try_pairs(state, alone, context))
   state <- paired$state
@@ -28,7 +29,7 @@ next_step <- function(state, context) {
   state$candidates <- rbind(state$candidates,
                             trial_table(trials, present, left, context$control$decisive))
   state$responses <- rbind(state$responses,
-                           response_table(trials, present, last_model(state$models)$attribution))
+                           response_table(trials, present, attribution))
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
   best <- higher_of(to_adopt(alone, present, context),
                     to_adopt(paired$trials, present, paired$context))

@@ -2,8 +2,8 @@
 # it can still win.
 
 # The present model as its trials see it: at its run of least squares.
-as_present <- function(model, catalogue, context) {
-  model <- with_losses(model, catalogue, context)
+as_present <- function(model, catalogue, attribution, context) {
+  model <- with_losses(model, catalogue, attribution$lost, context)
   if (model$level == "given") return(model)
   least <- model$least
   model$present <- list(at = least$at, slopes = least$slopes,

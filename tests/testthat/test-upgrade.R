@@ -162,7 +162,7 @@ present_model <- made_once(function() {
   control <- amiss:::fill_upgrade_control(quick_control, m)
   context <- amiss:::new_context(1, 1, control)
   base <- amiss:::base_model(amiss:::upgrade_start(linear_simulator(), m), NULL, context)
-  list(model = amiss:::as_present(base, catalogue(), context), context = context)
+  list(model = amiss:::as_present(base, catalogue(), NULL, context), context = context)
 })
 
 trial_of <- function(mechanism, off = NULL) {
@@ -201,7 +201,7 @@ two_adopted <- function(first, second) {
   extended <- amiss:::extend(linear_simulator(), first)
   with_first <- amiss:::try_mechanism(base$model, first$name, list(extended), NULL, 2,
                                       base$context)
-  with_first <- amiss:::as_present(with_first, catalogue(), base$context)
+  with_first <- amiss:::as_present(with_first, catalogue(), NULL, base$context)
   both <- amiss:::extend(extended, second, names(first$parameters))
   with_both <- amiss:::try_mechanism(with_first, second$name, list(both), NULL, 2, base$context)
   own <- data.frame(from = "base", mechanism = second$name, trusted = FALSE)
