@@ -206,8 +206,10 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
                         x$candidates$mechanism == model$mechanism, ]
     boundary <- x$catalogue[[model$mechanism]]$boundary
     driven <- driver_words(model$mechanism, boundary)
-    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}{driven}, log10",
-                                   "Bayes factor {round(row$log10_bf, 1)}")))
+    evidence <- if (is_sound(row, x)) sprintf("log10 Bayes factor %.1f", row$log10_bf)
+                else "its numbers are not trusted"
+    cli::cli_bullets(c("*" = paste("{model$verdict}: {.strong {model$mechanism}}{driven},",
+                                   "{evidence}")))
   }
   others <- vapply(adopted[-seq_len(listed_alone)],
                    function(model) paste(model$verdict, model$mechanism), "")

@@ -93,13 +93,14 @@ candidates_words <- function(upgrade) {
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
              "log10 Bayes factor" = factor$estimate,
              "95 % interval" = paste(factor$lower, "to", factor$upper),
-             evidence = table$word,
+             evidence = ifelse(table$trusted, table$word, ""),
              "beside an unknown response" = signed(table$beside_unknown),
              "with no unknown response" = signed(table$standing),
-             probability = ifelse(startsWith(decision, "refused"), "", percent(table$probability)),
+             probability = ifelse(startsWith(decision, "refused") | !table$trusted, "",
+                                  percent(table$probability)),
              "error in calibration" = error_words(table$error_ratio),
-             estimate = ifelse(table$judged_by == "runs", "verified",
-                               ifelse(table$trusted, "trial", "rough")),
+             estimate = ifelse(!table$trusted, "rough",
+                               ifelse(table$judged_by == "runs", "verified", "trial")),
              decision = decision, check.names = FALSE, row.names = NULL)
 }
 

@@ -19,9 +19,17 @@ improves_held_out <- function(upgrade) {
 is_too_rough <- function(row)
   !isTRUE(row$trusted) && row$upper95 - row$lower95 > rules$too_rough
 
-evidence_sentence <- function(row) {
+# Whether the numbers of a trial and of the model it extends can be trusted.
+is_sound <- function(row, upgrade) isTRUE(row$trusted) && parent_of(row, upgrade)$fit$trust$trusted
+
+parent_of <- function(row, upgrade) Find(function(m) m$name == row$from, upgrade$models)
+
+evidence_sentence <- function(row, upgrade) {
   if (is_too_rough(row)) {
     return(sprintf("The numbers for %s are too rough for odds.", row$mechanism))
+  }
+  if (!is_sound(row, upgrade)) {
+    return(sprintf("No odds are given for %s: its numbers are not trusted.", row$mechanism))
   }
   sprintf("The evidence for %s over no change is %s: odds of %s%s.", row$mechanism, row$word,
           odds(row$log10_bf), odds_interval(c(row$lower95, row$upper95)))
@@ -45,18 +53,19 @@ sure_sentences <- function(upgrade) {
     else if (is_refuted(best)) needed <- refuted_sentence(best)
     else if (is_unverified(best, upgrade))
       needed <- "It was not adopted, because no runs were left to verify it."
-    return(c(missing_sentence(upgrade), if (!is_too_rough(best)) probability_sentence(trials),
-             evidence_sentence(best), needed, trust_sentence(upgrade, best)))
+    return(c(missing_sentence(upgrade), if (is_sound(best, upgrade)) probability_sentence(trials),
+             evidence_sentence(best, upgrade), needed, trust_sentence(upgrade, best)))
   }
   each <- unlist(lapply(adopted, function(m) {
     row <- upgrade$candidates[upgrade$candidates$from == m$parent &
                               upgrade$candidates$mechanism == m$mechanism, ]
-    evidence_sentence(row)
+    evidence_sentence(row, upgrade)
   }))
   first <- trials[1, ]
-  c(each, if (!is_too_rough(best)) probability_sentence(trials),
+  c(each, if (is_sound(best, upgrade)) probability_sentence(trials),
     if (first$mechanism != best$mechanism) {
-      if (keeps_error(first)) raised_sentence(first, " first") else outranked_sentence(first, best)
+      if (keeps_error(first)) raised_sentence(first, " first")
+      else if (is_sound(first, upgrade) && best$trusted) outranked_sentence(first, best)
     },
     trust_sentence(upgrade, best))
 }
@@ -126,12 +135,18 @@ trust_sentence <- function(upgrade, best) {
                             listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
   }
   if (base$trusted && is_too_rough(best)) return(NULL)
+  why <- if (base$trusted) adopted_trust(upgrade, best)$why else base$why
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
-  why <- if (!base$trusted) paste0(" (", base$verdict, ")") else ""
   sprintf(
-    "The numbers are rough for %s%s: read the odds as an order of magnitude. %s", listed(who), why,
-    if (best$lower95 >= upgrade$control$decisive) "Even the lower end of the interval is decisive."
-    else "The decision may depend on these numbers: more runs or chains would settle it.")
+    paste("Why the numbers of %s are not trusted: %s. The decision may depend on them: more runs or",
+          "chains would settle it."),
+    listed(who), if (length(why)) paste(why, collapse = "; ") else "its few runs leave them rough")
+}
+
+# The trust in what a row of the candidates led to; NULL if it was not adopted.
+adopted_trust <- function(upgrade, row) {
+  Find(function(m) identical(m$mechanism, row$mechanism) && identical(m$parent, row$from),
+       upgrade$models)$fit$trust
 }
 
 # How large the matter is, beside the noise and on data held out.
@@ -166,8 +181,10 @@ change_sentences <- function(upgrade) {
     row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
     entry <- upgrade$catalogue[[model$mechanism]]
     driven <- if (length(entry$boundary)) paste0(", driven by ", listed(entry$boundary)) else ""
-    c(sprintf("%s (%s)%s: %s Evidence %s, odds of %s.", model$mechanism, model$verdict, driven,
-              entry$sentence, row$word, odds(row$log10_bf)),
+    evidence <- if (is_sound(row, upgrade))
+      sprintf("Evidence %s, odds of %s.", row$word, odds(row$log10_bf))
+    c(paste(c(sprintf("%s (%s)%s: %s", model$mechanism, model$verdict, driven, entry$sentence),
+              evidence), collapse = " "),
       description_sentence(entry, last_fit(upgrade)), step_sentence(upgrade, model),
       doubt_sentence(model), confounded_sentence(model))
   }))
@@ -181,7 +198,7 @@ mechanism_words <- function(model, upgrade) {
   changes <- changes_table(upgrade)
   list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
        sentence = paste(c(entry$sentence, description_sentence(entry, last_fit(upgrade))),
-                        collapse = " "), evidence = evidence_sentence(row),
+                        collapse = " "), evidence = evidence_sentence(row, upgrade),
        brought = step_sentence(upgrade, model), against = doubt_sentence(model),
        also = c(rival_sentence(upgrade, model), confounded_sentence(model)),
        inspect = mechanism_inspections(upgrade, model),
@@ -191,6 +208,7 @@ mechanism_words <- function(model, upgrade) {
 # What else could have been adopted at the same step.
 rival_sentence <- function(upgrade, model) {
   trials <- upgrade$candidates[upgrade$candidates$from == model$parent, ]
+  if (!is_sound(trials[trials$mechanism == model$mechanism, ], upgrade)) return(NULL)
   others <- trials[trials$mechanism != model$mechanism, ]
   kept <- stats::setNames(c(others$probability, max(0, 1 - sum(trials$probability))),
                           c(others$mechanism, "no change"))

@@ -184,6 +184,12 @@ site_inspection <- function(upgrade, models) {
   brought <- table[table$mechanism %in% vapply(models, `[[`, "", "mechanism"), ]
   if (!NROW(brought)) return(NULL)
   last <- upgrade$models[[length(upgrade$models)]]
+  if (!last$fit$trust$trusted) {
+    causes <- listed(unique(brought$mechanism), "or")
+    return(c(site = sprintf(
+      "If %s is the cause, measure %s on site: the calibrated %s not trusted.", causes,
+      listed(brought$parameter), if (nrow(brought) > 1) "values are" else "value is")))
+  }
   between <- gsub(" to ", " and ", brought[["physical value"]] %||% brought[["95 % interval"]],
                   fixed = TRUE)
   values <- sprintf("%s lies between %s", brought$parameter, with_unit(between, brought$unit))
@@ -224,8 +230,8 @@ nearest_inspection <- function(upgrade) {
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf(
-    "The mechanism %s is not established (odds of %s%s): a longer record%s%s would decide%s.",
-    best$mechanism, odds(best$log10_bf),
+    "The mechanism %s is not established (%s%s): a longer record%s%s would decide%s.",
+    best$mechanism, odds_words(best, upgrade),
     if (isTRUE(best$error_ratio < rules$clearly_fallen))
       sprintf("; with it the error falls to %s", percent(best$error_ratio))
     else "",
@@ -234,6 +240,11 @@ nearest_inspection <- function(upgrade) {
                  paste(listed(drivers), if (length(drivers) > 1) "change" else "changes")),
     longer_words(best, upgrade),
     if (NROW(new)) sprintf(", or a check on site whether there is %s", called_for(new)) else ""))
+}
+
+odds_words <- function(row, upgrade) {
+  if (is_sound(row, upgrade)) paste("odds of", odds(row$log10_bf))
+  else "its numbers are not trusted"
 }
 
 # The nearest trial, if its numbers and those of the model are good enough to speak of.
@@ -265,7 +276,7 @@ budget_inspections <- function(upgrade) {
   open <- open_trials(upgrade)
   open <- open[!open$mechanism %in% unverified$mechanism, ]
   first <- if (!is.null(unverified))
-    sprintf("%s was not verified (odds of %s)", unverified$mechanism, odds(unverified$log10_bf))
+    sprintf("%s was not verified (%s)", unverified$mechanism, odds_words(unverified, upgrade))
   rough <- if (NROW(open)) rough_words(open)
   if (is.null(rough)) {
     return(if (!is.null(first)) {

@@ -37,8 +37,10 @@ next_step <- function(state, context) {
     table <- trial_table(alone, present, left, context$control$decisive)
     return(c(state, list(stopped = no_winner(table, last_model(state$models), context))))
   }
-  context$say("Adopted {.strong {best$mechanism}}: log10 Bayes factor {round(best$log10_bf, 1)}")
   adopted <- trials[[best$mechanism]]
+  evidence <- if (best$trusted) sprintf("log10 Bayes factor %.1f", best$log10_bf)
+              else "its numbers are not trusted"
+  context$say("Adopted {.strong {best$mechanism}}: {evidence}")
   measured <- measured_model(adopted, context)
   measured$may_replace <- staged(paste(best$mechanism, "without others"),
                                  may_replace(adopted, state, context))
@@ -293,6 +295,8 @@ best_so_far <- function(seen, decisive) {
 
 # With as many digits as it takes to see that it is less than what is needed.
 found_words <- function(row, decisive) {
+  if (isFALSE(row$trusted))
+    return(sprintf("best: %s, whose numbers are not trusted", row$mechanism))
   digits <- if (row$log10_bf < decisive && round(row$log10_bf, 1) >= decisive) 2 else 1
   sprintf("best: %s, log10 Bayes factor %.*f", row$mechanism, digits, row$log10_bf)
 }

@@ -90,7 +90,10 @@ disagreements <- function(upgrade) {
 
   # Sure or not.
   trusted <- last$fit$trust$trusted
-  if (!trusted && says(told$sure, "odds of")) note("odds of numbers that are not trusted")
+  for (where in names(texts))
+    if (!trusted && length(upgrade$models) < 3 && says(texts[[where]], "odds of (?!100 to 1 and)",
+                                                       perl = TRUE))
+      note("%s gives odds of numbers that are not trusted", where)
   if (!trusted && !says(texts$report, "not trusted|not to be trusted|cannot be trusted"))
     note("the report does not say that numbers are not trusted")
   all_trusted <- all(vapply(upgrade$models, function(m) m$fit$trust$trusted, NA),

@@ -8,7 +8,6 @@ test_that(paste("it is the factor, and what the present model loses without the 
   row <-
     upgrade$candidates[upgrade$candidates$from == "base" & upgrade$candidates$mechanism == "sun", ]
   lost <- function(model) {
-    # The coarse sampler of the upgrade is not trusted with each seed.
     finer <- list(surrogates = 19, ais = list(pilot_chains = 128, groups = 8, max_groups = 16))
     table <- attribute_discrepancy(model$fit, finer, seed = 2)$table
     table$log10_bf_dropped[table$boundary == "Gv"]

@@ -346,6 +346,23 @@ test_that("why nothing was adopted names the best, also where the error rises wi
   expect_match(told(log10_bf = c(1.96, 0.3))$words, "log10 Bayes factor 1.96;")
 })
 
+test_that("numbers that are not trusted give no odds, and no values to find on site", {
+  texts <- function(upgrade) {
+    upgrade <- rejudged(upgrade)
+    paste(c(utils::capture.output(print(upgrade)), unlist(summary(upgrade))), collapse = " ")
+  }
+  sound <- small_upgrade()
+  expect_match(texts(sound), "odds of 10\\^.*lies between")
+  lost <- sound
+  lost$models[[2]]$fit$trust <- amiss:::new_trust(FALSE, "no draws lie at 1 of the modes")
+  lost$candidates$trusted[lost$candidates$mechanism == "sun"] <- FALSE
+  told <- texts(lost)
+  expect_no_match(told, "odds of|most probable|per cent of the probability|lies between")
+  expect_match(told, "sun \\(Gv\\), its numbers are not trusted")
+  expect_match(told, "Why the numbers of sun are not trusted: no draws lie at 1 of the modes")
+  expect_match(told, "measure gain of the sun on site: the calibrated value is not trusted")
+})
+
 test_that(
   "where the base model's emulator is refuted, no mechanism is judged and no odds are given", {
   open <- base_only(small_upgrade())
