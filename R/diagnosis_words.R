@@ -138,8 +138,8 @@ trust_sentence <- function(upgrade, best) {
   why <- if (base$trusted) adopted_trust(upgrade, best)$why else base$why
   who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
   sprintf(
-    paste("Why the numbers of %s are not trusted: %s. The decision may depend on them: more runs or",
-          "chains would settle it."),
+    paste("Why the numbers of %s are not trusted: %s. The decision may depend on them: more runs",
+          "or chains would settle it."),
     listed(who), if (length(why)) paste(why, collapse = "; ") else "its few runs leave them rough")
 }
 

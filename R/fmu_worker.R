@@ -130,12 +130,12 @@ unpacked_fmus <- new.env(parent = emptyenv())
 fmu_origin <- function(fmu, platform) {
   folder <- unpacked_fmus[[fmu$hash]]
   name <- paste0(fmu$identifier, library_extension(platform))
-  library <- function(folder) file.path(folder, "binaries", platform, name)
-  if (is.null(folder) || !file.exists(library(folder))) {
+  binary <- function(folder) file.path(folder, "binaries", platform, name)
+  if (is.null(folder) || !file.exists(binary(folder))) {
     folder <- unpack_fmu(fmu$file, platform)
     unpacked_fmus[[fmu$hash]] <- folder
   }
-  list(library = library(folder), resources = file.path(folder, "resources"), version = fmu$version,
+  list(library = binary(folder), resources = file.path(folder, "resources"), version = fmu$version,
        token = fmu$token, name = fmu$identifier)
 }
 

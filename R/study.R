@@ -80,9 +80,9 @@
 #'   If the command `amiss` ends with status 0, the work was done. It does not mean that a cause was
 #'   found or that numbers are trusted.
 #'
-#' @section Tables: The table in `data` is a text file. Its header is the line that holds `time`,
-#'   `target` and `boundary`. What stands above it is left out, and so are lines that begin with `#`
-#'   and rows of units below the header.
+#' @section Tables: The table in `data` is a text file, which may be compressed (`.gz`). Its header
+#'   is the line that holds `time`, `target` and `boundary`. What stands above it is left out, and
+#'   so are lines that begin with `#` and rows of units below the header.
 #'
 #'   Fields are separated by commas, semicolons, tabs, bars or spaces, whichever separates the names
 #'   in the header. If that fails, give `separator`: `comma`, `semicolon`, `tab`, `bar`, `space`, or

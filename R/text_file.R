@@ -31,19 +31,37 @@ read_any_text <- function(path, field, call = rlang::caller_env()) {
   text
 }
 
-# Without a byte-order mark of UTF-8.
+# The bytes of a file, of one that gzip has compressed those it holds; without a byte-order mark of
+# UTF-8.
 checked_bytes <- function(path, field, call) {
   if (!is_regular_file(path)) {
     abort_input(c("The {.field {field}} file {.file {path}} is not a regular file.",
                   i = "Name a file that can be read from its start to its end."),
                 call = call)
   }
-  bytes <- tryCatch(suppressWarnings(readBin(path, "raw", file.size(path))), error = function(e) {
+  bytes <- tryCatch(unpacked_bytes(path), error = function(e) {
     abort_input(c("The {.field {field}} file {.file {path}} cannot be read.",
                   x = "{conditionMessage(e)}"), call = call)
   })
   mark <- as.raw(c(0xef, 0xbb, 0xbf))
   if (identical(utils::head(bytes, 3), mark)) bytes[-(1:3)] else bytes
+}
+
+# A file of gzip ends with the size of what it holds (modulo 2^32), by which one that is cut off is
+# known: gzfile() reads it as if it were whole.
+unpacked_bytes <- function(path) {
+  bytes <- suppressWarnings(readBin(path, "raw", file.size(path)))
+  if (!identical(utils::head(bytes, 2), as.raw(c(0x1f, 0x8b)))) return(bytes)
+  size <- sum(as.integer(utils::tail(c(raw(4), bytes), 4)) * 256^(0:3))
+  file <- gzfile(path, "rb")
+  on.exit(close(file))
+  blocks <- list(raw())
+  while (length(block <- suppressWarnings(readBin(file, "raw", 2^22))))
+    blocks <- c(blocks, list(block))
+  unpacked <- do.call(c, blocks)
+  if (length(unpacked) %% 2^32 != size)
+    stop("It is compressed, and damaged or cut off: unpack it with gunzip to see.")
+  unpacked
 }
 
 # trimws() in a time that grows as the text does, also if it holds a hundred thousand blanks.

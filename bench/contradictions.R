@@ -31,7 +31,7 @@ places_of <- function(upgrade) {
        json = engine$result_list(upgrade))
 }
 
-squeezed <- function(text) gsub("[[:space:]]+", " ", paste(unlist(text), collapse = " "))
+squeezed <- function(text) gsub("[[:space:]\u00a0]+", " ", paste(unlist(text), collapse = " "))
 says <- function(text, pattern, ...) grepl(pattern, squeezed(text), ...)
 
 # What disagrees: a text each, none if all agree.

@@ -61,7 +61,7 @@ crude_catalogue <- function(states) {
 }
 
 crude_record <- function(house) {
-  file <- system.file("extdata", paste0("twinhouse_exp1_", house, "_rolbs_freefloat_10min.csv"),
+  file <- system.file("extdata", paste0("twinhouse_exp1_", house, "_rolbs_freefloat_10min.csv.gz"),
                       package = "amiss")
   data <- utils::read.csv(file)
   data <- transform(data, heating = P_living / 1000, sun = Gv_S / 1000, corridor = Ti_corridor,

@@ -2,7 +2,7 @@
 # Usage: Rscript given_runs.R [FOLDER for the report]
 library(amiss)
 
-record <- read.csv(system.file("extdata", "twinhouse_exp1_O5_rolbs_freefloat_10min.csv", package = "amiss"))
+record <- read.csv(system.file("extdata", "twinhouse_exp1_O5_rolbs_freefloat_10min.csv.gz", package = "amiss"))
 room <- measurements(record, time = "time_cet", target = "Ti", unit = "K", noise_sd = 0.1, average = 1, warmup = 24,
                      boundary = ~ Te + Gv_S + Gv_W + Lw_h + Ws + circular(Wd) + P_living + T_kitchen,
                      calibrate = record$phase == "rolbs", validate = record$phase == "freefloat", name = "House O5")

@@ -166,3 +166,17 @@ test_that("blanks at the ends of long texts are left out in a time that grows as
   texts <- c(a = paste0(long, "x \u00e9", long), b = long, c = " y ")
   expect_identical(amiss:::without_blanks(texts), c(a = "x \u00e9", b = "", c = "y"))
 })
+
+test_that("a table of gzip is read, and one that is cut off or damaged is refused", {
+  lines <- charToRaw(paste0(c("Zeit,Te,Ti", plain), "\n", collapse = ""))
+  path <- withr::local_tempfile(fileext = ".csv.gz")
+  file <- gzfile(path, "wb")
+  writeBin(lines, file)
+  close(file)
+  expect_identical(read_table_file(path, c("Zeit", "Ti", "Te"))$Ti, Ti)
+  bytes <- readBin(path, "raw", 1e5)
+  for (kept in c(3, 20, length(bytes) - c(40, 9, 8, 1)))
+    refused(NULL, "cannot be read", bytes = utils::head(bytes, kept))
+  refused(NULL, "damaged or cut off", bytes = utils::head(bytes, length(bytes) - 40))
+  refused(NULL, "cannot be read", bytes = replace(bytes, 100:200, as.raw(0)))
+})

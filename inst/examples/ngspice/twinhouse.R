@@ -4,7 +4,7 @@
 library(amiss)
 
 folder <- system.file("examples", "ngspice", package = "amiss")
-minutes <- read.csv(system.file("extdata", "twinhouse_exp1_O5_rolbs_freefloat_10min.csv", package = "amiss"))
+minutes <- read.csv(system.file("extdata", "twinhouse_exp1_O5_rolbs_freefloat_10min.csv.gz", package = "amiss"))
 ends <- seq(6, nrow(minutes), 6)
 record <- data.frame(minutes[ends, c("time_cet", "phase")],
                      rowsum(minutes[-(1:2)], rep(ends, each = 6)) / 6)  # means of hours
