@@ -164,7 +164,8 @@ attribute_record <- function(fits, which, control, seed, threads) {
 # Evidence lost, by the sets of conditions without which it is.
 by_condition_set <- function(lost, sets) stats::setNames(lost, vapply(sets, condition_set, ""))
 
-condition_set <- function(conditions) toString(sort(conditions))
+# In an order that does not depend on the locale, which workers need not share.
+condition_set <- function(conditions) toString(sort(conditions, method = "radix"))
 
 # As AttributionOptions::significant() of the engine.
 is_significant <- function(log10_bf, p_value, control) {

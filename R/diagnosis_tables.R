@@ -89,17 +89,18 @@ candidates_words <- function(upgrade) {
   drives <- vapply(table$mechanism,
                    function(name) paste(upgrade$catalogue[[name]]$boundary, collapse = ", "), "")
   decision <- decision_words(table, upgrade$control$decisive)
+  sound <- is_sound(table, upgrade)
   factor <- same_decimals(table$log10_bf, table$lower95, table$upper95, "+")
   data.frame(step = table$step, mechanism = table$mechanism, "driven by" = drives,
              "log10 Bayes factor" = factor$estimate,
              "95 % interval" = paste(factor$lower, "to", factor$upper),
-             evidence = ifelse(table$trusted, table$word, ""),
+             evidence = ifelse(sound, table$word, ""),
              "beside an unknown response" = signed(table$beside_unknown),
              "with no unknown response" = signed(table$standing),
-             probability = ifelse(startsWith(decision, "refused") | !table$trusted, "",
+             probability = ifelse(startsWith(decision, "refused") | !sound, "",
                                   percent(table$probability)),
              "error in calibration" = error_words(table$error_ratio),
-             estimate = ifelse(!table$trusted, "rough",
+             estimate = ifelse(!sound, "rough",
                                ifelse(table$judged_by == "runs", "verified", "trial")),
              decision = decision, check.names = FALSE, row.names = NULL)
 }

@@ -19,10 +19,11 @@ improves_held_out <- function(upgrade) {
 is_too_rough <- function(row)
   !isTRUE(row$trusted) && row$upper95 - row$lower95 > rules$too_rough
 
-# Whether the numbers of a trial and of the model it extends can be trusted.
-is_sound <- function(row, upgrade) isTRUE(row$trusted) && parent_of(row, upgrade)$fit$trust$trusted
-
-parent_of <- function(row, upgrade) Find(function(m) m$name == row$from, upgrade$models)
+# Whether the numbers of trials and of the models they extend can be trusted.
+is_sound <- function(rows, upgrade) {
+  sure <- Filter(function(model) model$fit$trust$trusted, upgrade$models)
+  rows$trusted & rows$from %in% vapply(sure, `[[`, "", "name")
+}
 
 evidence_sentence <- function(row, upgrade) {
   if (is_too_rough(row)) {
@@ -56,18 +57,15 @@ sure_sentences <- function(upgrade) {
     return(c(missing_sentence(upgrade), if (is_sound(best, upgrade)) probability_sentence(trials),
              evidence_sentence(best, upgrade), needed, trust_sentence(upgrade, best)))
   }
-  each <- unlist(lapply(adopted, function(m) {
-    row <- upgrade$candidates[upgrade$candidates$from == m$parent &
-                              upgrade$candidates$mechanism == m$mechanism, ]
-    evidence_sentence(row, upgrade)
-  }))
+  rows <- do.call(rbind, lapply(adopted, candidate_row, upgrade))
+  each <- vapply(seq_len(nrow(rows)), function(k) evidence_sentence(rows[k, ], upgrade), "")
   first <- trials[1, ]
   c(each, if (is_sound(best, upgrade)) probability_sentence(trials),
     if (first$mechanism != best$mechanism) {
       if (keeps_error(first)) raised_sentence(first, " first")
-      else if (is_sound(first, upgrade) && best$trusted) outranked_sentence(first, best)
+      else if (all(is_sound(rbind(first, best), upgrade))) outranked_sentence(first, best)
     },
-    trust_sentence(upgrade, best))
+    trust_sentence(upgrade, rows))
 }
 
 raised_sentence <- function(row, when = "") {
@@ -87,10 +85,13 @@ outranked_sentence <- function(row, best) {
 }
 
 refuted_sentence <- function(row) {
+  factor <- if (row$trusted)
+    sprintf(": if both models have such a response, its log10 Bayes factor is %s",
+            signed(row$beside_unknown))
   capital(sprintf(
     paste("%s was not adopted, because an unknown response to what drives it explains the error",
-          "better: if both models have such a response, its log10 Bayes factor is %s."),
-    row$mechanism, signed(row$beside_unknown)))
+          "better%s."),
+    row$mechanism, factor %||% ""))
 }
 
 unjudged_sentence <- function(fit) {
@@ -111,22 +112,27 @@ missing_sentence <- function(upgrade) {
 }
 
 probability_sentence <- function(trials) {
+  rough <- trials$mechanism[!trials$trusted]
   all <- stats::setNames(c(trials$probability, max(0, 1 - sum(trials$probability))),
                          c(trials$mechanism, "no change"))
   all <- sort(all, decreasing = TRUE)
   near <- all[-1][all[-1] >= 0.01]
-  told <- function(p) paste0(names(p), " (", percent(unname(p)), ")")
   tried <- if (nrow(trials) == 1) "the mechanism" else paste("the", nrow(trials), "mechanisms")
-  then <- if (length(near)) paste0("; then ", listed(told(utils::head(near, 3)))) else ""
+  then <- if (length(near)) paste0("; then ", listed(rival_words(utils::head(near, 3), rough)))
   sprintf("If %s and \"no change\" were equally likely beforehand, the most probable is now %s%s.",
-          tried, told(all[1]), then)
+          tried, rival_words(all[1], NULL), then %||% "")
 }
 
-# Whether the numbers behind the first decision can be trusted, in words; if not, whether the
-# decision depends on it.
-trust_sentence <- function(upgrade, best) {
+candidate_row <- function(model, upgrade) {
+  upgrade$candidates[upgrade$candidates$from == model$parent &
+                       upgrade$candidates$mechanism == model$mechanism, ]
+}
+
+# Whether the numbers behind some trials can be trusted; if not, whose they are and why.
+trust_sentence <- function(upgrade, rows) {
   base <- upgrade$models[[1]]$fit$trust
-  if (base$trusted && best$trusted) {
+  rough <- rows[!rows$trusted, ]
+  if (base$trusted && !nrow(rough)) {
     open <- open_trials(upgrade)
     return(paste0("These numbers can be trusted: they passed all checks.",
                   if (NROW(open))
@@ -134,19 +140,24 @@ trust_sentence <- function(upgrade, best) {
                                   "see what to inspect next."),
                             listed(open$mechanism), if (NROW(open) > 1) "were" else "was")))
   }
-  if (base$trusted && is_too_rough(best)) return(NULL)
-  why <- if (base$trusted) adopted_trust(upgrade, best)$why else base$why
-  who <- c(if (!base$trusted) "the base model", if (!best$trusted) best$mechanism)
-  sprintf(
-    paste("Why the numbers of %s are not trusted: %s. The decision may depend on them: more runs",
-          "or chains would settle it."),
-    listed(who), if (length(why)) paste(why, collapse = "; ") else "its few runs leave them rough")
+  if (base$trusted && nrow(rows) == 1 && is_too_rough(rows)) return(NULL)
+  who <- c(if (!base$trusted) with_reason("the base model", base$why),
+           vapply(seq_len(nrow(rough)), function(k) {
+             with_reason(rough$mechanism[k], untrusted_why(rough[k, ], upgrade))
+           }, ""))
+  sprintf(paste("Not trusted: %s. The decision may depend on these numbers: more runs or chains",
+                "would settle it."), listed(who))
 }
 
-# The trust in what a row of the candidates led to; NULL if it was not adopted.
-adopted_trust <- function(upgrade, row) {
-  Find(function(m) identical(m$mechanism, row$mechanism) && identical(m$parent, row$from),
-       upgrade$models)$fit$trust
+with_reason <- function(name, why)
+  if (length(why)) sprintf("%s (%s)", name, paste(why, collapse = "; ")) else name
+
+# Of a model that was adopted, as its fit says.
+untrusted_why <- function(row, upgrade) {
+  adopted <- Find(function(m) identical(m$mechanism, row$mechanism) &&
+                    identical(m$parent, row$from), upgrade$models)
+  if (!is.null(adopted)) adopted$fit$trust$why
+  else if (row$judged_by == "trial") "it had few runs"
 }
 
 # How large the matter is, beside the noise and on data held out.
@@ -178,7 +189,7 @@ change_sentences <- function(upgrade) {
   if (!length(adopted)) return("Nothing: the base model stays as it is.")
   trials <- upgrade$candidates
   unlist(lapply(adopted, function(model) {
-    row <- trials[trials$from == model$parent & trials$mechanism == model$mechanism, ]
+    row <- candidate_row(model, upgrade)
     entry <- upgrade$catalogue[[model$mechanism]]
     driven <- if (length(entry$boundary)) paste0(", driven by ", listed(entry$boundary)) else ""
     evidence <- if (is_sound(row, upgrade))
@@ -192,8 +203,7 @@ change_sentences <- function(upgrade) {
 
 # All that is reported of one mechanism.
 mechanism_words <- function(model, upgrade) {
-  row <- upgrade$candidates[upgrade$candidates$from == model$parent &
-                            upgrade$candidates$mechanism == model$mechanism, ]
+  row <- candidate_row(model, upgrade)
   entry <- upgrade$catalogue[[model$mechanism]]
   changes <- changes_table(upgrade)
   list(name = model$mechanism, verdict = model$verdict, drivers = entry$boundary,
@@ -213,11 +223,12 @@ rival_sentence <- function(upgrade, model) {
   kept <- stats::setNames(c(others$probability, max(0, 1 - sum(trials$probability))),
                           c(others$mechanism, "no change"))
   kept <- sort(kept[kept >= 0.01], decreasing = TRUE)
+  rough <- others$mechanism[!is_sound(others, upgrade)]
   if (!length(kept)) return(paste("Neither another mechanism tried at this step nor \"no change\"",
                                   "keeps one per cent of the probability."))
   sprintf("At this step %s too: %s.",
           if (length(kept) > 1) "others are possible" else "another is possible",
-          listed(paste0(names(kept), " (", percent(unname(kept)), ")")))
+          listed(rival_words(kept, rough)))
 }
 
 # What one step brought.

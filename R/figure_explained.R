@@ -1,10 +1,14 @@
 # What each mechanism leaves of the error's responses to the boundary conditions that drive it.
 
-explained_title <- function(table, adopted) {
+explained_title <- function(table, adopted, catalogue) {
   if (!length(adopted))
     return("How much of the error's response to its conditions each mechanism explains")
   own <- table[table$step == 1 & table$mechanism == adopted[1], ]
-  if (!nrow(own)) return(paste(adopted[1], "is driven by no boundary condition"))
+  if (!nrow(own)) {
+    drivers <- catalogue[[adopted[1]]]$boundary
+    return(if (length(drivers)) paste("The numbers of", adopted[1], "are not trusted")
+           else paste(adopted[1], "is driven by no boundary condition"))
+  }
   sprintf("With %s, the evidence for a response to %s falls from %s to %s powers of ten",
           adopted[1], listed(own$condition), decades_label(own$before[1]),
           decades_label(own$left[1]))
@@ -46,7 +50,7 @@ figure_explained <- function(upgrade) {
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1, scales = "free_y",
                         labeller = wrap_strips()) +
     ggplot2::coord_cartesian(clip = "off") +
-    figure_titles(explained_title(table, adopted),
+    figure_titles(explained_title(table, adopted, upgrade$catalogue),
                   paste("Evidence that the error responds to boundary conditions, in powers of",
                         "ten. First row: to each by itself, without a change. Below: to all that",
                         "drive a mechanism together, without -> with it."),

@@ -74,8 +74,9 @@ rival_pairs <- function(model, upgrade) {
   lapply(rivals$mechanism, function(rival) {
     names <- c(model$mechanism, rival)
     drivers <- lapply(upgrade$catalogue[names], `[[`, "boundary")
-    asks <- vapply(names, function(name)
-      called_for(trials$parameters[[match(name, trials$mechanism)]]), "")
+    asks <- vapply(match(names, trials$mechanism), function(k)
+      called_for(trials$parameters[[k]], is_sound(trials[k, ], upgrade)), "")
+    names(asks) <- names
     list(names = names, drivers = sort(drivers[[1]]), asks = asks,
          measure = separating_words(upgrade$measurements, drivers[[1]], drivers[[2]]))
   })
@@ -130,9 +131,12 @@ correlation_words <- function(measurements, a, b) {
   else sprintf(" (in this record the correlation of %s and %s is %.2f)", pairs$a, pairs$b, r)
 }
 
-called_for <- function(parameters) {
+# With their values, if the numbers behind them are `sound`.
+called_for <- function(parameters, sound = TRUE) {
   if (!NROW(parameters)) return("no value that could be checked")
-  listed(sprintf("%s of %s", with_article(parameters$label %||% parameters$name),
+  label <- with_article(parameters$label %||% parameters$name)
+  if (!sound) return(listed(label))
+  listed(sprintf("%s of %s", label,
                  with_unit(interval_words(parameters$lower95, parameters$upper95),
                            parameters$unit)))
 }
@@ -226,12 +230,12 @@ is_unverified <- function(row, upgrade)
 
 nearest_inspection <- function(upgrade) {
   best <- near_trial(upgrade)
-  if (!NROW(best) || is_unverified(best, upgrade)) return(NULL)
+  if (!NROW(best) || is_unverified(best, upgrade) || !is_sound(best, upgrade)) return(NULL)
   drivers <- upgrade$catalogue[[best$mechanism]]$boundary
   new <- best$parameters[[1]]
   c(nearest = sprintf(
-    "The mechanism %s is not established (%s%s): a longer record%s%s would decide%s.",
-    best$mechanism, odds_words(best, upgrade),
+    "The mechanism %s is not established (odds of %s%s): a longer record%s%s would decide%s.",
+    best$mechanism, odds(best$log10_bf),
     if (isTRUE(best$error_ratio < rules$clearly_fallen))
       sprintf("; with it the error falls to %s", percent(best$error_ratio))
     else "",
@@ -240,11 +244,6 @@ nearest_inspection <- function(upgrade) {
                  paste(listed(drivers), if (length(drivers) > 1) "change" else "changes")),
     longer_words(best, upgrade),
     if (NROW(new)) sprintf(", or a check on site whether there is %s", called_for(new)) else ""))
-}
-
-odds_words <- function(row, upgrade) {
-  if (is_sound(row, upgrade)) paste("odds of", odds(row$log10_bf))
-  else "its numbers are not trusted"
 }
 
 # The nearest trial, if its numbers and those of the model are good enough to speak of.
@@ -276,7 +275,9 @@ budget_inspections <- function(upgrade) {
   open <- open_trials(upgrade)
   open <- open[!open$mechanism %in% unverified$mechanism, ]
   first <- if (!is.null(unverified))
-    sprintf("%s was not verified (%s)", unverified$mechanism, odds_words(unverified, upgrade))
+    sprintf("%s was not verified (%s)", unverified$mechanism,
+            if (is_sound(unverified, upgrade)) paste("odds of", odds(unverified$log10_bf))
+            else "its numbers are not trusted")
   rough <- if (NROW(open)) rough_words(open)
   if (is.null(rough)) {
     return(if (!is.null(first)) {
@@ -330,7 +331,7 @@ answer_inspections <- function(upgrade, last) {
   })
   open <- c(nearest_trial(upgrade)$mechanism, open_trials(upgrade)$mechanism)
   trials <- last_trials(upgrade)
-  falls <- trials[trials$trusted & !trials$mechanism %in% open &
+  falls <- trials[is_sound(trials, upgrade) & !trials$mechanism %in% open &
                     !is.na(trials$error_ratio) & trials$error_ratio < rules$clearly_fallen, ]
   best <- as.character(falls$mechanism[order(as.numeric(falls$error_ratio))])
   fallen <- vapply(driven, function(d) best[match(TRUE, best %in% d)], "")

@@ -13,8 +13,10 @@ doubts <- list(
     if (describes(case$entry)) "it describes what is missing and does not explain it"
   }, "a response is no cause"),
   rivals = doubt(function(case) {
-    if (length(case$rivals))
-      sprintf("this record does not distinguish it from %s", listed(rival_words(case$rivals), "or"))
+    if (length(case$rivals)) {
+      sprintf("this record does not distinguish it from %s",
+              listed(rival_words(case$rivals, case$rough), "or"))
+    }
   }, "others may have more than 5 % of the probability"),
   open = doubt(function(case) {
     if (length(case$open))
@@ -122,6 +124,8 @@ mechanism_case <- function(models, k, catalogue, candidates, control, threads, l
        entry = catalogue[[model$mechanism]], catalogue = catalogue, gain = gain,
        no_gain = isFALSE(gain$improves),
        rivals = rivals_of(trials, c(model$mechanism, later)),
+       rough = if (row$trusted && parent$fit$trust$trusted) trials$mechanism[!trials$trusted]
+               else c("no change", trials$mechanism),
        open = open_rivals(trials, row, c(model$mechanism, later)),
        unsettled = later[vapply(models[-seq_len(k)],
                                 function(m) model$mechanism %in% m$may_replace, NA)],
@@ -145,7 +149,11 @@ open_rivals <- function(trials, row, adopted) {
   trials$mechanism[which(near & !trials$trusted & !trials$mechanism %in% adopted)]
 }
 
-rival_words <- function(rivals) paste0(names(rivals), " (", percent(unname(rivals)), ")")
+# With their probabilities, but for those whose numbers are `rough`.
+rival_words <- function(rivals, rough) {
+  ifelse(names(rivals) %in% rough, names(rivals),
+         paste0(names(rivals), " (", percent(unname(rivals)), ")"))
+}
 
 judged_model <- function(case) {
   model <- case$model

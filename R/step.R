@@ -257,23 +257,24 @@ why_not <- function(table, decisive, context) {
   highest <- seen[which.max(seen$log10_bf), ]
   if (keeps_error(highest) && highest$log10_bf >= decisive) {
     return(list(id = "keeps_error", words = sprintf(
-      paste("no mechanism with decisive evidence lowers the error by 1 %% (%s has a log10 Bayes",
-            "factor of %.1f)"), highest$mechanism, highest$log10_bf)))
+      "no mechanism with decisive evidence lowers the error by 1 %% (%s)",
+      factor_words(highest))))
   }
   if (is_refuted(highest) && highest$log10_bf >= decisive) {
     return(list(id = "imitated",
-                words = sprintf(paste("no mechanism has enough evidence (%s has a log10 Bayes",
-                                      "factor of %.1f, but one of %.1f beside an unknown",
-                                      "response to what drives it)"), highest$mechanism,
-                                highest$log10_bf, highest$beside_unknown)))
+                words = sprintf(paste("no mechanism has enough evidence (%s, but %s beside an",
+                                      "unknown response to what drives it)"),
+                                factor_words(highest),
+                                if (isFALSE(highest$trusted)) "it is refuted"
+                                else sprintf("one of %.1f", highest$beside_unknown))))
   }
   best <- best_trial(table, decisive)
   if (!nrow(best) || highest$log10_bf < decisive) best <- highest
   found <- found_words(best, decisive)
   if (best$log10_bf < decisive) {
     list(id = "not_decisive", words = sprintf(
-      "no mechanism has enough evidence (%s; %s or more and an interval above zero are needed)",
-      found, format(decisive)))
+      "no mechanism has enough evidence (%s; %s%s or more and an interval above zero are needed)",
+      found, if (isFALSE(best$trusted)) "a log10 Bayes factor of " else "", format(decisive)))
   } else {
     list(id = "uncertain",
          words = sprintf("the evidence for the best mechanism is too uncertain (%s)", found))
@@ -291,6 +292,11 @@ best_so_far <- function(seen, decisive) {
   best <- seen[which.max(seen$log10_bf), ]
   sprintf(" (%s%s)", found_words(best, decisive),
           if (best$judged_by == "trial") ", not verified" else "")
+}
+
+factor_words <- function(row) {
+  if (isFALSE(row$trusted)) sprintf("the numbers of %s are not trusted", row$mechanism)
+  else sprintf("%s has a log10 Bayes factor of %.1f", row$mechanism, row$log10_bf)
 }
 
 # With as many digits as it takes to see that it is less than what is needed.

@@ -60,7 +60,7 @@ unpacked_bytes <- function(path) {
     blocks <- c(blocks, list(block))
   unpacked <- do.call(c, blocks)
   if (length(unpacked) %% 2^32 != size)
-    stop("It is compressed, and damaged or cut off: unpack it with gunzip to see.")
+    stop("It is compressed and damaged, cut off, or made of several files: unpack it with gunzip.")
   unpacked
 }
 

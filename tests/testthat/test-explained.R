@@ -19,6 +19,24 @@ test_that(paste("it is the factor, and what the present model loses without the 
   expect_gt(row$log10_bf, row$beside_unknown)
 })
 
+test_that("what the attribution knows of the present model is not sampled again", {
+  asked <- NULL
+  stand_in(lost_without = function(model, conditions, context) {
+    asked <<- c(asked, list(conditions))
+    -1
+  })
+  upgrade <- small_upgrade()
+  attribution <- upgrade$models[[1]]$attribution
+  catalogue <- c(upgrade$catalogue["sun"], list(both = list(boundary = c("Te", "Gv"))))
+  model <- amiss:::with_losses(list(), catalogue, attribution$lost, NULL)
+  table <- attribution$table
+  expect_equal(model$lost[["Gv"]], table$log10_bf_dropped[table$boundary == "Gv"])
+  expect_equal(asked, list(c("Gv", "Te")))
+  expect_equal(model$lost[["Gv, Te"]], -1)
+  # In an order that workers in another locale share.
+  expect_identical(amiss:::condition_set(c("gain", "Te")), "Te, gain")
+})
+
 test_that("a mechanism without conditions takes nothing away", {
   present <- list(conditions = list(sun = character()), catalogued = character(), lost = list())
   trial <- amiss:::with_taken(list(mechanism = "sun"), present, NULL)

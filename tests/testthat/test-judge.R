@@ -359,8 +359,36 @@ test_that("numbers that are not trusted give no odds, and no values to find on s
   told <- texts(lost)
   expect_no_match(told, "odds of|most probable|per cent of the probability|lies between")
   expect_match(told, "sun \\(Gv\\), its numbers are not trusted")
-  expect_match(told, "Why the numbers of sun are not trusted: no draws lie at 1 of the modes")
+  expect_match(told, "Not trusted: sun \\(no draws lie at 1 of the modes\\)")
   expect_match(told, "measure gain of the sun on site: the calibrated value is not trusted")
+  # A rival keeps its name, and its probability only if its own numbers are trusted too.
+  near <- function(u, trusted) {
+    second <- u$candidates$mechanism == "drift"
+    u$candidates$probability <- ifelse(second, 0.2, 0.8)
+    u$candidates$trusted[second] <- trusted
+    texts(u)
+  }
+  expect_match(near(sound, TRUE), "distinguish it from drift \\(20 %\\)")
+  expect_match(near(sound, FALSE), "distinguish it from drift(;|\\.)")
+  expect_no_match(near(lost, TRUE), "\\((20|80) %\\)")
+})
+
+test_that("a second mechanism whose numbers are not trusted is said beside a first whose are", {
+  upgrade <- small_upgrade()
+  second <- upgrade$models[[2]]
+  second$name <- "base + sun + drift"
+  second$parent <- upgrade$models[[2]]$name
+  second$mechanism <- "drift"
+  second$fit$trust <- amiss:::new_trust(FALSE, "chains hardly move")
+  upgrade$models[[3]] <- second
+  row <- upgrade$candidates[upgrade$candidates$mechanism == "sun", ]
+  upgrade$candidates <- rbind(upgrade$candidates,
+                              transform(row, from = second$parent, mechanism = "drift",
+                                        trusted = FALSE))
+  sure <- paste(amiss:::sure_sentences(upgrade), collapse = " ")
+  expect_match(sure, "The evidence for sun over no change is decisive: odds of")
+  expect_match(sure, "No odds are given for drift.*Not trusted: drift \\(chains hardly move\\)")
+  expect_no_match(sure, "can be trusted")
 })
 
 test_that(
