@@ -19,12 +19,6 @@ improves_held_out <- function(upgrade) {
 is_too_rough <- function(row)
   !isTRUE(row$trusted) && row$upper95 - row$lower95 > rules$too_rough
 
-# Whether the numbers of trials and of the models they extend can be trusted.
-is_sound <- function(rows, upgrade) {
-  sure <- Filter(function(model) model$fit$trust$trusted, upgrade$models)
-  rows$trusted & rows$from %in% vapply(sure, `[[`, "", "name")
-}
-
 evidence_sentence <- function(row, upgrade) {
   if (is_too_rough(row)) {
     return(sprintf("The numbers for %s are too rough for odds.", row$mechanism))

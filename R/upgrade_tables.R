@@ -61,6 +61,12 @@ gain_table <- function(upgrade) {
   table[!is.na(table$value), ]
 }
 
+# Whether the numbers of trials and of the models they extend can be trusted.
+is_sound <- function(rows, upgrade) {
+  sure <- Filter(function(model) model$fit$trust$trusted, upgrade$models)
+  rows$trusted & rows$from %in% vapply(sure, `[[`, "", "name")
+}
+
 # Every trial that has a number, with its step and whether it was adopted there.
 candidate_table <- function(upgrade) {
   table <- upgrade$candidates[!is.na(upgrade$candidates$log10_bf), ]
