@@ -202,8 +202,7 @@ print.amiss_upgrade <- function(x, ...) on_stdout(x, {
   cli::cli_bullets(c("*" = "{diagnosis_verdict(x)$tag}"))
   listed_alone <- if (length(adopted) > 8) 7 else length(adopted)
   for (model in adopted[seq_len(listed_alone)]) {
-    row <- x$candidates[x$candidates$from == model$parent &
-                        x$candidates$mechanism == model$mechanism, ]
+    row <- candidate_row(model, x)
     boundary <- x$catalogue[[model$mechanism]]$boundary
     driven <- driver_words(model$mechanism, boundary)
     evidence <- if (is_sound(row, x)) sprintf("log10 Bayes factor %.1f", row$log10_bf)

@@ -28,8 +28,7 @@ next_step <- function(state, context) {
   trials <- c(alone, paired$trials)
   state$candidates <- rbind(state$candidates,
                             trial_table(trials, present, left, context$control$decisive))
-  state$responses <- rbind(state$responses,
-                           response_table(trials, present, attribution))
+  state$responses <- rbind(state$responses, response_table(trials, present, attribution))
   state$off <- utils::modifyList(state$off, Filter(Negate(is.null), lapply(trials, `[[`, "off")))
   best <- higher_of(to_adopt(alone, present, context),
                     to_adopt(paired$trials, present, paired$context))
@@ -262,11 +261,11 @@ why_not <- function(table, decisive, context) {
   }
   if (is_refuted(highest) && highest$log10_bf >= decisive) {
     return(list(id = "imitated",
-                words = sprintf(paste("no mechanism has enough evidence (%s, but %s beside an",
-                                      "unknown response to what drives it)"),
-                                factor_words(highest),
-                                if (isFALSE(highest$trusted)) "it is refuted"
-                                else sprintf("one of %.1f", highest$beside_unknown))))
+                words = sprintf("no mechanism has enough evidence (%s%s)", factor_words(highest),
+                                if (isFALSE(highest$trusted)) ""
+                                else sprintf(paste(", but one of %.1f beside an unknown response",
+                                                   "to what drives it"),
+                                             highest$beside_unknown))))
   }
   best <- best_trial(table, decisive)
   if (!nrow(best) || highest$log10_bf < decisive) best <- highest
