@@ -139,8 +139,8 @@ error_ratios_of <- function(fit, draws) {
          length(draws))
 }
 
-# Log-likelihood of runs (one a column) of a record, each at its draw; with the simulator itself
-# nothing is discarded.
+# Log-likelihood of runs (one a column) of a record, each at its draw or, if there are several for
+# each run, at those in turn; with the simulator itself nothing is discarded.
 run_log_likelihood <- function(fit, draws, runs, threads) {
   points <- list(setting = fit$posterior$setting[draws],
                  variance = fit$posterior$variance[draws] - fit$priors$discarded_variance,

@@ -459,9 +459,8 @@ share_of_modes <- function(model, fits, ends, covariances) {
 values_under <- function(model, fits, at) {
   draws <- even_draws(fits[[1]], rules$search_draws)
   each <- Map(function(fit, rows) {
-    log_l <- run_log_likelihood(
-      fit, rep(draws, length(at)),
-      model$runs$outputs[rows, rep(at, each = length(draws)), drop = FALSE], 1)
+    log_l <- run_log_likelihood(fit, rep(draws, length(at)),
+                                model$runs$outputs[rows, at, drop = FALSE], 1)
     apply(matrix(log_l, length(draws)), 2, log_mean_exp)
   }, fits, model$rows)
   Reduce(`+`, each) - 0.5 * rowSums(model$runs$z[at, !model$space$flat, drop = FALSE]^2)

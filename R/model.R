@@ -1,6 +1,7 @@
 # A model of the loop as a value: what it simulates, the runs that are known of it, and what has
 # been found out. One record is a list of one; parameters of the same name are one parameter. Points
-# z are those of coordinates.R. Outputs of all records stand below each other in one matrix.
+# z are those of coordinates.R. Of each run there are outputs, those of all records below each
+# other, and the sum of the squares of its errors over the noise.
 
 # What the loop needs of a record, once.
 loop_record <- function(measurements, control, call = rlang::caller_env()) {
@@ -34,7 +35,8 @@ new_model <- function(simulators, records, name = "base", parent = NULL, mechani
        target = unlist(lapply(records, function(record) record$data$y), use.names = FALSE),
        noise = rep(vapply(records, function(r) r$priors$noise_sd, 0), sizes),
        runs = list(z = matrix(0, 0, length(parameters), dimnames = list(NULL, names(parameters))),
-                   outputs = matrix(0, sum(sizes), 0), held = matrix(0, sum(held), 0)),
+                   outputs = new_columns(matrix(0, sum(sizes), 0)),
+                   held = new_columns(matrix(0, sum(held), 0)), squares = numeric()),
        level = "none")
 }
 
@@ -50,8 +52,13 @@ with_runs <- function(model, z, context) {
 }
 
 bind_runs <- function(runs, more) {
-  list(z = rbind(runs$z, more$z), outputs = cbind(runs$outputs, more$outputs),
-       held = cbind(runs$held, more$held))
+  list(z = rbind(runs$z, more$z), outputs = bind_columns(runs$outputs, more$outputs),
+       held = bind_columns(runs$held, more$held), squares = c(runs$squares, more$squares))
+}
+
+new_runs <- function(model, z, outputs, held) {
+  list(z = z, outputs = new_columns(outputs), held = new_columns(held),
+       squares = colSums(((outputs - model$target) / model$noise)^2))
 }
 
 # A record is run once at points that differ in nothing of its own. `kept_as`: under which name runs
@@ -75,7 +82,7 @@ run_at <- function(model, z, context, kept_as = "runs") {
   colnames(z) <- names(model$parameters)
   outputs <- part(TRUE)
   outputs[abs(outputs / model$noise) > largest_over_noise] <- NaN
-  list(z = z, outputs = outputs, held = part(FALSE))
+  new_runs(model, z, outputs, part(FALSE))
 }
 
 # An output so far beyond the noise is none: its square could not be computed with.
@@ -96,7 +103,7 @@ failure_words <- function(model, at) {
   }
 }
 
-succeeded <- function(model) colSums(!is.finite(model$runs$outputs)) == 0
+succeeded <- function(model) is.finite(model$runs$squares)
 
 # RMS of a difference of outputs in units of the noise of each record.
 over_noise <- function(model, difference) sqrt(colMeans((cbind(difference) / model$noise)^2))
@@ -114,7 +121,7 @@ inherit_runs <- function(model, present, off) {
               dimnames = list(NULL, names(model$parameters)))
   z[, old] <- runs$z
   z[, names(off)] <- rep(off, each = nrow(z))
-  model$runs <- bind_runs(list(z = z, outputs = runs$outputs, held = runs$held), model$runs)
+  model$runs <- bind_runs(replace(runs, "z", list(z)), model$runs)
   model$over_priors <- present$over_priors
   model
 }

@@ -77,7 +77,7 @@ check_repeats <- function(model, context, call = rlang::caller_env()) {
   if (all(known) || runs_left(context) < length(known)) return(invisible())
   found <- found_so_far()
   again <- run_at(model, model$runs$z[at, , drop = FALSE], context, "repeated")
-  change <- over_noise(model, again$outputs - model$runs$outputs[, at])
+  change <- over_noise(model, again$outputs[, 1] - model$runs$outputs[, at])
   if (found_so_far() > found || !isTRUE(change > rules$random_change)) return(invisible())
   abort_input(c(paste("The simulator is random: two runs at the same values differ by",
                       "{short(change)} times the noise."),
@@ -107,7 +107,7 @@ check_some_succeeded <- function(model, call = rlang::caller_env()) {
 # Where searches begin: the run nearest to the record; the nearest of the half that lies farther
 # from it; and so on, each time of the half that lies farther from all before.
 start_runs <- function(model, starts = NULL, among = seq_len(nrow(model$runs$z))) {
-  misfit <- colMeans(((model$runs$outputs - model$target) / model$noise)^2)
+  misfit <- model$runs$squares
   misfit[!succeeded(model) | !seq_along(misfit) %in% among] <- Inf
   starts <- starts %||% which.min(misfit)
   for (k in seq_len(max(0, min(rules$most_starts, sum(is.finite(misfit))) - 1))) {

@@ -108,7 +108,7 @@ with_known_runs <- function(model, ensembles) {
   colnames(z) <- names(model$parameters)
   held <- matrix(NaN, nrow(model$runs$held), n)
   outputs <- do.call(rbind, lapply(unname(ensembles), `[[`, "outputs"))
-  model$runs <- list(z = z, outputs = outputs, held = held)
+  model$runs <- new_runs(model, z, outputs, held)
   model
 }
 

@@ -164,12 +164,13 @@ optimum_of_bend <- function(search, bent, line, best, within, context) {
 # draws of error and discrepancy.
 misfit_of <- function(search, outputs, z, context) {
   if (search$weighted) -values_of(search$model, outputs, z, search$history, search$moves, context)
-  else squared_misfit(search$model, outputs, z)
+  else squared_misfit(search$model, colSums(((outputs - search$model$target) /
+                                               search$model$noise)^2), z)
 }
 
-squared_misfit <- function(model, outputs = model$runs$outputs, z = model$runs$z) {
-  misfit <- 0.5 * colSums(((outputs - model$target) / model$noise)^2) +
-    0.5 * rowSums(z[, !model$space$flat, drop = FALSE]^2)
+# By the sums of the squares of the errors over the noise.
+squared_misfit <- function(model, squares = model$runs$squares, z = model$runs$z) {
+  misfit <- 0.5 * squares + 0.5 * rowSums(z[, !model$space$flat, drop = FALSE]^2)
   ifelse(is.finite(misfit), misfit, Inf)
 }
 

@@ -137,8 +137,9 @@ too_steep <- function(model, at, slopes) {
   apart <- sqrt(rowSums(sweep(model$runs$z, 2, model$runs$z[at, ])^2))
   far <- which(succeeded(model) & apart >= rules$search_difference)
   if (!length(far)) return(logical(ncol(slopes)))
-  differ <- model$runs$outputs[, far, drop = FALSE] - model$runs$outputs[, at]
-  over_noise(model, slopes) > rules$steepest * max(over_noise(model, differ) / apart[far])
+  from <- model$runs$outputs[, at]
+  differ <- vapply(far, function(k) over_noise(model, model$runs$outputs[, k] - from), 0)
+  over_noise(model, slopes) > rules$steepest * max(differ / apart[far])
 }
 
 # Slopes about a run by regression on all runs over the priors, nearer ones weighing more.

@@ -53,7 +53,7 @@ values_of <- function(model, outputs, z, history, moves, context) {
                    t = history[[k]]$t[repeated, , drop = FALSE])
     data <- c(model$records[[k]]$data, list(moves = moves[rows, model$own[[k]], drop = FALSE]))
     log_l <- call_engine(run_likelihood_(data, model$records[[k]]$priors, points,
-                                         outputs[rows, rep(fine, each = draws), drop = FALSE],
+                                         outputs[rows, fine, drop = FALSE],
                                          engine_context(context$seed, context$threads)))
     apply(matrix(log_l, draws), 2, log_mean_exp)
   })

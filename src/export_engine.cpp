@@ -355,7 +355,8 @@ Rcpp::List response_evidence_(const Rcpp::List& data, const Rcpp::List& priors, 
                                              convert::ais_options(ais), convert::context(context)));
 }
 
-// Log-likelihood of runs of the simulator itself (N x n), each at its point of the history posterior.
+// Log-likelihood of runs of the simulator itself (N x n), each at its points of the history posterior, which
+// follow one another.
 // [[Rcpp::export]]
 Eigen::VectorXd run_likelihood_(const Rcpp::List& data, const Rcpp::List& priors, const Rcpp::List& points,
                                 const Eigen::MatrixXd& runs, const Rcpp::List& context_list) {

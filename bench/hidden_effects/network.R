@@ -180,9 +180,9 @@ network_plan <- function(network) {
        gain_parameter = gains$parameter, fixed = network$fixed, start = network$start)
 }
 
-# Temperature of the air, averaged over each step, driven by conditions that are constant over a
-# step: exact, mode by mode. The truth is computed so, the models are the package's own networks.
-network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
+# C dx/dt = -loss x + gain u, with `root` of 1 / C, and where it begins: steady before the record,
+# the air held, the rest between it and what it remembers of outdoors.
+network_equations <- compiler::cmpfun(function(plan, values) {
   n <- plan$n
   values <- c(values, plan$fixed)
   root <- 1 / sqrt(pmax(unname(values[plan$capacity]) * plan$share, 1e-6))
@@ -201,8 +201,6 @@ network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
       loss[i, j] <- loss[j, i] <- loss[i, j] - conductance[l]
     }
   }
-  # Steady before the record: the air was held, the rest between it and what it remembers of
-  # outdoors.
   held <- plan$start[["held"]]
   outdoors <- values[["remembered"]]
   start <- c(held, solve(loss[-1, -1, drop = FALSE], gain[-1, 1] * outdoors - loss[-1, 1] * held))
@@ -213,11 +211,20 @@ network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
     gain[i, j] <- gain[i, j] +
       plan$gain_factor[l] * if (is.na(parameter)) 1 else values[[parameter]]
   }
-  modes <- eigen(root * loss * rep(root, each = n), symmetric = TRUE)
+  list(loss = loss, gain = gain, root = root, start = start)
+})
+
+# Temperature of the air, averaged over each step, driven by conditions that are constant over a
+# step: exact, mode by mode. The truth is computed so, the models are the package's own networks.
+network_output <- compiler::cmpfun(function(plan, values, drivers, step) {
+  n <- plan$n
+  equations <- network_equations(plan, values)
+  root <- equations$root
+  modes <- eigen(root * equations$loss * rep(root, each = n), symmetric = TRUE)
   rate <- pmax(modes$values, 1e-12)
   left <- modes$vectors * root
-  forcing <- drivers %*% crossprod(gain, left)
-  initial <- as.numeric(crossprod(modes$vectors, start / root))
+  forcing <- drivers %*% crossprod(equations$gain, left)
+  initial <- as.numeric(crossprod(modes$vectors, equations$start / root))
   out <- numeric(nrow(drivers))
   for (k in seq_len(n)) {
     kept <- exp(-rate[k] * step)

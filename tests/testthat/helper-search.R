@@ -44,3 +44,10 @@ stores_simulator <- function(first = free("first", uniform(0.5, 12), "h"),
 
 space_of <- function(...)
   amiss:::coordinates_of(lapply(list(...), function(prior) free("k", prior)))
+
+# The model as if one of its runs had failed.
+failing <- function(model, k) {
+  model$runs$outputs[[k]][] <- NaN
+  model$runs$squares[k] <- NaN
+  model
+}

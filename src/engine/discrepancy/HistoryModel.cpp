@@ -242,7 +242,8 @@ VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameter
     of_setting[points[i].setting].push_back(static_cast<Index>(i));
   const std::vector<std::pair<int, std::vector<Index>>> groups(of_setting.begin(), of_setting.end());
   const Index p = data_.responses.cols();
-  VectorXd values(runs.cols());
+  const Index of_each = static_cast<Index>(points.size()) / std::max<Index>(1, runs.cols());
+  VectorXd values(static_cast<Index>(points.size()));
   parallel_for(static_cast<int>(groups.size()), context, [&](int k) {
     const auto& [setting, members] = groups[static_cast<std::size_t>(k)];
     const Whitener whitener(data_.axis, priors_.error.correlation_times,
@@ -254,7 +255,7 @@ VectorXd HistoryModel::log_likelihood_of_runs(const std::vector<HistoryParameter
     seen.log_det = whitener.log_det();
     seen.size = data_.y.size();
     for (Index i : members) {
-      const VectorXd left = whitener(data_.y - runs.col(i));
+      const VectorXd left = whitener(data_.y - runs.col(i / of_each));
       seen.cross = white.transpose() * left;
       seen.square = left.squaredNorm();
       const HistoryParameters& point = points[static_cast<std::size_t>(i)];

@@ -297,6 +297,9 @@ TEST(HistoryModel, LikelihoodOfRunsIsTheDenseOneOfTheirResiduals) {
         kRounding)
         << i;
   EXPECT_EQ(model.log_likelihood_of_runs(points, runs, two), own);
+  // One run at all points is that run once for each.
+  EXPECT_EQ(model.log_likelihood_of_runs(points, runs.leftCols(1), two),
+            model.log_likelihood_of_runs(points, runs.leftCols(1).replicate(1, 5), two));
 }
 
 TEST(HistoryModel, ConditionWithoutVarianceIsAModelWithoutItsColumns) {
