@@ -220,8 +220,13 @@ score_rates <- function(rows) {
               "forest_condition", "ard_condition")
   right <- lapply(stats::setNames(rivals, paste0("right_", rivals)),
                   function(rule) rate(flags(strong, function(r) condition_right(r, rule))))
+  within_a_tenth <- function(k) function(r) unlist(r$over_least)[k] <= 1.1
   c(list(right_mechanism = rate(flags(strong, named_right))), right,
     list(
+      named = rate(flags(strong, function(r) any(named_mechanisms(r) %in% r$true_mechanism))),
+      least_squares_calibration = rate(flags(rows, within_a_tenth(1))),
+      least_squares_held_out = rate(flags(rows, within_a_tenth(2))),
+      many_runs = rate(flags(rows, function(r) r$runs_total > 800)),
       detection_at_1 = rate(flags(one, named_right)),
       detection_below_1 = rate(flags(weak, named_right)),
       parameter_covered = rate(flags(strong, function(r) r$covered)),
@@ -257,7 +262,7 @@ score_means <- function(rows) {
     v <- vapply(rows, function(r) as.numeric(r[[field]]), 0)
     v <- v[is.finite(v)]
     list(mean = mean(v), standard_error = stats::sd(v) / sqrt(length(v)), median = stats::median(v),
-         n = length(v))
+         largest = max(v), n = length(v))
   }
   list(gain_share = of(strong, "gain_share"), rmse_ratio = of(strong, "rmse_ratio"),
        runs_total = of(rows, "runs_total"), wall_s = of(rows, "wall_s"))

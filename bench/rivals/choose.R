@@ -2,23 +2,22 @@
 # package does it, at most two of them.
 
 #' @param fit_model Function of a simulator and the fit of the model that it extends (`NULL` for the
-#'   base), that returns a fit: a list with `values` of the parameters, `runs`, and what `better`
-#'   compares.
+#'   base), that returns a fit: a list with `values` of the parameters, `runs`, `seconds`, and what
+#'   `better` compares.
 #' @param better Function of the fits of all extensions and of the present model: the position of
 #'   the extension that is adopted, or `NULL` if none is.
 #' @return adopted, the names of the mechanisms in turn; rmse, held out, of the last model; runs;
 #'   seconds.
 choose_forward <- function(world, fit_model, better, most = 2) {
-  started <- proc.time()[["elapsed"]]
   simulator <- world$base
   present <- fit_model(simulator, NULL)
-  runs <- present$runs
+  spent <- c(runs = present$runs, seconds = present$seconds)
   adopted <- character()
   while (length(adopted) < most) {
     left <- setdiff(names(world$catalogue), adopted)
     extended <- lapply(left, function(name) world$catalogue[[name]]$edit(simulator))
     fits <- lapply(extended, fit_model, from = present)
-    runs <- runs + sum(vapply(fits, `[[`, 0, "runs"))
+    for (what in names(spent)) spent[what] <- spent[what] + sum(vapply(fits, `[[`, 0, what))
     chosen <- better(fits, present)
     if (is.null(chosen)) break
     adopted <- c(adopted, left[chosen])
@@ -26,7 +25,20 @@ choose_forward <- function(world, fit_model, better, most = 2) {
     simulator <- extended[[chosen]]
   }
   list(adopted = adopted, rmse = held_out_rmse(simulator, present$values, world$measurements),
-       runs = runs, seconds = proc.time()[["elapsed"]] - started)
+       runs = spent[["runs"]], seconds = spent[["seconds"]])
+}
+
+# A fit by its method, timed; what rules have in common is computed once.
+timed_fits <- function(fit, m, seed) {
+  known <- new.env()
+  function(simulator, from) {
+    key <- rlang::hash(list(names(amiss::free_parameters(simulator)), from$values))
+    if (is.null(known[[key]])) {
+      seconds <- system.time(found <- fit(simulator, from, m, seed))[["elapsed"]]
+      assign(key, c(found, seconds = seconds), known)
+    }
+    known[[key]]
+  }
 }
 
 held_out_rmse <- function(simulator, values, m) {

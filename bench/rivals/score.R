@@ -2,13 +2,14 @@
 score_rivals <- function(world, asked) {
   m <- world$measurements
   seed <- fit_seed(world)
-  of <- function(fit) function(simulator, from) fit(simulator, from, m, seed)
+  by_least_squares <- timed_fits(fit_autoregressive, m, seed)
   rivals <- list(
-    bic = function() choose_forward(world, of(fit_autoregressive), least_bic(0)),
-    bic10 = function() choose_forward(world, of(fit_autoregressive), least_bic(10)),
-    importance = function() choose_forward(world, of(fit_importance), most_evident()),
+    bic = function() choose_forward(world, by_least_squares, least_bic(0)),
+    bic10 = function() choose_forward(world, by_least_squares, least_bic(10)),
+    importance = function()
+      choose_forward(world, timed_fits(fit_importance, m, seed), most_evident()),
     kalman = function() if (world$family == "network")
-      choose_forward(world, of(fit_kalman), likelihood_ratio))
+      choose_forward(world, timed_fits(fit_kalman, m, seed), likelihood_ratio))
   rows <- lapply(asked, function(name) {
     found <- rivals[[name]]()
     if (!is.null(found)) rival_row(world, name, found)

@@ -56,6 +56,13 @@ test_that("no file calls into a room below its own, and none in a circle", {
   expect_identical(nrow(left), 0L)
 })
 
+test_that("the tables of README and measured.Rmd are those of bench/results", {
+  skip_without_sources()
+  check <- callr::rscript(file.path("tools", "measured.R"), "--check", wd = root, show = FALSE,
+                          fail_on_status = FALSE)
+  expect_identical(check$status, 0L, info = check$stderr)
+})
+
 test_that("every benchmark is in the plan of bench/all, by options that it has", {
   skip_without_sources()
   lines <- grep("^[^#]", readLines(file.path(root, "bench", "plan.txt")), value = TRUE)
