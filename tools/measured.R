@@ -35,11 +35,10 @@ keep_results <- function(folder) {
     said <- readLines(file.path(folder, done))
     found <- jsonlite::read_json(file.path(folder, paste0(part, ".json")))
     if (is.list(found)) found[c("worlds", "rows")] <- NULL
-    part_found <- list(command = gsub(folder, "DIR", said[1], fixed = TRUE), date = said[2],
-                       code = code, found = found)
-    jsonlite::write_json(part_found,
-                         file.path(results, paste0(part, ".json")), auto_unbox = TRUE, digits = 6,
-                         null = "null", na = "null", pretty = TRUE)
+    kept <- list(command = gsub(folder, "DIR", said[1], fixed = TRUE), date = said[2], code = code,
+                 found = found)
+    jsonlite::write_json(kept, file.path(results, paste0(part, ".json")), auto_unbox = TRUE,
+                         digits = 6, null = "null", na = "null", pretty = TRUE)
   }
 }
 
