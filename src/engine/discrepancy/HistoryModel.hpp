@@ -105,8 +105,8 @@ class HistoryModel {
   /// (y - K m)' (cov y)^-1 (y - K m) for coefficients that are standard normal in the terms of `whitened`.
   double quadratic(const WhitenedData& whitened, double log_variance, const Eigen::VectorXd& t) const;
 
-  /// log density of y for each run of the simulator itself (columns of `runs`, N x n) at each of its points, of
-  /// which all runs have equally many, one run's after the other's; their variance holds no discarded part.
+  /// log density of y for each run of the simulator itself (columns of `runs`, N x n) at each of its points.
+  /// All runs have equally many, one run's after the other's. Their variance holds no discarded part.
   Eigen::VectorXd log_likelihood_of_runs(const std::vector<HistoryParameters>& points,
                                          const Eigen::MatrixXd& runs, const Context& context) const;
 
