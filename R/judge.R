@@ -54,6 +54,8 @@ doubts <- list(
   }, "the true mechanism takes the response away"),
   only_beside = doubt(function(case) only_beside(case$models, case$confounded, case$candidates),
                       "two that imitate a third together look like this"),
+  stands_on = doubt(function(case) unnamed_before(case$models),
+                    "it may make up for what those before it do wrongly"),
   alone = doubt(function(case) {
     if (length(case$unsettled)) {
       sprintf(paste("%s, adopted after it, may be the cause by itself: no search shows that it",
@@ -233,6 +235,15 @@ confounded_parameters <- function(fit, new) {
   r <- together / outer(sd, sd)
   dimnames(r) <- list(colnames(fit$values), colnames(fit$values))
   others[apply(abs(r[others, new, drop = FALSE]), 1, max) > rules$confounded]
+}
+
+# In words, if the last of `models` was found on top of mechanisms that are not named.
+unnamed_before <- function(models) {
+  before <- models[-c(1, length(models))]
+  unnamed <- Filter(function(model) !identical(model$verdict, "named"), before)
+  if (!length(unnamed)) return(NULL)
+  sprintf("%s, on top of which it was found, %s not named",
+          listed(vapply(unnamed, `[[`, "", "mechanism")), if (length(unnamed) > 1) "are" else "is")
 }
 
 # In words, if the last of `models` has no evidence on the base model and is correlated with what

@@ -262,7 +262,7 @@ score_means <- function(rows) {
     v <- vapply(rows, function(r) as.numeric(r[[field]]), 0)
     v <- v[is.finite(v)]
     list(mean = mean(v), standard_error = stats::sd(v) / sqrt(length(v)), median = stats::median(v),
-         largest = max(v), n = length(v))
+         largest = if (length(v)) max(v) else NA, n = length(v))
   }
   list(gain_share = of(strong, "gain_share"), rmse_ratio = of(strong, "rmse_ratio"),
        runs_total = of(rows, "runs_total"), wall_s = of(rows, "wall_s"))

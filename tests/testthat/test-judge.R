@@ -506,3 +506,16 @@ test_that("a parameter beside it at its prior's end, or another not ruled out, i
                error_ratio = 1)
   expect_length(judged(function(u) not_trusted(u, error_ratio = 1.1))$doubts, 0)
 })
+
+test_that("a mechanism found on top of one that is not named is not named", {
+  adopted <- function(mechanism, verdict) list(mechanism = mechanism, verdict = verdict)
+  base <- list(list(name = "base"))
+  last <- list(list(mechanism = "c"))
+  found <- function(...) amiss:::unnamed_before(c(base, list(...), last))
+  expect_null(found())
+  expect_null(found(adopted("a", "named")))
+  expect_identical(found(adopted("a", "named"), adopted("b", "likely")),
+                   "b, on top of which it was found, is not named")
+  expect_identical(found(adopted("a", "stand-in"), adopted("b", "likely")),
+                   "a and b, on top of which it was found, are not named")
+})
