@@ -92,6 +92,12 @@ test_that("two mechanisms of a function, adopted one after the other, are both k
   expect_equal(coef(last)[c("gain", "sun", "wind")], c(gain = 0.4, sun = 0.01, wind = -0.5),
                tolerance = 0.1)
   expect_lt(upgrade$models[[3]]$scores$calibrate[["rmse"]], 0.12)  # the noise is 0.1
+  # If the first were not named, neither would be the second.
+  doubted <- upgrade
+  doubted$models[[2]]$fit$trust$trusted <- FALSE
+  doubted <- rejudged(doubted)$models
+  expect_identical(doubted[[2]]$verdict, "likely")
+  expect_true("stands_on" %in% names(doubted[[3]]$doubts))
   # Had the second no evidence alone and been correlated with the first, it would be likely at most.
   expect_identical(upgrade$models[[3]]$verdict, "named")
   second <- upgrade$models[[3]]$mechanism
