@@ -83,7 +83,7 @@ world_rows <- list(
   "twice the noise or more: the right mechanism is adopted first" =
     function(r, m) count(r$right_mechanism),
   "the same: it is named as the cause" = function(r, m) count(r$named),
-  "the same, one mechanism hidden: its parameter lies inside its 95 % interval" =
+  "the same: the parameter of the first lies inside its 95 % interval" =
     function(r, m) count(r$parameter_covered),
   "effect about as large as the noise: the right mechanism is adopted first" =
     function(r, m) count(r$detection_at_1),
@@ -97,7 +97,7 @@ world_rows <- list(
 
 more_world_rows <- list(
   "worlds with more than 800 runs" = function(r, m) count(r$many_runs),
-  "the parameter inside its interval of the physical value" =
+  "twice the noise or more: it lies inside its physical interval" =
     function(r, m) count(r$physical_covered),
   "error of least squares reached within a tenth: calibration; held out" =
     function(r, m) counts(r$least_squares_calibration, r$least_squares_held_out),
