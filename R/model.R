@@ -58,8 +58,11 @@ bind_runs <- function(runs, more) {
 
 new_runs <- function(model, z, outputs, held) {
   list(z = z, outputs = new_columns(outputs), held = new_columns(held),
-       squares = colSums(((outputs - model$target) / model$noise)^2))
+       squares = squared_errors(model, outputs))
 }
+
+squared_errors <- function(model, outputs)
+  colSums(((outputs - model$target) / model$noise)^2)
 
 # A record is run once at points that differ in nothing of its own. `kept_as`: under which name runs
 # are kept.

@@ -164,8 +164,7 @@ optimum_of_bend <- function(search, bent, line, best, within, context) {
 # draws of error and discrepancy.
 misfit_of <- function(search, outputs, z, context) {
   if (search$weighted) -values_of(search$model, outputs, z, search$history, search$moves, context)
-  else squared_misfit(search$model, colSums(((outputs - search$model$target) /
-                                               search$model$noise)^2), z)
+  else squared_misfit(search$model, squared_errors(search$model, outputs), z)
 }
 
 # By the sums of the squares of the errors over the noise.

@@ -1,24 +1,25 @@
 # What all rivals share: forward selection over the mechanisms of a world, as the loop of the
 # package does it, at most two of them.
 
-#' @param fit_model Function of a simulator and the fit of the model that it extends (`NULL` for the
-#'   base), that returns a fit: a list with `values` of the parameters, `runs`, `seconds`, and what
-#'   `better` compares.
+#' @param fit_model Function of a simulator, the fit of the model that it extends (`NULL` for the
+#'   base) and its mechanisms, that returns a fit: a list with `values` of the parameters, `runs`,
+#'   `seconds`, and what `better` compares.
 #' @param better Function of the fits of all extensions and of the present model: the position of
 #'   the extension that is adopted, or `NULL` if none is.
 #' @return adopted, the names of the mechanisms in turn; rmse, held out, of the last model; runs;
 #'   seconds.
 choose_forward <- function(world, fit_model, better, most = 2) {
   simulator <- world$base
-  present <- fit_model(simulator, NULL)
+  present <- fit_model(simulator, NULL, character())
   spent <- c(runs = present$runs, seconds = present$seconds)
   adopted <- character()
   while (length(adopted) < most) {
     left <- setdiff(names(world$catalogue), adopted)
     extended <- lapply(left, function(name) world$catalogue[[name]]$edit(simulator))
-    fits <- lapply(extended, fit_model, from = present)
+    fits <- Map(function(extension, name) fit_model(extension, present, c(adopted, name)), extended,
+                left)
     for (what in names(spent)) spent[what] <- spent[what] + sum(vapply(fits, `[[`, 0, what))
-    chosen <- better(fits, present)
+    chosen <- better(unname(fits), present)
     if (is.null(chosen)) break
     adopted <- c(adopted, left[chosen])
     present <- fits[[chosen]]
@@ -31,8 +32,8 @@ choose_forward <- function(world, fit_model, better, most = 2) {
 # A fit by its method, timed; what rules have in common is computed once.
 timed_fits <- function(fit, m, seed) {
   known <- new.env()
-  function(simulator, from) {
-    key <- rlang::hash(list(names(amiss::free_parameters(simulator)), from$values))
+  function(simulator, from, mechanisms) {
+    key <- paste(c("base", mechanisms), collapse = " + ")
     if (is.null(known[[key]])) {
       seconds <- system.time(found <- fit(simulator, from, m, seed))[["elapsed"]]
       assign(key, c(found, seconds = seconds), known)
