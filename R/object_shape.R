@@ -114,6 +114,8 @@ object_shapes <- list(
   amiss_discrepancy = c(series = "table", responses = "?real[n,b]", record = "?table",
                         rows = "?real[n]", segment = "real[n]", target = "text[1]",
                         unit = "text[1]"),
+  amiss_survey = c(studies = "table", trials = "table", conditions = "table",
+                   parameters = "table"),
   amiss_study = c(study = "text[1]", title = "text[1]", measurements = "list", control = "?list"),
   amiss_sobol = c(table = "table", unexplained = "?number[1]", points = "?real[1]",
                   replicates = "?real[1]", by_time = "?any"))
@@ -121,10 +123,10 @@ object_shapes <- list(
 # Objects with a format_version; the others are written by the package's functions in a session, and
 # not kept.
 versioned_classes <- c("amiss_measurements", "amiss_ensemble", "amiss_emulator", "amiss_fit",
-                       "amiss_joint", "amiss_upgrade", "amiss_comparison", "amiss_ais",
-                       "amiss_attribution", "amiss_joint_attribution", "amiss_discrepancy",
-                       "amiss_sobol", "amiss_function_simulator", "amiss_program_simulator",
-                       "amiss_fmu_simulator", "amiss_network")
+                       "amiss_joint", "amiss_upgrade", "amiss_comparison", "amiss_survey",
+                       "amiss_ais", "amiss_attribution", "amiss_joint_attribution",
+                       "amiss_discrepancy", "amiss_sobol", "amiss_function_simulator",
+                       "amiss_program_simulator", "amiss_fmu_simulator", "amiss_network")
 
 shapes_of <- function(x) intersect(class(x), names(object_shapes))
 

@@ -32,6 +32,7 @@ class_words <- list(
   amiss_joint = c("a joint calibration", "calibrate_jointly()"),
   amiss_upgrade = c("an upgrade", "upgrade_model()"),
   amiss_comparison = c("a comparison", "compare_models()"),
+  amiss_survey = c("a survey", "survey()"),
   amiss_attribution = c("an attribution", "attribute_discrepancy()"),
   amiss_discrepancy = c("a discrepancy", "discrepancy()"))
 
