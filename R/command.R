@@ -1,13 +1,16 @@
-# The command line of exec/amiss. Exit status: 0 done, 1 failed or not whole, 2 bad usage.
+# The command line of exec/amiss. Exit status: 0 done, 1 failed or not whole, 2 bad usage. A survey
+# is not whole if a study has no result.
 
 command_parser <- function() {
   option <- function(name, help, ...) optparse::make_option(paste0("--", name), help = help, ...)
   switch <- function(name, help) option(name, help, action = "store_true", default = FALSE)
   optparse::OptionParser(
-    usage = "usage: amiss run STUDY.yml --out DIR [options]\n       amiss --help | --version",
+    usage = paste0("usage: amiss run STUDY.yml --out DIR [options]\n",
+                   "       amiss survey FOLDER ... --out DIR [--quiet]\n",
+                   "       amiss --help | --version"),
     add_help_option = FALSE, option_list = list(
-      option("out", "folder for report.html, figures/, result.rds and result.json",
-             metavar = "DIR"),
+      option("out", paste("folder for report.html, figures/, result.rds and result.json; of a",
+                          "survey also studies.csv"), metavar = "DIR"),
       option("threads", "threads to use (1); results do not depend on it", default = "1",
              metavar = "N"),
       option("seed", "seed of the random numbers; overrides that of the study", metavar = "N"),
@@ -17,7 +20,8 @@ command_parser <- function() {
       switch("version", "the version, and nothing else"),
       optparse::make_option(c("-h", "--help"), help = "this text, and nothing else",
                             action = "store_true", default = FALSE)),
-    description = "\nRuns the study and writes its results into DIR.")
+    description = paste0("\nrun: runs the study and writes its results into DIR.\n",
+                         "survey: one report of the studies whose results are in the folders."))
 }
 
 run_command <- function(words) {
@@ -38,10 +42,12 @@ run_command <- function(words) {
   on.exit(options(before))
   missing <- FALSE
   tryCatch(withCallingHandlers({
-    result <- run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads,
-                        quiet = asked$quiet, trust = asked$trust)
+    result <- if (is.null(asked$folders)) {
+      run_study(asked$study, out = asked$out, seed = asked$seed, threads = asked$threads,
+                quiet = asked$quiet, trust = asked$trust)
+    } else write_survey(asked$folders, asked$out, asked$quiet)
     if (!asked$quiet) print(result)
-    as.numeric(missing)
+    as.numeric(missing || any(result$studies$verdict == "no result"))
   }, amiss_warning_missing = function(w) missing <<- TRUE), error = function(e) {
     message("amiss: ", conditionMessage(e))
     1
@@ -60,7 +66,8 @@ read_command <- function(words, parser) {
   if (identical(names, "help")) asked$help <- TRUE
   if (asked$help || asked$version) return(asked)
   if (!length(names)) stop("no command given")
-  if (names[1] != "run") stop("unknown command '", names[1], "'")
+  if (!names[1] %in% c("run", "survey")) stop("unknown command '", names[1], "'")
+  if (names[1] == "survey") return(read_survey_command(asked, names[-1]))
   if (length(names) != 2) stop("one study file is needed, not ", length(names) - 1)
   if (is.null(asked$out)) stop("'--out DIR' is needed")
   if (!file.exists(names[2])) stop("the study file '", names[2], "' does not exist")
@@ -68,6 +75,18 @@ read_command <- function(words, parser) {
   asked$study <- names[2]
   asked$threads <- whole_number(asked$threads, "threads", 1, 1024)
   if (!is.null(asked$seed)) asked$seed <- whole_number(asked$seed, "seed", 0, .Machine$integer.max)
+  asked
+}
+
+read_survey_command <- function(asked, folders) {
+  if (!length(folders)) stop("a folder of results is needed")
+  if (is.null(asked$out)) stop("'--out DIR' is needed")
+  of_run <- c(seed = !is.null(asked$seed), threads = asked$threads != "1", trust = asked$trust,
+              large = asked$large)
+  if (any(of_run)) stop("'--", names(which(of_run))[1], "' is not for 'survey'")
+  absent <- folders[!dir.exists(folders)]
+  if (length(absent)) stop("the folder '", absent[1], "' does not exist")
+  asked$folders <- folders
   asked
 }
 

@@ -15,8 +15,9 @@ calibration_figures <- c("parameters", "residuals", "modes", "profiles")
 #'
 #' @param x,object [measurements()]; a calibration ([calibrate()], not [calibrate_paper()]); or the
 #'   result of [attribute_discrepancy()], [discrepancy()], [sobol_indices()], [ais()],
-#'   [compare_models()] or [upgrade_model()]. If there are several records, plot one of `records`.
-#' @param which Which figure of an upgrade, a comparison or a calibration, see below.
+#'   [compare_models()], [upgrade_model()] or [survey()]. If there are several records, plot one of
+#'   `records`.
+#' @param which Which figure of an upgrade, a comparison, a calibration or a survey, see below.
 #' @param ... Not used: an argument that is not known is an error.
 #' @return A ggplot.
 #' @section Figures of an upgrade:
@@ -55,6 +56,10 @@ calibration_figures <- c("parameters", "residuals", "modes", "profiles")
 #'   * `"residuals"`: whether the error is as the error model says.
 #'   * `"modes"`: the modes of the posterior, and the ends of searches.
 #'   * `"profiles"`: the profile likelihood of each parameter, see *Profiles*.
+#' @section Figures of a survey:
+#'   * `"causes"`: how many studies lack what.
+#'   * `"studies"`: what became of each mechanism in each study.
+#'   * `"gain"`: the typical error of each study before and after.
 #' @section Profiles:
 #'   The profile likelihood of a parameter is the largest likelihood at each of its values, whatever
 #'   the other parameters are. It says what the record alone knows of the parameter. By Wilks, an

@@ -11,9 +11,9 @@
 #'     chromium`). The environment variable `CHROMOTE_CHROME` may name the program.
 #'   * `.docx`: a Word document with the same text, tables and figures.
 #'
-#' @param x An upgrade ([upgrade_model()]), a comparison ([compare_models()]) or a calibration
-#'   ([calibrate()], [calibrate_paper()]). The simulator of a calibration is run again to predict
-#'   its record.
+#' @param x An upgrade ([upgrade_model()]), a comparison ([compare_models()]), a calibration
+#'   ([calibrate()], [calibrate_paper()]) or a [survey()] of many studies. The simulator of a
+#'   calibration is run again to predict its record.
 #' @param file Name of the file, ending in `.html`, `.pdf` or `.docx`; its folder must exist. The
 #'   file appears only when it is complete.
 #' @param quiet No messages of R Markdown.
@@ -22,7 +22,8 @@
 #'     `"lack"`, `"trust"`, `"method"` and `"words"`;
 #'   * a comparison: `"summary"`, `"evidence"`, `"drivers"`, `"fit"`, `"parameters"`, `"practice"`
 #'     and `"method"`;
-#'   * a calibration: `"summary"`, `"fit"`, `"parameters"`, `"lack"` and `"trust"`.
+#'   * a calibration: `"summary"`, `"fit"`, `"parameters"`, `"lack"` and `"trust"`;
+#'   * a survey: `"summary"`, `"causes"`, `"parameters"`, `"drivers"`, `"gain"` and `"studies"`.
 #' @param level Level of the headings of the parts, 1 to 4.
 #' @return `report()`: `file`, invisibly. `report_fragment()`: text for knitr, which a chunk shows
 #'   as it is.
@@ -90,9 +91,9 @@ report_fragment <- function(x, parts = NULL, level = 2) {
 }
 
 check_reported <- function(x, call = rlang::caller_env()) {
-  check_object(x, c("amiss_upgrade", "amiss_comparison", "amiss_fit"), "x",
-               "It is made by {.fun upgrade_model}, {.fun compare_models} or {.fun calibrate}.",
-               call = call)
+  check_object(x, c("amiss_upgrade", "amiss_comparison", "amiss_fit", "amiss_survey"), "x",
+               paste("It is made by {.fun upgrade_model}, {.fun compare_models},",
+                     "{.fun calibrate} or {.fun survey}."), call = call)
 }
 
 # html, pdf or docx, by the name of a file that can be written.
@@ -136,6 +137,7 @@ check_report_tools <- function(call = rlang::caller_env()) {
 template_parts <- function(x) {
   kind <- if (inherits(x, "amiss_upgrade")) "diagnosis"
           else if (inherits(x, "amiss_comparison")) "comparison"
+          else if (inherits(x, "amiss_survey")) "survey"
           else "calibration"
   text <- readLines(report_path("parts", paste0(kind, ".Rmd")), encoding = "UTF-8")
   mark <- "^<!-- part: (.*) -->$"

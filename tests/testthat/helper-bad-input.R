@@ -166,6 +166,7 @@ valid_calls <- function() {
     simulate_zone = list(zone = o$room, values = cbind(ach = 0.5), drivers = o$drivers,
                          step_s = 900, hold = NULL, threads = 1, control = list(), flux = NULL),
     sobol_indices = list(x = o$emulator, points = 32, replicates = 4, by_time = FALSE, seed = 1),
+    survey = list(results = list(a = o$upgrade)),
     synthetic_weather = list(days = 1, step_h = 0.25, day_of_year = 100, latitude = 36,
                              temperature = 17, daily_range = 9, cloudiness = 0.3, wind = 3,
                              wind_direction = 240, azimuth = 180, seed = 1),
