@@ -62,7 +62,10 @@ write_estate <- function(folder) {
 
 score_estate <- function(folder) {
   truth <- utils::read.csv(file.path(folder, "truth.csv"))
-  found <- merge(truth, utils::read.csv(file.path(folder, "survey", "studies.csv")), by = "study")
+  studies <- utils::read.csv(file.path(folder, "survey", "studies.csv"),
+                             colClasses = c(named = "character", likely = "character",
+                                            stand_in = "character"))
+  found <- merge(truth, studies, by = "study")
   each <- function(text) strsplit(text, ", ", fixed = TRUE)
   is_in <- function(hidden, texts) mapply(`%in%`, hidden, each(texts))
   others <- function(texts) lengths(mapply(setdiff, each(texts), found$hidden, SIMPLIFY = FALSE))
