@@ -86,6 +86,8 @@ read_survey_command <- function(asked, folders) {
   if (any(of_run)) stop("'--", names(which(of_run))[1], "' is not for 'survey'")
   absent <- folders[!dir.exists(folders)]
   if (length(absent)) stop("the folder '", absent[1], "' does not exist")
+  if (normalizePath(asked$out, mustWork = FALSE) %in% normalizePath(folders))
+    stop("'--out' must be another folder than those of the studies")
   asked$folders <- folders
   asked
 }

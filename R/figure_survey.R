@@ -4,9 +4,10 @@ survey_figures <- c("causes", "studies", "gain")
 
 state_colours <- c("named" = stage_colours[["after"]], "likely" = "#56B4E9",
                    "stand-in" = stage_colours[["before"]], "unexplained" = "grey45",
-                   "nothing decisive" = "grey80", "no result" = "white")
+                   "nothing decisive" = "grey80", "undecided" = "grey95", "no result" = "white")
 
-# Of each mechanism, in how many studies it was adopted; and the studies that adopted none.
+# Of each mechanism, in how many studies it was adopted; and how many studies have no cause, named
+# or likely.
 causes_table <- function(survey) {
   counts <- mechanism_counts(survey)
   counts <- counts[counts$named + counts$likely + counts$stand_in > 0, ]
@@ -14,12 +15,10 @@ causes_table <- function(survey) {
   adopted <- expand.grid(row = counts$mechanism, state = states, stringsAsFactors = FALSE)
   adopted$n <- unlist(lapply(states, function(state) counts[[state]]))
   adopted$state <- sub("_", "-", adopted$state)
-  s <- survey$studies
-  none <- s[s$named == "" & s$likely == "" & s$stand_in == "", ]
-  open <- c(unexplained = "unexplained", "nothing decisive" = "nothing", "no result" = "no result")
-  others <- data.frame(row = c("unexplained", "nothing decisive", "no result"),
-                       state = names(open),
-                       n = vapply(open, function(v) sum(none$verdict == v), 0L))
+  open <- c(unexplained = "unexplained", "nothing decisive" = "nothing", undecided = "undecided",
+            "no result" = "no result")
+  others <- data.frame(row = names(open), state = names(open),
+                       n = vapply(open, function(v) sum(survey$studies$verdict == v), 0L))
   table <- rbind(adopted, others)
   table <- table[table$n > 0, ]
   table$row <- factor(table$row, rev(c(counts$mechanism, others$row)))
@@ -49,12 +48,21 @@ figure_causes <- function(survey) {
     ggplot2::scale_x_continuous(expand = ggplot2::expansion(c(0, 0.02)), guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.5)) +
     figure_titles(causes_title(survey),
-                  paste("Each mechanism counts the studies that adopted it, so that a study with",
-                        "two counts twice."), x = "studies") +
+                  paste("Each mechanism counts the studies that adopted it: a study with two",
+                        "counts twice, and one with a stand-in alone is unexplained as well."),
+                  x = "studies") +
     figure_theme()
   figure <- with_end_labels(figure + ggplot2::coord_cartesian(clip = "off"), counts)
   figure <- with_keys(figure, levels(table$state))
   with_height(figure, 2.3 + 0.42 * nlevels(table$row))
+}
+
+# A row for each study, with its name as long as names can be read; a file holds 50 inches.
+named_studies <- 120
+rows_height <- function(n) 0.25 * min(n, named_studies)
+study_axis <- function(studies) {
+  ggplot2::scale_y_discrete(limits = studies,
+                            labels = if (length(studies) > named_studies) NULL else identity)
 }
 
 figure_studies <- function(survey) {
@@ -72,7 +80,7 @@ figure_studies <- function(survey) {
     ggplot2::scale_shape_manual(values = of_state(18, 19, 17, 3, 4)) +
     ggplot2::scale_size_manual(values = of_state(5, 3.4, 3.4, 0.9, 2)) +
     ggplot2::scale_x_discrete(limits = columns, position = "top") +
-    ggplot2::scale_y_discrete(limits = rev(studies_words(survey)$study)) +
+    study_axis(rev(studies_words(survey)$study)) +
     figure_titles("What became of each mechanism in each study",
                   paste("Studies with a cause named come first.",
                         if (any(survey$studies$verdict == "no result"))
@@ -80,7 +88,7 @@ figure_studies <- function(survey) {
     figure_theme() +
     ggplot2::theme(axis.text.x.top = ggplot2::element_text(angle = 90, hjust = 0, vjust = 0.5))
   figure <- with_keys(figure, levels(shown$state))
-  with_height(figure, 2.2 + 0.085 * max(nchar(columns)) + 0.25 * nrow(survey$studies))
+  with_height(figure, 2.2 + 0.085 * max(nchar(columns)) + rows_height(nrow(survey$studies)))
 }
 
 figure_survey_gain <- function(survey) {
@@ -98,14 +106,14 @@ figure_survey_gain <- function(survey) {
     ggplot2::scale_shape_manual(values = c(before = 17, after = 19)) +
     ggplot2::scale_x_log10(breaks = c(0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000),
                            labels = format_each, guide = apart) +
-    ggplot2::scale_y_discrete(limits = s$study[order(s$error_before, s$error_after)]) +
+    study_axis(s$study[order(s$error_before, s$error_after)]) +
     stage_scales() +
     figure_titles(survey_gain_title(s),
                   "Dashed: the stated noise, about the smallest error that can be expected.",
                   x = "typical error over the stated noise") +
     figure_theme()
   figure <- with_keys(figure, c("before", "after"))
-  with_height(figure, 2.6 + 0.25 * nrow(s))
+  with_height(figure, 2.6 + rows_height(nrow(s)))
 }
 
 survey_gain_title <- function(studies) {

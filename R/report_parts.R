@@ -111,7 +111,8 @@ report_figure <- function(x, which) {
   file <- knitr::fig_path(".png", number = file_stem(which))
   dir.create(dirname(file), recursive = TRUE, showWarnings = FALSE)
   save_figure(figure, file, dpi = 160)
-  cat("\n![", markdown_text(alt), "](", file, "){width=85%}\\\n\n", sep = "")
+  size <- if (figure_height(figure) > canvas_width) "height=8.5in" else "width=85%"  # of a page
+  cat("\n![", markdown_text(alt), "](", file, "){", size, "}\\\n\n", sep = "")
 }
 
 # On the narrow canvas letters are smaller, so that panels need less height.

@@ -5,10 +5,13 @@
 #' does both.
 #'
 #' Each study was judged by itself: nothing that one house shows counts for another. A study without
-#' a result does not stop the survey. It is listed, and `why` says what is wrong with it.
+#' a result does not stop the survey. It is listed, and `why` says what is wrong with it. A study
+#' that is refused leaves no folder of its own: make the folders of all studies before the first
+#' begins, so that none is forgotten.
 #'
 #' @param results A named list of upgrades ([upgrade_model()]), or names of folders that
-#'   [run_study()] filled. If a folder holds no result of its own, its subfolders are the studies.
+#'   [run_study()] filled. If a folder holds no result of its own, the folders in it are the
+#'   studies, or streets of studies.
 #' @param x A survey.
 #' @param what Which table, see below.
 #' @param object A survey.
@@ -18,15 +21,20 @@
 #'   them.
 #' @section Tables: `tidy()` gives one of five tables:
 #'   * `"studies"`: one row for each study.
-#'     * `verdict`: that of [summary.amiss_upgrade()], or `"no result"`, and `why`.
-#'     * `named`, `likely`, `stand_in`: mechanisms adopted. `responds_to`: what the first model's
+#'     * `verdict`: `"named"`, `"likely"`, `"unexplained"` or `"nothing"` as of
+#'       [summary.amiss_upgrade()]; `"undecided"` if the first model's numbers are not trusted or
+#'       no mechanism could be tried; `"no result"`, and `why`.
+#'     * `named`, `likely`, `stand_in`: mechanisms adopted, separated by semicolons. `or`: those
+#'       that the record does not distinguish from them. `responds_to`: what the first model's
 #'       error responds to.
 #'     * `error_before`, `error_after`: root mean squared error of the first and the last model
 #'       over the stated noise, on held-out data if there are any (`held_out`).
-#'     * `log10_bf`: what all that was adopted gains, `NA` if the numbers are not `trusted`.
+#'     * `log10_bf`: the sum of what each adopted mechanism explains (`log10_bf` of the `candidates`
+#'       of [upgrade_model()]), `NA` if the numbers are not `trusted`.
 #'     * `runs`, `seconds`, `faults` of the record.
 #'   * `"mechanisms"`: in how many studies each was tried, named, likely, a stand-in, or not
-#'     adopted. A mechanism that could not be computed was not tried.
+#'     adopted. A mechanism that could not be computed was not tried. A pair counts for both of its
+#'     mechanisms.
 #'   * `"conditions"`: how many `studies` have each condition, and in how many of these the first
 #'     model's error `responds` to it.
 #'   * `"trials"`: one row for each study and mechanism, with its `state` and the `log10_bf` of its
@@ -93,15 +101,20 @@ study_folders <- function(folders, call) {
                   i = "Name folders that {.fun run_study} filled, or a folder that holds them."),
                 call = call)
   }
-  found <- unique(unlist(lapply(folders, function(folder) {
-    own <- c("result.rds", "stages", ".amiss-holder")
-    within <- list.dirs(folder, recursive = FALSE)
-    within <- within[!grepl("^([.]|earlier-)", basename(within))]
-    if (any(file.exists(file.path(folder, own))) || !length(within)) folder else within
-  })))
+  found <- unlist(lapply(folders, studies_within))
+  found <- found[!duplicated(normalizePath(found))]
   names <- basename(normalizePath(found))
   again <- names %in% names[duplicated(names)]
   stats::setNames(as.list(found), ifelse(again, found, names))
+}
+
+# The folder itself if it has a study's results or their beginnings, or holds no other.
+studies_within <- function(folder) {
+  own <- file.exists(file.path(folder, c("result.rds", "stages", ".amiss-holder")))
+  of_survey <- file.exists(file.path(folder, "studies.csv"))
+  within <- list.dirs(folder, recursive = FALSE)
+  within <- within[!grepl("^([.]|earlier-|figures$)", basename(within))]
+  if (any(own) && !of_survey || !length(within)) folder else unlist(lapply(within, studies_within))
 }
 
 # The upgrade in a folder, or why there is none.
@@ -111,56 +124,77 @@ read_result <- function(folder) {
     begun <- any(file.exists(file.path(folder, c("stages", ".amiss-holder"))))
     return(if (begun) "it is not finished" else "there is no result.rds in its folder")
   }
-  tryCatch({
-    result <- suppressWarnings(readRDS(file))
-    if (inherits(result, "amiss_survey")) return(result)
-    if (!inherits(result, "amiss_upgrade"))
-      return(paste("its result.rds holds", got_words(result), "and no upgrade"))
-    check_whole(result, "result")
-    result
-  }, error = function(e) {
-    said <- cli::ansi_strip(strsplit(conditionMessage(e), "\n")[[1]][1])
-    paste("its result.rds cannot be read:", said)
-  })
+  result <- tryCatch(suppressWarnings(readRDS(file)), error = function(e) NULL)
+  if (is.null(result)) return("its result.rds cannot be read")
+  if (inherits(result, c("amiss_survey", "amiss_upgrade"))) result
+  else paste("its result.rds holds", got_words(result), "and no upgrade")
 }
 
-# The rows of a study in each table; NULL for the folder of a survey.
+# The rows of a study in each table; NULL for the folder of a survey. A result that is not whole is
+# none.
 surveyed <- function(source, name) {
   upgrade <- if (is.character(source)) read_result(source) else source
   if (inherits(upgrade, "amiss_survey")) return(NULL)
-  if (is.character(upgrade)) return(list(studies = study_row(name, "no result", why = upgrade)))
+  without <- function(why) list(studies = study_row(name, "no result", why = why))
+  if (is.character(upgrade)) return(without(upgrade))
+  tryCatch({
+    check_whole(upgrade, "result")
+    rows <- upgrade_rows(upgrade, name)
+    if (is.character(source) && dir.exists(file.path(source, "stages")))
+      rows$studies$why <- "it is being made again, or was not made whole"
+    rows
+  }, error = function(e) {
+    without(paste("its result is not whole:", cli::ansi_strip(one_line(conditionMessage(e)))))
+  })
+}
+
+upgrade_rows <- function(upgrade, name) {
   told <- labelled(upgrade)
   verdicts <- vapply(adopted_models(upgrade), `[[`, "", "verdict")
-  mechanisms <- vapply(adopted_models(upgrade), `[[`, "", "mechanism")
-  of <- function(verdict) paste(mechanisms[verdicts == verdict], collapse = ", ")
+  names(verdicts) <- vapply(adopted_models(upgrade), `[[`, "", "mechanism")
+  of <- function(verdict) paste(names(verdicts)[verdicts == verdict], collapse = "; ")
+  rivals <- unlist(lapply(adopted_models(upgrade), `[[`, "rivals"))
   held <- has_validation(upgrade)
   error <- score_of(upgrade, if (held) "validate" else "calibrate", "rmse") /
     upgrade$measurements$noise_sd
   trusted <- all(vapply(upgrade_stages(upgrade), function(m) m$fit$trust$trusted, NA))
+  explained <- vapply(adopted_models(upgrade),
+                      function(model) candidate_row(model, upgrade)$log10_bf, 0)
   studies <- study_row(
-    name, diagnosis_verdict(told)$verdict, of("named"), of("likely"), of("stand-in"),
-    paste(significant_conditions(told$models[[1]]$attribution$table), collapse = ", "),
-    error[[1]], error[[length(error)]], held, if (trusted) upgrade$gain$log10_bf else NA_real_,
-    trusted, upgrade$runs_total, upgrade$wall_s %||% NA_real_,
-    paste(record_faults(told), collapse = "; "))
-  names(verdicts) <- mechanisms
+    name, survey_verdict(told), of("named"), of("likely"), of("stand-in"),
+    paste(unique(rivals), collapse = "; "),
+    paste(significant_conditions(told$models[[1]]$attribution$table), collapse = "; "),
+    error[[1]], error[[length(error)]], held, if (trusted) sum(explained) else NA_real_, trusted,
+    upgrade$runs_total, upgrade$wall_s %||% NA_real_, paste(record_faults(told), collapse = "; "))
   list(studies = studies, trials = trial_states(upgrade, name, verdicts),
        conditions = condition_rows(told, name), parameters = brought_rows(upgrade, name))
 }
 
-study_row <- function(study, verdict, named = "", likely = "", stand_in = "", responds_to = "",
-                      error_before = NA_real_, error_after = NA_real_, held_out = NA,
-                      log10_bf = NA_real_, trusted = NA, runs = NA_real_, seconds = NA_real_,
-                      faults = "", why = "") {
-  data.frame(study, verdict, named, likely, stand_in, responds_to, error_before, error_after,
+# Without a mechanism adopted, numbers that are not trusted decide nothing.
+survey_verdict <- function(upgrade) {
+  open <- !length(adopted_models(upgrade)) &&
+    (!upgrade$models[[1]]$fit$trust$trusted || unjudged(upgrade) ||
+       identical(upgrade$stopped_id, "none_computed"))
+  if (open) "undecided" else diagnosis_verdict(upgrade)$verdict
+}
+
+study_row <- function(study, verdict, named = "", likely = "", stand_in = "", or = "",
+                      responds_to = "", error_before = NA_real_, error_after = NA_real_,
+                      held_out = NA, log10_bf = NA_real_, trusted = NA, runs = NA_real_,
+                      seconds = NA_real_, faults = "", why = "") {
+  data.frame(study, verdict, named, likely, stand_in, or, responds_to, error_before, error_after,
              held_out, log10_bf, trusted, runs, seconds, faults, why)
 }
 
-# What became of each mechanism of the catalogue. `verdicts`: of those adopted, by their names.
+# What became of each single mechanism. `verdicts`: of those adopted, by their names; a pair's is
+# that of both.
 trial_states <- function(upgrade, study, verdicts) {
   trials <- upgrade$candidates
   if (is.null(trials)) return(NULL)
-  first <- trials[!duplicated(trials$mechanism), ]
+  members <- lapply(upgrade$catalogue[names(verdicts)], single_names)
+  verdicts <- stats::setNames(rep(verdicts, lengths(members)), unlist(members))
+  singles <- names(Filter(is_single, unclass(upgrade$catalogue)))
+  first <- trials[!duplicated(trials$mechanism) & trials$mechanism %in% singles, ]
   state <- unname(verdicts[first$mechanism])
   computed <- first$mechanism %in% trials$mechanism[!is.na(trials$log10_bf)]
   state[is.na(state)] <- ifelse(computed, "not adopted", "not computed")[is.na(state)]
@@ -218,16 +252,16 @@ summary.amiss_survey <- function(object, ...) {
 #' @rdname survey
 #' @export
 print.summary.amiss_survey <- function(x, ...) on_stdout(x, {
-  cli::cli_text("{.strong Survey}: {as_said(x$headline)}")
+  cli::cli_text("{.strong Survey}: {x$headline}")
   parts <- list("Causes" = x$causes, "What it brings" = x$gain, "What stays open" = x$open)
-  say_parts(lapply(parts[lengths(parts) > 0], as_said))
+  say_parts(parts[lengths(parts) > 0])
 })
 
 #' @rdname survey
 #' @export
 print.amiss_survey <- function(x, ...) on_stdout(x, {
   check_whole(x, "x")
-  cli::cli_text("{.strong Survey}: {as_said(survey_headline(x))}")
+  cli::cli_text("{.strong Survey}: {survey_headline(x)}")
   say_bullets(c(cause_sentences(x), survey_gain(x)))
   say_bullets(open_sentences(x), "!")
   cli::cli_bullets(c(">" = "next: {.fun tidy}, {.fun plot} or {.fun report}"))

@@ -20,7 +20,7 @@ condition_counts <- function(survey) {
   out[order(-out$responds), ]
 }
 
-verdict_order <- c("named", "likely", "unexplained", "nothing", "no result")
+verdict_order <- c("named", "likely", "unexplained", "nothing", "undecided", "no result")
 
 studies_counted <- function(n) paste(n, if (n == 1) "study" else "studies")
 
@@ -28,7 +28,8 @@ survey_headline <- function(survey) {
   counts <- table(factor(survey$studies$verdict, verdict_order))
   told <- c(named = "a cause is named", likely = "a cause is likely",
             unexplained = "something is missing that the catalogue does not explain",
-            nothing = "nothing decisive is wrong", "no result" = "there is no result")
+            nothing = "nothing decisive is wrong",
+            undecided = "nothing could be decided", "no result" = "there is no result")
   seen <- names(counts)[counts > 0]
   sprintf("In %d of %s %s.", counts[[seen[1]]], studies_counted(nrow(survey$studies)),
           listed(c(told[seen[1]], sprintf("in %d %s", counts[seen[-1]], told[seen[-1]]))))
@@ -68,18 +69,20 @@ some_names <- function(names, most = 5) {
 # remain.
 open_sentences <- function(survey) {
   s <- survey$studies
+  s <- s[order(-s$error_after), ]
   of <- function(which, words) {
     which <- which & !is.na(which)
     if (any(which)) sprintf(words, studies_counted(sum(which)), some_names(s$study[which]))
   }
-  s <- s[order(-s$error_after), ]
-  large <- s$error_after > rules$large_remainder
+  failed <- unique(survey$trials$study[survey$trials$state %in% "not computed"])
   c(of(s$verdict == "no result", "%s without a result: %s."),
+    of(nzchar(s$why) & s$verdict != "no result", "%s made again, or not made whole: %s."),
     of(nzchar(s$faults), "%s with a fault in the record, which looks like a cause: %s."),
     of(!s$trusted, "%s with numbers that are not trusted: %s."),
-    of(large & nzchar(s$named), paste("%s with a cause named and an error that stays above the",
-                                      "noise, largest first: %s.")),
-    of(large & s$verdict == "unexplained", "%s unexplained, the largest error first: %s."))
+    of(s$study %in% failed, "%s with a mechanism that could not be computed: %s."),
+    of(s$error_after > rules$large_remainder,
+       paste("%s with an error that stays above", rules$large_remainder,
+             "times the noise, the largest first: %s.")))
 }
 
 # The table of studies as people read it: by verdict, by what was found most often, then by what
@@ -92,9 +95,11 @@ studies_words <- function(survey) {
   error <- ifelse(is.na(s$error_before), "",
                   ifelse(s$named == "" & s$likely == "" & s$stand_in == "", short(s$error_before),
                          paste(short(s$error_before), "\u2192", short(s$error_after))))
-  count <- function(x) ifelse(is.na(x), "", format(x, big.mark = ",", trim = TRUE))
+  count <- function(x)
+    ifelse(is.na(x), "", format(x, big.mark = ",", trim = TRUE, scientific = FALSE))
   data.frame(study = s$study, verdict = s$verdict, named = s$named, likely = s$likely,
-             "stand-in" = s$stand_in, "the error responds to" = s$responds_to,
+             "stand-in" = s$stand_in, "not distinguished from" = s$or,
+             "the error responds to" = s$responds_to,
              "error over the noise" = error,
              "log10 Bayes factor" = ifelse(is.na(s$log10_bf) | s$log10_bf == 0, "",
                                            signed(s$log10_bf)),
@@ -123,7 +128,7 @@ parameter_ranges <- function(survey) {
   rows <- survey$parameters
   rows <- rows[rows$verdict != "stand-in", ]
   if (!NROW(rows)) return(data.frame())
-  of <- paste(rows$mechanism, rows$name)
+  of <- paste(rows$mechanism, rows$name, rows$unit)
   each <- split(rows, factor(of, unique(of)))
   do.call(rbind, unname(lapply(each, function(r) {
     data.frame(mechanism = r$mechanism[1], parameter = r$label[1], unit = pretty_unit(r$unit[1]),

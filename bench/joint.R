@@ -23,7 +23,10 @@ beside <- function(name, target, unit, noise_sd) {
   fields <- yaml::read_yaml(file.path(folder, paste0("twinhouse_", name, ".yml")))
   data <- utils::read.csv(file.path(folder, fields$data), stringsAsFactors = FALSE)
   measurements(data, time = fields$time, target = target,
-               boundary = as.character(unlist(fields$boundary)), noise_sd = noise_sd,
+               boundary = unlist(Map(function(column, field) {
+                 if (isTRUE(field$circular)) sprintf("circular(%s)", column) else column
+               }, names(fields$boundary), fields$boundary), use.names = FALSE),
+               noise_sd = noise_sd,
                average = fields$average_h, calibrate = data$phase == "rolbs",
                validate = data$phase == "freefloat", warmup = fields$warmup_h, unit = unit,
                name = paste(name, target))

@@ -166,10 +166,186 @@ conditions_table <- function(found) {
   markdown(c("hidden", "rule", "box", "networks", "catchments"), cells)
 }
 
+# ---- one part each
+
+# Under a table: the commands that made it, and when.
+with_source <- function(lines, found, parts) {
+  of <- found[intersect(parts, names(found))]
+  commands <- vapply(of, function(f) sub(" --out FILE", "", sub("Rscript ", "", f$command)), "")
+  dates <- unique(vapply(of, `[[`, "", "date"))
+  c(lines, "", paste0("By `", paste(commands, collapse = "`, `"), "`, ",
+                      paste(dates, collapse = " and "), "."))
+}
+
+field <- function(rows, name) {
+  unlist(lapply(rows, function(r) if (is.null(r[[name]])) NA else r[[name]]))
+}
+between <- function(x, f = whole) {
+  ends <- unique(f(range(x)))
+  paste(ends, collapse = " to ")
+}
+of_all <- function(x, n = length(x)) sprintf("%d of %d", as.integer(sum(x)), as.integer(n))
+digits <- function(x, n = 2)
+  sub("[.]$", "", formatC(signif(x, n), digits = n, format = "fg", flag = "#"))
+
+calibration_table <- function(found) {
+  rows <- found$calibration$found
+  case <- field(rows, "case")
+  p <- field(rows, "p_value")
+  holm <- stats::p.adjust(p)
+  kinds <- c("joint posterior" = "^joint",
+             "posteriors (5), also with one noise precision, and (6)" = "^posterior",
+             "probabilities of three models" = "^model prob",
+             "evidence against bridge sampling" = "^evidence")
+  lines <- lapply(names(kinds), function(kind) {
+    of <- grepl(kinds[[kind]], case)
+    c(kind, sum(of), digits(min(p[of])), digits(min(holm[of])))
+  })
+  with_source(markdown(c("", "quantities", "least p-value",
+                         sprintf("adjusted by Holm over all %d", length(p))), lines),
+              found, "calibration")
+}
+
+evidence_table <- function(found) {
+  rows <- Filter(function(r) !is.null(r$d), found$evidence$found)
+  lines <- lapply(rows, function(r) {
+    c(r$case, r$d, sprintf("%.3f", r$bias), sprintf("%.3f", r$sd),
+      sprintf("%.0f %%", 100 * r$coverage))
+  })
+  with_source(markdown(c("target", "dimensions", "bias of the log evidence, nats",
+                         "standard deviation", "intervals that hold it"), lines), found, "evidence")
+}
+
+basis_table <- function(found) {
+  rows <- found$basis$found
+  models <- unique(field(rows, "model"))
+  spread <- function(model, varied) {
+    of <- Filter(function(r) r$model == model && r$varied %in% varied, rows)
+    trusted <- field(of, "trusted")
+    values <- field(of, "log10_evidence")[trusted]
+    paste0(sprintf("%.2f", diff(range(values))),
+           if (any(!trusted)) sprintf(" (%d not trusted)", sum(!trusted)))
+  }
+  own <- c("own choice", "twice as many")
+  kinds <- list("own choice of vectors, twice as many" = list(own, 0.3),
+                "8, 10, 12, 16 vectors" = list("Q", 1), "100, 150, 250 runs" = list("M", 1))
+  lines <- lapply(names(kinds), function(kind) {
+    c(kind, vapply(models, spread, "", kinds[[kind]][[1]]), kinds[[kind]][[2]])
+  })
+  with_source(markdown(c("", models, "required"), lines), found, "basis")
+}
+
+record_names <- c(
+  reservoir = "level of a tank, by the hour", cell = "voltage of a battery cell",
+  greenhouse = "carbon dioxide in a greenhouse", town = "electricity of a town",
+  river = "oxygen of a river, by the hour", glucose = "glucose, by the quarter of an hour",
+  reactor = "temperature of a stirred reactor", module = "power of a photovoltaic module",
+  drug = "a drug in the blood")
+
+# What is hidden though no mechanism of the catalogue holds it.
+outside <- c(greenhouse = "vents that open when it is warm, in no catalogue",
+             module = "dust that rain washes off, in no catalogue")
+
+sciences_table <- function(found) {
+  parts <- grep("^sciences_", names(found), value = TRUE)
+  rows <- unlist(lapply(found[parts], `[[`, "found"), recursive = FALSE)
+  lines <- lapply(names(record_names), function(record) {
+    of <- Filter(function(r) r$record == record, rows)
+    each <- table(unlist(strsplit(field(of, "adopted"), ", ", fixed = TRUE)))
+    told <- if (identical(names(each), "nothing")) sprintf("nothing in %d", each)
+            else sprintf("%s in %d", names(each), each)
+    ratio <- function(name) between(field(of, name) / field(of, "noise"), digits)
+    before <- ratio("rmse_before")
+    after <- ratio("rmse_after")
+    hidden <- if (record %in% names(outside)) outside[[record]] else of[[1]]$hidden
+    c(record_names[[record]], hidden, paste(told, collapse = "; "),
+      sprintf("%d; %d of %d", sum(field(of, "covered")), sum(field(of, "calibrated_covered")),
+              sum(field(of, "parameters"))),
+      if (before == after) paste0(before, ", unchanged") else paste(before, "\u2192", after),
+      between(field(of, "runs")))
+  })
+  n <- length(parts)
+  with_source(markdown(c(sprintf("record, %d of each", n), "hidden", "adopted",
+                         "true values in their 95 % intervals: physical; calibrated",
+                         "held-out RMSE over the noise, before \u2192 after", "runs"), lines),
+              found, parts)
+}
+
+steps_table <- function(found) {
+  rows <- found$steps$found
+  off <- field(rows, "off")
+  ends <- c(0, 0.1, 0.3, 1, 3, Inf)
+  names <- c("below 0.1", "0.1 to 0.3", "0.3 to 1", "1 to 3", "above 3")
+  row <- function(name, of) {
+    r <- rows[of]
+    there <- field(r, "hidden") != "nothing"
+    sum_of <- function(what, which = TRUE) sum(field(r, what)[which])
+    c(name, length(r), sprintf("%d (%d)", sum_of("wrong_named"), sum_of("wrong_otherwise")),
+      sprintf("%d (%d) of %d", sum_of("right_named", there), sum_of("right_otherwise", there),
+              sum(there)),
+      sprintf("%d of %d; %d of %d", sum_of("told_held"), sum_of("told"), sum_of("silent_held"),
+              sum_of("silent")))
+  }
+  lines <- lapply(seq_along(names), function(k) row(names[k], off >= ends[k] & off < ends[k + 1]))
+  with_source(markdown(c("what the steps change at the true values, over the noise", "worlds",
+                         "named that is not there", "hidden, and named",
+                         "95 % intervals that hold the truth: said to move; others"),
+                       c(lines, list(row("all", TRUE)))), found, "steps")
+}
+
+crude_table <- function(found) {
+  lines <- lapply(found$crude$found, function(r) {
+    split <- function(text) strsplit(text, ", ", fixed = TRUE)[[1]]
+    c(r$house, r$states, sub("/", ", ", r$before),
+      paste0(split(r$adopted), " (", split(r$verdicts), ")", collapse = "; "),
+      sub("/", ", ", r$after), whole(r$runs_total))
+  })
+  with_source(markdown(c("house", "capacities", "RMSE before, K: calibration, held out", "adopted",
+                         "RMSE after", "runs"), lines), found, "crude")
+}
+
+catchment_table <- function(found) {
+  lines <- lapply(found$catchment$found, function(r) {
+    arrows <- function(text) gsub(", ", " \u2192 ", text, fixed = TRUE)
+    c(r$catchment, r$adopted, arrows(r$rmse_calibration), arrows(r$rmse_held_out), whole(r$runs))
+  })
+  with_source(markdown(c("catchment", "adopted", "RMSE in calibration", "RMSE held out", "runs"),
+                       lines), found, "catchment")
+}
+
+estate_table <- function(found) {
+  r <- found$estate$found
+  hides <- function(n) sprintf("%d of %d", as.integer(n), as.integer(r$hide_something))
+  lines <- list(
+    c("houses, each with a result", sprintf("%d of %d", r$houses - r$without_result, r$houses)),
+    c("the right mechanism is adopted", hides(r$right_adopted)),
+    c("it is named", hides(r$right_named)),
+    c("nothing hidden: nothing is adopted",
+      sprintf("%d of %d", r$nothing_adopted, r$nothing_hidden)),
+    c("houses with something adopted; named that is not there",
+      sprintf("%d; %d of %d", r$wrong_adopted, r$wrong_named, r$houses)),
+    c("runs of the simulator, median", whole(r$runs_median)),
+    c("minutes for all, two nodes of one CPU", digits(r$wall_s / 60)))
+  with_source(markdown(c("", ""), lines), found, "estate")
+}
+
+# A table of a part is empty until the part has a result.
+of_part <- function(table, part) {
+  function(found) if (any(startsWith(names(found), part))) table(found) else character()
+}
+
 tables <- list(
   "conditions" = conditions_table,
   "worlds in short" = function(found) worlds_table(found, families[1:3], world_rows),
   "worlds" = function(found) worlds_table(found, families, c(world_rows, more_world_rows)),
-  "rivals" = rivals_table)
+  "rivals" = rivals_table,
+  "calibration" = of_part(calibration_table, "calibration"),
+  "evidence" = of_part(evidence_table, "evidence"),
+  "basis" = of_part(basis_table, "basis"),
+  "sciences" = of_part(sciences_table, "sciences"),
+  "steps" = of_part(steps_table, "steps"),
+  "crude" = of_part(crude_table, "crude"),
+  "catchment" = of_part(catchment_table, "catchment"),
+  "estate" = of_part(estate_table, "estate"))
 
 main(commandArgs(trailingOnly = TRUE))

@@ -65,21 +65,20 @@ score_estate <- function(folder) {
   studies <- utils::read.csv(file.path(folder, "survey", "studies.csv"),
                              colClasses = c(named = "character", likely = "character",
                                             stand_in = "character"))
-  found <- merge(truth, studies, by = "study")
-  each <- function(text) strsplit(text, ", ", fixed = TRUE)
+  all <- merge(truth, studies, by = "study", all.x = TRUE)
+  found <- all[!is.na(all$verdict) & all$verdict != "no result", ]
+  each <- function(text) strsplit(text, "; ", fixed = TRUE)
   is_in <- function(hidden, texts) mapply(`%in%`, hidden, each(texts))
   others <- function(texts) lengths(mapply(setdiff, each(texts), found$hidden, SIMPLIFY = FALSE))
-  adopted <- paste(found$named, found$likely, found$stand_in, sep = ", ")
-  adopted <- gsub("(^(, )+|(, )+$)", "", gsub("(, )+", ", ", adopted))
+  adopted <- paste(found$named, found$likely, found$stand_in, sep = "; ")
+  adopted <- gsub("(^(; )+|(; )+$)", "", gsub("(; )+", "; ", adopted))
   something <- found$hidden != "nothing"
-  count <- function(which) sum(which, na.rm = TRUE)
   result <- list(
-    houses = nrow(found), without_result = count(found$verdict == "no result"),
-    hide_something = count(something),
-    right_adopted = count(is_in(found$hidden, adopted)[something]),
-    right_named = count(is_in(found$hidden, found$named)[something]),
-    wrong_adopted = count(others(adopted) > 0), wrong_named = count(others(found$named) > 0),
-    nothing_hidden = count(!something), nothing_adopted = count(adopted[!something] == ""),
+    houses = nrow(all), without_result = nrow(all) - nrow(found), hide_something = sum(something),
+    right_adopted = sum(is_in(found$hidden, adopted)[something]),
+    right_named = sum(is_in(found$hidden, found$named)[something]),
+    wrong_adopted = sum(others(adopted) > 0), wrong_named = sum(others(found$named) > 0),
+    nothing_hidden = sum(!something), nothing_adopted = sum(adopted[!something] == ""),
     runs_median = stats::median(found$runs), seconds_median = stats::median(found$seconds))
   print(table(hidden = found$hidden, adopted = adopted))
   utils::str(result, give.head = FALSE)

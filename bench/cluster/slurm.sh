@@ -46,7 +46,7 @@ start() {  # name, command
 }
 start_node() { start "$1" slurmd -D -N "$1"; node_pid=$!; }
 idle() { [[ "$(sinfo -h -p worlds -t idle -o %D 2> /dev/null)" == 2 ]]; }
-empty() { [[ -z "$(squeue -h)" ]]; }
+empty() { local waiting; waiting="$(squeue -h 2> /dev/null)" && [[ -z $waiting ]]; }
 
 start_slurm() {
   say "Starting munged, slurmctld and two nodes"

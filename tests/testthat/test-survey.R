@@ -46,7 +46,7 @@ test_that("a survey says its counts, and what stays open", {
   expect_match(told$causes[1], "Named: sun in 2 of 5.", fixed = TRUE)
   expect_match(told$causes[2], "Likely: sun in 1 of 5.", fixed = TRUE)
   expect_match(told$gain, "median of 5 studies; held-out data")
-  expect_match(paste(told$open, collapse = " "), "unexplained, the largest error first: d")
+  expect_match(told$open, "1 study with an error that stays above 1.5 times the noise.*: d.")
   expect_identical(told$studies$study[1:2], c("a", "c"))
   expect_identical(told$parameters$studies, 3L)  # the stand-in is none
   expect_output(print(small_survey()), "2 of 5 studies")
@@ -92,6 +92,83 @@ test_that("a survey of folders lists what has no result, and why", {
   one <- survey(file.path(folder, c("done", "empty")))
   expect_identical(tidy(one)$study, c("done", "empty"))
   expect_error(survey(file.path(folder, "whole")), class = "amiss_error_input")
+})
+
+test_that("a folder counts once, streets are entered, and a survey in their midst is none", {
+  folder <- withr::local_tempdir()
+  for (house in c("north/1", "north/2", "south/3", "south/4")) {
+    dir.create(file.path(folder, house), recursive = TRUE)
+    saveRDS(surveyed_upgrade(), file.path(folder, house, "result.rds"))
+  }
+  dir.create(file.path(folder, "south", "4", "figures"))
+  dir.create(file.path(folder, "south", "5", "figures"), recursive = TRUE)
+  houses <- c("1", "2", "3", "4", "5")
+  expect_identical(tidy(survey(folder))$study, houses)
+  expect_identical(tidy(survey(c(folder, paste0(folder, "/"), file.path(folder, "north"))))$study,
+                   houses)
+  saveRDS(survey(folder), file.path(folder, "result.rds"))
+  file.create(file.path(folder, "studies.csv"))
+  expect_identical(tidy(survey(folder))$study, houses)
+})
+
+test_that("what decides nothing is undecided, whatever its verdict", {
+  verdict <- function(upgrade) tidy(survey(list(a = upgrade)))$verdict
+  base <- surveyed_upgrade(adopted = FALSE)
+  expect_identical(verdict(base), "unexplained")
+  untrusted <- base
+  untrusted$models[[1]]$fit$trust$trusted <- FALSE
+  expect_identical(verdict(untrusted), "undecided")
+  refuted <- base
+  refuted$models[[1]]$fit$check$passed <- FALSE
+  expect_identical(verdict(refuted), "undecided")
+  none <- base
+  none$stopped_id <- "none_computed"
+  expect_identical(verdict(none), "undecided")
+  expect_match(summary(survey(list(a = none)))$headline, "nothing could be decided")
+})
+
+test_that("an upgrade whose parts do not fit has no result, and does not stop the survey", {
+  folder <- withr::local_tempdir()
+  for (name in c("good", "bad")) dir.create(file.path(folder, name))
+  saveRDS(surveyed_upgrade(), file.path(folder, "good", "result.rds"))
+  bad <- surveyed_upgrade()
+  bad$models[[2]]$mechanism <- "not in the catalogue"
+  saveRDS(bad, file.path(folder, "bad", "result.rds"))
+  studies <- tidy(survey(folder))
+  expect_identical(studies$verdict, c("no result", "named"))
+  expect_match(studies$why[1], "not whole")
+})
+
+test_that("a pair counts for both of its mechanisms, and units are not mixed", {
+  pair <- surveyed_upgrade()
+  both <- paired_mechanism(c("sun", "drift"), pair$catalogue)
+  pair$catalogue <- with_entries(pair$catalogue, list("sun + drift" = both))
+  pair$models[[2]]$mechanism <- "sun + drift"
+  row <- pair$candidates[pair$candidates$mechanism == "sun", ]
+  row$mechanism <- "sun + drift"
+  pair$candidates <- rbind(pair$candidates, row)
+  other <- surveyed_upgrade()
+  other$models[[2]]$fit$emulator$parameters[["sun_gain"]]$unit <- "cm2"
+  found <- survey(list(a = pair, b = other))
+  counts <- tidy(found, "mechanisms")
+  expect_identical(counts$named[match(c("sun", "drift"), counts$mechanism)], c(2L, 1L))
+  expect_identical(tidy(found)$named, c("sun + drift", "sun"))
+  expect_identical(summary(found)$parameters$studies, c(1L, 1L))
+})
+
+test_that("three hundred studies still make figures", {
+  many <- small_survey()
+  many$studies <- do.call(rbind, lapply(1:60, function(k) {
+    transform(many$studies, study = paste(study, k))
+  }))
+  many$trials <- do.call(rbind, lapply(1:60, function(k) {
+    transform(many$trials, study = paste(study, k))
+  }))
+  for (which in survey_figures) {
+    figure <- ggplot2::autoplot(many, which)
+    expect_lt(figure_height(figure, narrow_canvas), 50)
+    expect_error(ggplot2::ggplot_build(figure), NA)
+  }
 })
 
 test_that("folders of the same name keep their paths", {
@@ -144,4 +221,5 @@ test_that("the command writes a survey, and says with its status that a study ha
   expect_match(said(folder), "'--out DIR' is needed", fixed = TRUE)
   expect_match(said(folder, "--out", out, "--seed", "1"), "'--seed' is not for 'survey'")
   expect_match(said(file.path(folder, "none"), "--out", out), "does not exist")
+  expect_match(said(folder, "--out", folder), "another folder")
 })
