@@ -173,7 +173,7 @@ with_source <- function(lines, found, parts) {
   of <- found[intersect(parts, names(found))]
   commands <- vapply(of, function(f) sub(" --out FILE", "", sub("Rscript ", "", f$command)), "")
   dates <- unique(vapply(of, `[[`, "", "date"))
-  c(lines, "", paste0("By `", paste(commands, collapse = "`, `"), "`, ",
+  c(lines, "", paste0("From `", paste(commands, collapse = "`, `"), "`, ",
                       paste(dates, collapse = " and "), "."))
 }
 
@@ -325,7 +325,7 @@ estate_table <- function(found) {
     c("houses with something adopted; named that is not there",
       sprintf("%d; %d of %d", r$wrong_adopted, r$wrong_named, r$houses)),
     c("runs of the simulator, median", whole(r$runs_median)),
-    c("minutes for all, two nodes of one CPU", digits(r$wall_s / 60)))
+    c("seconds of a study without its report, median", whole(r$seconds_median)))
   with_source(markdown(c("", ""), lines), found, "estate")
 }
 

@@ -40,7 +40,7 @@ write_house <- function(folder, number, seed) {
                       Gv = hourly(drivers[, "Gv"]), P = heating,
                       Ti = hourly(run) + stats::rnorm(hours, 0, 0.1))
   name <- sprintf("house_%02d", number)
-  dir.create(file.path(folder, "studies", name), recursive = TRUE)
+  dir.create(file.path(folder, "studies", name), recursive = TRUE, showWarnings = FALSE)
   utils::write.csv(signif(table, 6), file.path(folder, "studies", name, "record.csv"),
                    row.names = FALSE)
   writeLines(c(paste("study:", name), "data: record.csv", "time: hour", "target: Ti", "unit: K",
@@ -82,7 +82,7 @@ score_estate <- function(folder) {
     runs_median = stats::median(found$runs), seconds_median = stats::median(found$seconds))
   print(table(hidden = found$hidden, adopted = adopted))
   utils::str(result, give.head = FALSE)
-  write_rows(c(result, list(wall_s = as.numeric(option("seconds", "NA")))), option("out"))
+  write_rows(result, option("out"))
 }
 
 if ("--write" %in% arguments) write_estate(option("write")) else score_estate(option("score"))

@@ -72,12 +72,13 @@ test_that("every benchmark is in the plan of bench/all, by options that it has",
   scripts <- list.files(file.path(root, "bench"), "\\.R$")
   started <- Filter(function(f) startsWith(code(f)[1], "#!"), scripts)
   script <- sub(" .*", "", parts$command)
-  expect_setequal(script, c(started, "peers/ball_drop.R"))
+  expect_setequal(script, c(started, "peers/ball_drop.R", "estate", "slurm"))
   expect_false(anyDuplicated(parts$part) > 0)
   expect_true(all(parts$how %in% c("alone", "shared", "last")))
   options <- regmatches(parts$command, gregexpr("(?<=--)[a-z]+", parts$command, perl = TRUE))
   for (k in seq_along(options)) for (name in options[[k]]) {
-    expect_true(any(grepl(sprintf('option("%s"', name), code(script[k]), fixed = TRUE)),
+    read <- sprintf(if (grepl("[.]R$", script[k])) 'option("%s"' else "--%s", name)
+    expect_true(any(grepl(read, code(script[k]), fixed = TRUE)),
                 info = paste(parts$command[k], name))
   }
   # Those that come last look at worlds again.
