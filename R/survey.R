@@ -1,17 +1,17 @@
 #' Many studies in one table and one report
 #'
-#' Reads the results of many studies, such as those of all houses of an estate, and says how many of
-#' them lack what. [report()] writes it as one report. The command `amiss survey FOLDER --out DIR`
-#' does both.
+#' Reads the results of many studies, such as those of all houses of an estate, and counts in how
+#' many of them each cause was found. [report()] writes it as one report. The command
+#' `amiss survey FOLDER --out DIR` does both.
 #'
 #' Each study was judged by itself: nothing that one house shows counts for another. A study without
-#' a result does not stop the survey. It is listed, and `why` says what is wrong with it. A study
-#' that is refused leaves no folder of its own: make the folders of all studies before the first
-#' begins, so that none is forgotten.
+#' a result does not stop the survey: it is listed, with the reason in `why`. A study that is
+#' refused leaves no folder of its own. Make the folders of all studies before the first begins, so
+#' that none is forgotten.
 #'
 #' @param results A named list of upgrades ([upgrade_model()]), or names of folders that
-#'   [run_study()] filled. If a folder holds no result of its own, the folders in it are the
-#'   studies, or streets of studies.
+#'   [run_study()] filled. If a folder holds no result of its own, its subfolders are searched for
+#'   studies, at any depth.
 #' @param x A survey.
 #' @param what Which table, see below.
 #' @param object A survey.
@@ -22,8 +22,9 @@
 #' @section Tables: `tidy()` gives one of five tables:
 #'   * `"studies"`: one row for each study.
 #'     * `verdict`: `"named"`, `"likely"`, `"unexplained"` or `"nothing"` as of
-#'       [summary.amiss_upgrade()]; `"undecided"` if the first model's numbers are not trusted or
-#'       no mechanism could be tried; `"no result"`, and `why`.
+#'       [summary.amiss_upgrade()]; `"undecided"` if no mechanism was adopted, and the first
+#'       model's numbers are not trusted or no mechanism could be computed; `"no result"`. `why`
+#'       has the reason, or that the result is being made again.
 #'     * `named`, `likely`, `stand_in`: mechanisms adopted, separated by semicolons. `or`: those
 #'       that the record does not distinguish from them. `responds_to`: what the first model's
 #'       error responds to.
@@ -37,8 +38,9 @@
 #'     mechanisms.
 #'   * `"conditions"`: how many `studies` have each condition, and in how many of these the first
 #'     model's error `responds` to it.
-#'   * `"trials"`: one row for each study and mechanism, with its `state` and the `log10_bf` of its
-#'     first trial.
+#'   * `"trials"`: one row for each study and single mechanism, with its `state` (`named`, `likely`,
+#'     `stand-in`, `not adopted`, `not computed`) and the `log10_bf` of its first trial, `NA` if
+#'     that is not trusted.
 #'   * `"parameters"`: what each adopted mechanism brought, with median, 95 % interval and physical
 #'     interval.
 #' @seealso `vignette("pipelines", "amiss")`
