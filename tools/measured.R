@@ -162,12 +162,14 @@ conditions_table <- function(found) {
     row <- Find(function(r) r$rule == rule && r$hidden == hidden && r$family == family, rows)
     if (is.null(row)) "" else paste(row$right, row$wrong, row$none, sep = "; ")
   }
-  hidden <- c("strength of two and more", "weaker", "outside", "nothing")
+  hidden <- c("twice the noise or more" = "strength of two and more", weaker = "weaker",
+              "an effect outside the catalogue" = "outside", nothing = "nothing")
   families <- c("box", "network", "runoff")
-  cells <- unlist(lapply(hidden, function(h) lapply(names(rule_names), function(rule) {
-    c(h, rule_names[[rule]], vapply(families, function(family) cell(rule, h, family), ""))
+  cells <- unlist(lapply(names(hidden), function(h) lapply(names(rule_names), function(rule) {
+    c(h, rule_names[[rule]], vapply(families, function(family) cell(rule, hidden[[h]], family), ""))
   })), recursive = FALSE)
-  markdown(c("hidden", "rule", "box", "networks", "catchments"), cells)
+  with_source(markdown(c("hidden", "rule", "box: right; wrong; none", "networks", "catchments"),
+                       unname(cells)), found, "conditions")
 }
 
 # ---- one part each
