@@ -26,8 +26,8 @@
 #'       model's numbers are not trusted or no mechanism could be computed; `"no result"`. `why`
 #'       has the reason, or that the result is being made again.
 #'     * `named`, `likely`, `stand_in`: mechanisms adopted, separated by semicolons. `or`: those
-#'       that the record does not distinguish from them. `responds_to`: what the first model's
-#'       error responds to.
+#'       that the record does not distinguish from them. `doubts`: what speaks against those that
+#'       are not named. `responds_to`: what the first model's error responds to.
 #'     * `error_before`, `error_after`: root mean squared error of the first and the last model
 #'       over the stated noise, on held-out data if there are any (`held_out`).
 #'     * `log10_bf`: the sum of what each adopted mechanism explains (`log10_bf` of the `candidates`
@@ -156,6 +156,7 @@ upgrade_rows <- function(upgrade, name) {
   names(verdicts) <- vapply(adopted_models(upgrade), `[[`, "", "mechanism")
   of <- function(verdict) paste(names(verdicts)[verdicts == verdict], collapse = "; ")
   rivals <- unlist(lapply(adopted_models(upgrade), `[[`, "rivals"))
+  doubts <- unlist(lapply(adopted_models(upgrade), function(model) unname(model$doubts)))
   held <- has_validation(upgrade)
   error <- score_of(upgrade, if (held) "validate" else "calibrate", "rmse") /
     upgrade$measurements$noise_sd
@@ -164,7 +165,7 @@ upgrade_rows <- function(upgrade, name) {
                       function(model) candidate_row(model, upgrade)$log10_bf, 0)
   studies <- study_row(
     name, survey_verdict(told), of("named"), of("likely"), of("stand-in"),
-    paste(unique(rivals), collapse = "; "),
+    paste(unique(rivals), collapse = "; "), paste(unique(doubts), collapse = "; "),
     paste(significant_conditions(told$models[[1]]$attribution$table), collapse = "; "),
     error[[1]], error[[length(error)]], held, if (trusted) sum(explained) else NA_real_, trusted,
     upgrade$runs_total, upgrade$wall_s %||% NA_real_, paste(record_faults(told), collapse = "; "))
@@ -181,11 +182,11 @@ survey_verdict <- function(upgrade) {
 }
 
 study_row <- function(study, verdict, named = "", likely = "", stand_in = "", or = "",
-                      responds_to = "", error_before = NA_real_, error_after = NA_real_,
-                      held_out = NA, log10_bf = NA_real_, trusted = NA, runs = NA_real_,
-                      seconds = NA_real_, faults = "", why = "") {
-  data.frame(study, verdict, named, likely, stand_in, or, responds_to, error_before, error_after,
-             held_out, log10_bf, trusted, runs, seconds, faults, why)
+                      doubts = "", responds_to = "", error_before = NA_real_,
+                      error_after = NA_real_, held_out = NA, log10_bf = NA_real_, trusted = NA,
+                      runs = NA_real_, seconds = NA_real_, faults = "", why = "") {
+  data.frame(study, verdict, named, likely, stand_in, or, doubts, responds_to, error_before,
+             error_after, held_out, log10_bf, trusted, runs, seconds, faults, why)
 }
 
 # What became of each single mechanism. `verdicts`: of those adopted, by their names; a pair's is

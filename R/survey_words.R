@@ -110,7 +110,7 @@ studies_words <- function(survey) {
 look_at <- function(studies) {
   trim <- function(x) trimws(gsub("(^; )+|(; )+$", "", gsub("(; )+", "; ", x)))
   untrusted <- ifelse(!is.na(studies$trusted) & !studies$trusted, "numbers not trusted", "")
-  trim(paste(studies$why, studies$faults, untrusted, sep = "; "))
+  trim(paste(studies$why, studies$faults, untrusted, studies$doubts, sep = "; "))
 }
 
 mechanism_counts_words <- function(survey) {

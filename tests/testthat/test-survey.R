@@ -25,6 +25,10 @@ test_that("a survey counts what each study lacks", {
   expect_equal(studies$error_after[1],
                upgrade$models[[2]]$scores$validate[["rmse"]] / upgrade$measurements$noise_sd)
   expect_true(all(studies$held_out))
+  doubtful <- surveyed_upgrade("likely")
+  doubtful$models[[2]]$doubts <- c(edge = "it lies at the edge")
+  expect_identical(tidy(survey(list(a = doubtful)))$doubts, "it lies at the edge")
+  expect_match(summary(survey(list(a = doubtful)))$studies[["to look at"]], "at the edge")
   expect_equal(studies$runs[1], upgrade$runs_total)
 
   counts <- tidy(found, "mechanisms")
