@@ -91,8 +91,8 @@ one_design <- function(case, runs, noise, seed) {
   basis <- list(vectors = matrix(1, 3, 1), coefficients = values, singular_values = 1,
                 discarded_ss = 0)
   seconds <- system.time(gcFirst = FALSE, {
-    e <- amiss:::train_emulator_(amiss:::to_normal(x), NULL, basis, amiss:::emulator_control,
-                                 list(seed = 1, threads = 1))
+    e <- amiss:::train_emulator_(amiss:::to_normal(x), NULL, basis, NULL,
+                                 amiss:::emulator_control, list(seed = 1, threads = 1))
   })[["elapsed"]]
   p <- amiss:::predict_emulator_(c(e, list(region = NULL)), stats::qnorm(at))
   error <- truth - centre - spread * p$mean[, 1]

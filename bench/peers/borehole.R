@@ -25,8 +25,8 @@ interval <- function(mean, sd, df = Inf) {
 amiss_fit <- function(x, y) {
   basis <- list(vectors = matrix(1, 3, 1), coefficients = matrix((y - mean(y)) / stats::sd(y)),
                 singular_values = 1, discarded_ss = 0)
-  e <- amiss:::train_emulator_(amiss:::to_normal(x), NULL, basis, amiss:::emulator_control,
-                               list(seed = 1, threads = 1))
+  e <- amiss:::train_emulator_(amiss:::to_normal(x), NULL, basis, NULL,
+                               amiss:::emulator_control, list(seed = 1, threads = 1))
   function(at) {
     p <- amiss:::predict_emulator_(c(e, list(region = NULL)), stats::qnorm(at))
     interval(mean(y) + stats::sd(y) * p$mean[, 1], stats::sd(y) * sqrt(p$variance[, 1]))
