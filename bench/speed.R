@@ -63,5 +63,5 @@ measured("dgemm, n = 1000, Eigen", gflops, "GFLOP/s")
 for (part in parts) {
   cat("\n", part, "\n", sep = "")
   sys.source(file.path(here, "speed", paste0(part, ".R")), new.env(parent = globalenv()))
+  write_rows(do.call(rbind, rows), out)
 }
-write_rows(do.call(rbind, rows), out)

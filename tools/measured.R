@@ -375,6 +375,21 @@ joint_upgrade_table <- function(found) {
               found, "joint_upgrade")
 }
 
+# Rows with a bound; `holds` says on which side of it.
+speed_table <- function(found) {
+  parts <- intersect(c("speed", "speed_emulator"), names(found))
+  rows <- unlist(lapply(found[parts], `[[`, "found"), recursive = FALSE)
+  rows <- Filter(function(r) !is.null(r$required) && !is.null(r$holds), rows)
+  lines <- lapply(rows, function(r) {
+    value <- paste(if (r$value >= 1000) whole(r$value) else digits(r$value, 3), r$unit)
+    below <- (r$value <= r$required) == r$holds
+    c(r$name, if (r$holds) value else paste0("**", trimws(value), "**"),
+      paste(if (below) "at most" else "at least", format(r$required, big.mark = ",")),
+      if (r$holds) "" else "**missed**")
+  })
+  with_source(markdown(c("", "measured", "required", ""), unname(lines)), found, parts)
+}
+
 doubt_words <- c(
   record = "a fault of the record is suspected", open = "a rival with rough numbers comes as near",
   rivals = "a rival is probable too", untried = "a condition without a mechanism would do as well",
@@ -423,6 +438,7 @@ tables <- list(
   "joint" = of_part(joint_table, "joint"),
   "joint cases" = of_part(joint_cases_table, "joint"),
   "joint upgrade" = of_part(joint_upgrade_table, "joint_upgrade"),
+  "speed" = of_part(speed_table, "speed"),
   "estate" = of_part(estate_table, "estate"))
 
 main(commandArgs(trailingOnly = TRUE))
