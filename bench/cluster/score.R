@@ -17,7 +17,8 @@ one_world <- function(seed, file, bench) {
   }
   note("begun")
   scope <- new.env(parent = globalenv())
-  for (part in c("worlds.R", "score.R")) sys.source(file.path(bench, "hidden_effects", part), scope)
+  for (part in c("worlds.R", "least_squares.R", "score.R"))
+    sys.source(file.path(bench, "hidden_effects", part), scope)
   row <- scope$score_world(scope$draw_world(seed), rivals = FALSE)
   part <- tempfile("part-", dirname(file))
   saveRDS(row, part)
