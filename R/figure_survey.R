@@ -108,18 +108,13 @@ figure_survey_gain <- function(survey) {
                            labels = format_each, guide = apart) +
     study_axis(s$study[order(s$error_before, s$error_after)]) +
     stage_scales() +
-    figure_titles(survey_gain_title(s),
+    figure_titles(paste("The typical error", median_change(s),
+                        "times the noise in the median study"),
                   "Dashed: the stated noise, about the smallest error that can be expected.",
                   x = "typical error over the stated noise") +
     figure_theme()
   figure <- with_keys(figure, c("before", "after"))
   with_height(figure, 2.6 + rows_height(nrow(s)))
-}
-
-survey_gain_title <- function(studies) {
-  paste0("The typical error ", change_words(stats::median(studies$error_before),
-                                            stats::median(studies$error_after), ""),
-         " times the noise in the median study")
 }
 
 #' @export

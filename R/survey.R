@@ -160,9 +160,10 @@ upgrade_rows <- function(upgrade, name) {
   held <- has_validation(upgrade)
   error <- score_of(upgrade, if (held) "validate" else "calibrate", "rmse") /
     upgrade$measurements$noise_sd
-  trusted <- all(vapply(upgrade_stages(upgrade), function(m) m$fit$trust$trusted, NA))
-  explained <- vapply(adopted_models(upgrade),
-                      function(model) candidate_row(model, upgrade)$log10_bf, 0)
+  rows <- lapply(adopted_models(upgrade), candidate_row, upgrade)
+  trusted <- all(vapply(upgrade$models, function(m) m$fit$trust$trusted, NA),
+                 vapply(rows, is_sound, NA, upgrade))
+  explained <- vapply(rows, `[[`, 0, "log10_bf")
   studies <- study_row(
     name, survey_verdict(told), of("named"), of("likely"), of("stand-in"),
     paste(unique(rivals), collapse = "; "), paste(unique(doubts), collapse = "; "),

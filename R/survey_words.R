@@ -54,9 +54,11 @@ survey_gain <- function(survey) {
           else if (any(done$held_out)) "held-out data if there are any, else calibration"
           else "calibration"
   sprintf("The typical error, in units of the stated noise, %s (median of %s; %s).",
-          change_words(stats::median(done$error_before), stats::median(done$error_after), ""),
-          studies_counted(nrow(done)), held)
+          median_change(done), studies_counted(nrow(done)), held)
 }
+
+median_change <- function(studies)
+  change_words(stats::median(studies$error_before), stats::median(studies$error_after), "")
 
 # The first few of many, by their names.
 some_names <- function(names, most = 5) {

@@ -413,8 +413,9 @@ doubts_table <- function(found) {
   none <- found$doubts$found$no_doubt
   all <- list(c("adopted", adopted[[1]], adopted[[2]], "", ""),
               c("nothing: named", none[[1]], none[[2]], "", ""))
-  markdown(c("what speaks against it", "right mechanisms", "wrong ones",
-             "right ones that would be named without it", "wrong ones"), c(all, lines))
+  with_source(markdown(c("what speaks against it", "right mechanisms", "wrong ones",
+                         "right ones that would be named without it", "wrong ones"),
+                       c(all, lines)), found, "doubts")
 }
 
 # A table of a part is empty until the part has a result.

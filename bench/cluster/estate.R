@@ -1,7 +1,7 @@
 #!/usr/bin/env Rscript
 # The houses of bench/estate: Rscript bench/cluster/estate.R --write DIR --houses N --seed S writes
-# the study of each house, of one design and with its own walls, weather, heating and faults, and
-# what it hides into DIR/truth.csv. --score DIR compares the survey in DIR/survey with that.
+# the study of each house, of one design and with its own walls, weather and heating, and what it
+# hides into DIR/truth.csv. --score DIR compares the survey in DIR/survey with that.
 here <- dirname(sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE)[1]))
 source(file.path(here, "..", "options.R"))
 suppressPackageStartupMessages(library(amiss))

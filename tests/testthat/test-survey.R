@@ -63,6 +63,9 @@ test_that("numbers that are not trusted give no odds in a survey", {
   found <- survey(list(a = rough))
   expect_identical(tidy(found)$log10_bf, NA_real_)
   expect_identical(unique(tidy(found, "trials")$log10_bf), NA_real_)
+  shaky <- surveyed_upgrade()
+  shaky$candidates$trusted[shaky$candidates$mechanism == "sun"] <- FALSE
+  expect_identical(tidy(survey(list(a = shaky)))$log10_bf, NA_real_)
   expect_match(summary(found)$open, "1 study with numbers that are not trusted: a.", fixed = TRUE,
                all = FALSE)
 })
