@@ -109,6 +109,18 @@ start_process <- function(...) {
   processx::process$new(...)
 }
 
+# Stops what a process has started and left behind. processx knows it by its environment, and what
+# is starting another program just now has none for a moment: two looks in succession must find
+# nothing.
+stop_tree <- function(process) {
+  empty <- 0
+  for (look in 1:100) {
+    empty <- if (length(process$kill_tree())) 0 else empty + 1
+    if (empty == 2) break
+    Sys.sleep(0.005)
+  }
+}
+
 check_threads <- function(threads, call = rlang::caller_env()) {
   check_input(checkmate::check_int(threads, lower = 1, upper = 1024), "threads", call = call)
   as.integer(threads)

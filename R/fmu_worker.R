@@ -152,7 +152,7 @@ stop_fmu_worker <- function(fmu) {
 }
 
 end_worker <- function(worker) {
-  try(worker$process$kill_tree(), silent = TRUE)
+  try(stop_tree(worker$process), silent = TRUE)
   try(worker$process$kill(), silent = TRUE)
   unlink(worker$folder, recursive = TRUE)
 }

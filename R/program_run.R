@@ -244,7 +244,7 @@ step_failure <- function(step, status, folder) {
 wait_for <- function(process, ends, time_limit, size_limit, folder) {
   stop_with_session(process$get_pid())
   on.exit({
-    process$kill_tree()
+    stop_tree(process)
     stop_with_session(NULL)
   })
   pause <- 0.05
