@@ -35,6 +35,8 @@ causes_title <- function(survey) {
          studies_counted(nrow(survey$studies)))
 }
 
+whole_breaks <- function(limits) unique(round(pretty(limits)))
+
 figure_causes <- function(survey) {
   table <- causes_table(survey)
   sums <- stats::aggregate(n ~ row, table, sum)
@@ -45,7 +47,8 @@ figure_causes <- function(survey) {
     ggplot2::geom_text(ggplot2::aes(label = counts), sums, hjust = 0, size = 4.4,
                        colour = "grey20") +
     ggplot2::scale_fill_manual(values = state_colours) +
-    ggplot2::scale_x_continuous(expand = ggplot2::expansion(c(0, 0.02)), guide = apart) +
+    ggplot2::scale_x_continuous(breaks = whole_breaks, expand = ggplot2::expansion(c(0, 0.02)),
+                                guide = apart) +
     ggplot2::scale_y_discrete(labels = wrap_labels(0.5)) +
     figure_titles(causes_title(survey),
                   paste("Each mechanism counts the studies that adopted it: a study with two",

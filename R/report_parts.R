@@ -78,12 +78,14 @@ html_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
       sep = "")
 }
 
-# A pipe table; its dashes are the widths of the columns, by the longest word and the length of what
-# they hold.
+# A pipe table; its dashes are the widths of the columns: what the longest words need, and of the
+# rest of a page what longer texts want.
 markdown_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
   cells <- rbind(names(table), as.matrix(data.frame(lapply(table, as.character))))
-  widths <- apply(
-    cells, 2, function(x) max(nchar(unlist(strsplit(x, " "))) + 2, min(40, 0.7 * max(nchar(x)))))
+  needed <- apply(cells, 2, function(x) max(nchar(unlist(strsplit(x, " "))))) + 3
+  wanted <- pmax(pmin(40, 0.7 * apply(nchar(cells), 2, max)) - needed, 0)
+  left <- max(page_letters - sum(needed), 0)
+  widths <- needed + wanted * min(1, left / max(sum(wanted), 1))
   cells[] <- markdown_text(cells)
   strong <- c(FALSE, bold) & nzchar(cells)
   cells[strong] <- paste0("**", cells[strong], "**")
@@ -92,6 +94,8 @@ markdown_sheet <- function(table, bold = rep(FALSE, nrow(table))) {
   cat("\n", paste0(c(row(cells[1, ]), dashes, apply(cells[-1, , drop = FALSE], 1, row)), "\n"),
       "\n", sep = "")
 }
+
+page_letters <- 110  # in a line of a table
 
 # Numbers with what they are: in HTML large, side by side.
 report_tiles <- function(value, words) {
