@@ -227,13 +227,14 @@ parameter_rows <- function(fit) {
         prior_upper = side(1, 0.999), at_edge = unname(edge_of_prior(fit)[table$name]))
 }
 
-# TRUE for each parameter whose 95 % interval comes within 1 % (in probability) of an end of its
-# prior, with its median in the outer tenth at that end.
+# TRUE for each parameter whose 95 % interval ends at an end of its prior, nearer than a twentieth
+# of its own width, with its median in the outer tenth (in probability) at that end. A narrow
+# interval in a wide prior is not at the edge, however near to the end it lies in probability.
 edge_of_prior <- function(fit) {
   unit <- posterior_unit(fit)
   stats::setNames(vapply(seq_len(ncol(unit)), function(p) {
     q <- weighted_quantile(unit[, p], fit$weights, c(0.025, 0.5, 0.975))
-    near <- rules$edge_interval
+    near <- rules$edge_interval * (q[3] - q[1])
     outer <- rules$edge_median
     (q[3] > 1 - near && q[2] > 1 - outer) || (q[1] < near && q[2] < outer)
   }, NA), colnames(fit$values))

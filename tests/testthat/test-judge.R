@@ -24,6 +24,9 @@ expect_doubt <- function(pattern, change, verdict = "likely", ...) {
   expect_match(own$doubts, pattern)
 }
 
+# In the order of x, from 0 to 1, most of them near 0.
+pile_up <- function(x) (rank(x) / length(x))^4
+
 test_that("a mechanism that nothing speaks against is named", {
   expect_identical(judged()$verdict, "named")
   model <- small_upgrade()$models[[2]]
@@ -57,7 +60,8 @@ test_that("each doubt makes a mechanism likely", {
     u
   })
   expect_doubt("at the edge of what was thought possible", function(u) {
-    u$models[[2]]$fit$posterior$unit[, 3] <- 1 - 0.001 * u$models[[2]]$fit$posterior$unit[, 3]
+    unit <- u$models[[2]]$fit$posterior$unit
+    u$models[[2]]$fit$posterior$unit[, 3] <- 1 - 0.05 * pile_up(unit[, 3])
     u
   })
   expect_doubt("it describes what is missing and does not explain it", function(u) {
@@ -156,7 +160,9 @@ test_that(
 test_that("a mechanism by which data held out do not gain is a stand-in, whatever its evidence", {
   worse <- function(upgrade) {
     held <- upgrade$models[[1]]$prediction$use == "validate"
-    upgrade$models[[2]]$prediction$mean[held] <- upgrade$models[[1]]$prediction$mean[held]
+    before <- upgrade$models[[1]]$prediction
+    wrong <- sign(before$observed - before$mean) * 0.5
+    upgrade$models[[2]]$prediction$mean[held] <- (before$mean - wrong)[held]
     upgrade
   }
   expect_doubt("held-out data do not improve", worse, "stand-in")
@@ -172,6 +178,24 @@ test_that("without data held out nothing is said of a gain", {
   gain <- amiss:::held_out_gain(upgrade$models[[1]], upgrade$models[[2]])
   expect_identical(gain$improves, NA)
   expect_identical(judged(without_held_out)$verdict, "named")
+})
+
+test_that("a mechanism that hardly acts in what is held out is no stand-in, and not named", {
+  acting <- function(share, shift = 0) function(u) {
+    before <- u$models[[1]]$prediction
+    held <- before$use == "validate"
+    # The first model is right there, and the mechanism changes so much of what it does elsewhere.
+    change <- u$models[[2]]$prediction$mean - before$mean
+    size <- share * sqrt(mean(change[!held]^2))
+    noise <- withr::with_seed(3, stats::rnorm(sum(held), 0, 0.05))
+    u$models[[1]]$prediction$mean[held] <- before$observed[held] + noise
+    u$models[[2]]$prediction$mean[held] <- before$observed[held] + noise +
+      size * rep_len(c(-1, 1), sum(held)) + shift * sign(noise)
+    u
+  }
+  expect_doubt("held-out data cannot confirm it, as it hardly acts there", acting(0))
+  expect_doubt("held-out data do not improve", acting(0.5), "stand-in")
+  expect_doubt("held-out data do not improve", acting(0, 0.02), "stand-in")  # clearly worse
 })
 
 test_that("the gain on data held out has the standard error of sums over days", {
@@ -274,10 +298,12 @@ test_that("parameters that are correlated with those of a mechanism beyond 0.4 a
 
 test_that("the edge of a prior is where the interval ends and the median lies", {
   draws <- cbind(top = 1 - 0.02 * (1:500) / 500, bottom = 0.02 * (1:500) / 500,
-                 wide = (1:500) / 500, inside = 0.4 + 0.2 * (1:500) / 500)
+                 wide = (1:500) / 500, inside = 0.4 + 0.2 * (1:500) / 500,
+                 narrow = 0.005 + 0.001 * (1:500) / 500)  # of a wide prior, and well inside it
   fit <- list(values = draws, weights = rep(1 / 500, 500), posterior = list(unit = draws))
   expect_identical(amiss:::edge_of_prior(fit),
-                   c(top = TRUE, bottom = TRUE, wide = FALSE, inside = FALSE))
+                   c(top = TRUE, bottom = TRUE, wide = FALSE, inside = FALSE,
+                     narrow = FALSE))
 })
 
 test_that("a stand-in is no named cause, and what is named goes before what is likely", {
@@ -492,7 +518,7 @@ test_that("a parameter beside it at its prior's end, or another not ruled out, i
   expect_doubt("with which it is correlated, lies at the edge", function(u) {
     fit <- u$models[[2]]$fit
     sun <- fit$posterior$unit[, match("sun_gain", colnames(fit$values))]
-    fit$posterior$unit[, match("offset", colnames(fit$values))] <- 1 - 0.001 * sun
+    fit$posterior$unit[, match("offset", colnames(fit$values))] <- 1 - 0.05 * pile_up(sun)
     u$models[[2]]$fit <- fit
     u
   })
