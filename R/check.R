@@ -90,8 +90,9 @@ new_check <- function(fit, error, variance, failed, by, mean = NULL) {
   noise <- if (ratio > 0) rms / ratio else fit$measurements$noise_sd
   border <- sum(fit$weights[in_border(fit$emulator$processes$region, posterior_unit(fit))])
   passed <- ratio <= rules$error_ratio && border <= rules$border
-  told <- sprintf("by %d %s the emulator's error is %s of the noise%s", ncol(error), by,
-                  format(signif(ratio, 2)),
+  told <- sprintf("by %d %s the emulator's error is %s the noise%s", ncol(error), by,
+                  if (ratio > 1) paste(format(signif(ratio, 2)), "times")
+                  else paste(format(signif(ratio, 2)), "of"),
                   if (failed) sprintf(" (%d more failed)", failed) else "")
   verdict <- if (ratio > rules$error_ratio)
                paste0(told, ", more than a third: it is not good enough")

@@ -69,11 +69,14 @@ comparison_inspections <- function(comparison) {
 
 trust_inspections <- function(models) {
   models <- do.call(c, unname(lapply(models, fits_by_name)))
-  refuted <- Filter(function(m) isFALSE(m$fit$check$passed), models)
+  refuted <- vapply(models, function(m) isFALSE(m$fit$check$passed), NA)
   # Of several records one sampler counts.
-  rough <- Filter(function(m) m$samples && !sampler_said(m$fit)$trusted, models)
-  c(if (length(refuted)) emulator_inspection(refuted),
-    if (length(rough)) sampler_inspection(rough))
+  counts <- vapply(models, `[[`, NA, "samples")
+  rough <- counts & !vapply(models, function(m) sampler_said(m$fit)$trusted, NA)
+  other <- counts & !refuted & !rough & !vapply(models, function(m) m$fit$trust$trusted, NA)
+  c(if (any(refuted)) emulator_inspection(models[refuted]),
+    if (any(rough)) sampler_inspection(models[rough]),
+    if (any(other)) numbers_inspection(models[other]))
 }
 
 # The fit of each record, with the name that it has in sentences; `samples`: its sampler counts.
@@ -110,6 +113,14 @@ sampler_inspection <- function(models) {
                       untrusted_words("sampler's result for", "sampler's results for", models,
                                        why),
                       if (length(models) > 1) "them" else "it", listed(chains)))
+}
+
+# Searches that do not agree, or a mode at which no draw lies.
+numbers_inspection <- function(models) {
+  why <- vapply(models, function(m) listed(m$fit$trust$why), "")
+  c(numbers = sprintf("%s: %s.", untrusted_words("result for", "results for", models, why),
+                      if (any(grepl("budget", why))) "give a larger budget (control$runs_total)"
+                      else "run it again with another seed and more chains (pilot_chains)"))
 }
 
 # ---- the record

@@ -5,8 +5,8 @@ inspections_first <- 3L
 
 # The ids by what their sentences would settle, those of one group in their order.
 inspection_ranks <- function() {
-  list(verdict = c("emulator", "sampler", "record", setdiff(names(fault_words), "constant"),
-                   "held_out", "step"),
+  list(verdict = c("emulator", "sampler", "numbers", "record",
+                   setdiff(names(fault_words), "constant"), "held_out", "step"),
        cause = c("separate", "rival", "site", "drift", "parts", "stand_in", "description",
                  "nearest", "undecided", "group", "answer", "answers", "noise", "pattern",
                  "driver", "constant"),

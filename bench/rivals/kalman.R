@@ -4,17 +4,26 @@
 # integral of x_1, which begins at zero in each interval, so that means are known exactly. Two
 # parameters of S and the noise are estimated beside those of the network, by maximum likelihood.
 
-# exp([F, G; 0, 0]) and the covariance that noise adds over one step (Van Loan, 1978).
+# exp([F, G; 0, 0]) and the covariance that noise adds over one step (Van Loan, 1978). His block
+# holds exp(-F) as well, which a fast node makes large. So he gets a step no longer than the fastest
+# node is slow, which is then doubled until it is as long as the one asked for.
 exact_step <- function(drift, input, diffusion, step) {
   n <- nrow(drift)
   m <- ncol(input)
-  moved <- as.matrix(Matrix::expm(step * rbind(cbind(drift, input), matrix(0, m, n + m))))
+  doublings <- max(0, ceiling(log2(step * max(abs(drift)))))
+  short <- step / 2^doublings
+  moved <- as.matrix(Matrix::expm(short * rbind(cbind(drift, input), matrix(0, m, n + m))))
   block <- rbind(cbind(-drift, diffusion), cbind(matrix(0, n, n), t(drift)))
-  loan <- as.matrix(Matrix::expm(step * block))
+  loan <- as.matrix(Matrix::expm(short * block))
   to <- t(loan[n + seq_len(n), n + seq_len(n)])
   noise <- to %*% loan[seq_len(n), n + seq_len(n)]
-  list(to = moved[seq_len(n), seq_len(n)], input = moved[seq_len(n), n + seq_len(m)],
-       noise = (noise + t(noise)) / 2)
+  input <- moved[seq_len(n), n + seq_len(m)]
+  for (k in seq_len(doublings)) {
+    noise <- noise + to %*% noise %*% t(to)
+    input <- input + to %*% input
+    to <- to %*% to
+  }
+  list(to = to, input = input, noise = (noise + t(noise)) / 2)
 }
 
 #' @param equations Of a network: network_equations().
@@ -65,7 +74,7 @@ kalman_deviance <- compiler::cmpfun(function(equations, drivers, y, count, step,
     if (!steady) {
       before <- covariance
       covariance <- whole[own, own] - spread * tcrossprod(gain)
-      steady <- max(abs(covariance - before)) < 1e-9 * max(abs(covariance))
+      steady <- max(abs(covariance - before)) < 1e-12 * max(abs(covariance))
     }
   }
   deviance

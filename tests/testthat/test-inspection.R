@@ -234,7 +234,7 @@ test_that("edges of the prior are told with the end and its value", {
   fit <- small_upgrade()$models[[1]]$fit
   expect_length(edge_inspections(fit), 0)
   fit$values[, "gain"] <- 1.9999
-  fit$posterior$unit[, match("gain", colnames(fit$values))] <- 0.99995
+  fit$posterior$unit[, match("gain", colnames(fit$values))] <- 1 - 0.05 * pile_up(fit$weights)
   expect_match(edge_inspections(fit),
                paste("gain lies at the upper end of its prior \\(2.0\\): measure it, .* if",
                      "more is possible"))
@@ -310,7 +310,8 @@ test_that("what asks for the same action is one sentence", {
   edge <- function(...) {
     for (name in c(...)) {
       fit$values[, name] <- c(gain = 1.9999, offset = 10.0001)[[name]]
-      unit <- c(gain = 0.99995, offset = 0.00005)[[name]]
+      low <- 0.05 * pile_up(fit$weights)
+      unit <- if (name == "gain") 1 - low else low
       fit$posterior$unit[, match(name, colnames(fit$values))] <- unit
     }
     edge_inspections(fit)
@@ -377,4 +378,16 @@ test_that("a printed summary shows three sentences and says how many more there 
   expect_match(shown(3), "next: .*report")
   expect_length(summary(without_held_out(small_upgrade()))$inspect,
                 length(inspected(without_held_out(small_upgrade()))))
+})
+
+test_that("for numbers that are not trusted there is always something to do", {
+  upgrade <- small_upgrade()
+  with_reason <- function(why) {
+    upgrade$models[[1]]$fit$trust <- amiss:::new_trust(FALSE, why)
+    amiss:::upgrade_inspections(upgrade)
+  }
+  expect_match(with_reason("no two of 2 searches led to one mode")[["numbers"]],
+               "not trusted \\(no two of 2 searches .*another seed and more chains")
+  expect_match(with_reason("the budget allowed a single search")[["numbers"]], "larger budget")
+  expect_false("numbers" %in% names(amiss:::upgrade_inspections(upgrade)))
 })

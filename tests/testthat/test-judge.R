@@ -24,9 +24,6 @@ expect_doubt <- function(pattern, change, verdict = "likely", ...) {
   expect_match(own$doubts, pattern)
 }
 
-# In the order of x, from 0 to 1, most of them near 0.
-pile_up <- function(x) (rank(x) / length(x))^4
-
 test_that("a mechanism that nothing speaks against is named", {
   expect_identical(judged()$verdict, "named")
   model <- small_upgrade()$models[[2]]
