@@ -233,7 +233,7 @@ step_sentence <- function(upgrade, model) {
     change_words(parent$scores[[use]][["rmse"]], model$scores[[use]][["rmse"]], unit)
   gain <- model$held_out_gain
   sprintf("With %s the typical error %s in calibration%s.", model$mechanism, told("calibrate"),
-          if (is.na(gain$mean)) ""
+          if (is.na(gain$improves)) ""
           else sprintf("; on held-out data it %s, %s", told("validate"),
                        if (gain$mean > 0) gain_words(gain) else "no gain"))
 }

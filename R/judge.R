@@ -46,10 +46,6 @@ doubts <- list(
   no_gain = doubt(function(case) {
     if (case$no_gain) "held-out data do not improve"
   }, "what fits alone does not predict"),
-  unconfirmed = doubt(function(case) {
-    if (is.na(case$gain$improves) && !is.na(case$gain$mean))
-      "held-out data cannot confirm it, as it hardly acts there"
-  }, "what acts in calibration alone was not tested"),
   raises_error = doubt(function(case) risen_words(case$parent, case$model),
                        "what is gained, the discrepancy gains"),
   still_responds = doubt(function(case) {
@@ -189,8 +185,7 @@ risen_words <- function(parent, model) {
 
 # By how much the mean square of the error held out falls, and its standard error, from sums over
 # days (or equal blocks of a short record): errors within a day are correlated, those of several
-# records too. Of several the error is in units of each one's noise. If a mechanism hardly acts in
-# what is held out, no clear fall is no sign against it: `improves` is NA.
+# records too. Of several the error is in units of each one's noise.
 held_out_gain <- function(parent, model) {
   before <- parent$prediction[parent$prediction$use == "validate", ]
   after <- model$prediction[model$prediction$use == "validate", ]
@@ -206,14 +201,7 @@ held_out_gain <- function(parent, model) {
     block <- unlist(lapply(lengths(hours), function(n) floor(blocks * (seq_len(n) - 1) / n)))
   sums <- rowsum(fall, block)
   error <- sqrt(nrow(sums)) * stats::sd(sums) / n
-  tells <- abs(mean(fall)) > error || !is_idle_held_out(parent$prediction, model$prediction)
-  list(mean = mean(fall), standard_error = error,
-       improves = if (tells) mean(fall) > error else NA)
-}
-
-is_idle_held_out <- function(before, after) {
-  change <- function(use) mean((after$mean - before$mean)[before$use == use]^2)
-  isTRUE(change("validate") < rules$idle_held_out * change("calibrate"))
+  list(mean = mean(fall), standard_error = error, improves = mean(fall) > error)
 }
 
 # Conditions that drive no mechanism of the catalogue, and that the error before cannot distinguish

@@ -111,8 +111,8 @@ upgrade_control <- list(max_steps = 3, decisive = rules$decisive, runs_total = N
 #' @section Models: Each model that adopted a mechanism has a `verdict`:
 #'   * `"named"`;
 #'   * `"likely"`, if one of its `doubts` (sentences, each with a short name) speaks against it;
-#'   * `"stand-in"`, if held-out data do not improve, unless it hardly acts there. `held_out_gain`
-#'     is that gain, with its standard error.
+#'   * `"stand-in"`, if held-out data do not improve. `held_out_gain` is that gain, with its
+#'     standard error.
 #'
 #'   Each model also has
 #'   * `rivals`: mechanisms that the record does not distinguish from it. They and "no change" have

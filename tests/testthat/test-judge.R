@@ -177,24 +177,6 @@ test_that("without data held out nothing is said of a gain", {
   expect_identical(judged(without_held_out)$verdict, "named")
 })
 
-test_that("a mechanism that hardly acts in what is held out is no stand-in, and not named", {
-  acting <- function(share, shift = 0) function(u) {
-    before <- u$models[[1]]$prediction
-    held <- before$use == "validate"
-    # The first model is right there, and the mechanism changes so much of what it does elsewhere.
-    change <- u$models[[2]]$prediction$mean - before$mean
-    size <- share * sqrt(mean(change[!held]^2))
-    noise <- withr::with_seed(3, stats::rnorm(sum(held), 0, 0.05))
-    u$models[[1]]$prediction$mean[held] <- before$observed[held] + noise
-    u$models[[2]]$prediction$mean[held] <- before$observed[held] + noise +
-      size * rep_len(c(-1, 1), sum(held)) + shift * sign(noise)
-    u
-  }
-  expect_doubt("held-out data cannot confirm it, as it hardly acts there", acting(0))
-  expect_doubt("held-out data do not improve", acting(0.5), "stand-in")
-  expect_doubt("held-out data do not improve", acting(0, 0.02), "stand-in")  # clearly worse
-})
-
 test_that("the gain on data held out has the standard error of sums over days", {
   e <- errors()
   models <- models_of(e$before, e$after)
