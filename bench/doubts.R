@@ -16,11 +16,12 @@ doubt_ids <- names(getFromNamespace("doubts", "amiss"))
 adopted_rows <- function(file) {
   world <- readRDS(file)
   mechanisms <- unlist(world$adopted)
-  if (!length(mechanisms)) return(NULL)
   of_each <- rep_len(world$doubts, length(mechanisms))
   found <- t(vapply(of_each, function(ids) doubt_ids %in% unlist(ids), logical(length(doubt_ids))))
   colnames(found) <- doubt_ids
-  data.frame(family = world$family, seed = world$seed, mechanism = mechanisms,
+  of_all <- function(x) rep_len(x, length(mechanisms))
+  data.frame(family = of_all(world$family), seed = of_all(world$seed),
+             mechanism = as.character(mechanisms),
              right = mechanisms %in% unlist(world$true_mechanism), found, check.names = FALSE)
 }
 rows <- do.call(rbind, lapply(files, adopted_rows))
