@@ -69,14 +69,14 @@ comparison_inspections <- function(comparison) {
 
 trust_inspections <- function(models) {
   models <- do.call(c, unname(lapply(models, fits_by_name)))
-  refuted <- vapply(models, function(m) isFALSE(m$fit$check$passed), NA)
-  # Of several records one sampler counts.
-  counts <- vapply(models, `[[`, NA, "samples")
-  rough <- counts & !vapply(models, function(m) sampler_said(m$fit)$trusted, NA)
-  other <- counts & !refuted & !rough & !vapply(models, function(m) m$fit$trust$trusted, NA)
-  c(if (any(refuted)) emulator_inspection(models[refuted]),
-    if (any(rough)) sampler_inspection(models[rough]),
-    if (any(other)) numbers_inspection(models[other]))
+  refuted <- Filter(function(m) isFALSE(m$fit$check$passed), models)
+  sampled <- Filter(function(m) m$samples, models)  # of several records one sampler counts
+  sticks <- vapply(sampled, function(m) !sampler_said(m$fit)$trusted, NA)
+  other <- Filter(function(m) !m$fit$trust$trusted && !isFALSE(m$fit$check$passed),
+                  sampled[!sticks])
+  c(if (length(refuted)) emulator_inspection(refuted),
+    if (any(sticks)) sampler_inspection(sampled[sticks]),
+    if (length(other)) numbers_inspection(other))
 }
 
 # The fit of each record, with the name that it has in sentences; `samples`: its sampler counts.

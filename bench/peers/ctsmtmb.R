@@ -3,9 +3,9 @@
 # the same values of the parameters of the same stochastic networks.
 # Usage: Rscript bench/peers/ctsmtmb.R [--worlds 2,4,13] [--points 3] [--substeps 64,256]
 #                                      [--seed 1] [--out FILE]
-# ctsmTMB is not installed by tools/: it needs newer packages than Debian 12 has. It was tried with
-# ctsmTMB 1.1.1, RTMB 2.0 (compiled as C++17), TMB 1.9.25, Rcpp 1.1.2, RcppEigen 0.3.4.0.2 and Deriv
-# 4.2.0 in a library of their own, given by R_LIBS.
+# tools/ does not install ctsmTMB, which needs newer packages than Debian 12 has: with R 4.2 ctsmTMB
+# 1.1.1, RTMB 2.0 (compiled as C++17), TMB 1.9.25, Rcpp 1.1.2 and RcppEigen 0.3.4.0.2 of CRAN and
+# Deriv 4.2.0 (sgsokol/Deriv, tag v4.2.0) work in a library of their own, which R_LIBS names.
 #
 # ctsmTMB knows observations at instants only, and begins at numbers. Here its model runs in a time
 # of its own, stretched by inputs: `begin` (a constant drift takes each node from zero to where it

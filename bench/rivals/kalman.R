@@ -5,8 +5,8 @@
 # parameters of S and the noise are estimated beside those of the network, by maximum likelihood.
 
 # exp([F, G; 0, 0]) and the covariance that noise adds over one step (Van Loan, 1978). His block
-# holds exp(-F) as well, which a fast node makes large. So he gets a step no longer than the fastest
-# node is slow, which is then doubled until it is as long as the one asked for.
+# also holds exp(-F), which overflows if a node is much faster than the step. So both are computed
+# for a step no longer than the fastest time constant, and doubled up to the step asked for.
 exact_step <- function(drift, input, diffusion, step) {
   n <- nrow(drift)
   m <- ncol(input)

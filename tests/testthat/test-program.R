@@ -174,7 +174,7 @@ alive <- function(command)
 test_that("a run ends with its program, and what that left in the background is stopped", {
   took <- seconds(expect_equal(shell_run("sleep 301 &", "(setsid sleep 302 &)", good), 1:3))
   expect_lt(took, 200)  # a tenth of a second on an idle machine; what is left behind takes 300
-  wait_until(function() !alive("^sleep 30[12]$"))  # killed is not gone yet
+  for (wait in 1:50) if (alive("^sleep 30[12]$")) Sys.sleep(0.1)  # killed is not gone yet
   expect_false(alive("^sleep 30[12]$"))
 })
 
